@@ -23,6 +23,10 @@ pub enum ExpectedOutcome {
 }
 
 impl ExpectedOutcome {
+    pub(crate) fn of(profile: &Profile) -> Self {
+        if profile.is_one_sided() { Self::Refuse } else { Self::Estimate }
+    }
+
     /// The word used in truth tables.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -74,7 +78,7 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
         gap_m,
         stiffness_n_per_m: plant.contact.stiffness_n_per_m,
         skew_s: sensors.skew_s(),
-        expected: if profile.is_one_sided() { ExpectedOutcome::Refuse } else { ExpectedOutcome::Estimate },
+        expected: ExpectedOutcome::of(profile),
     })
 }
 

@@ -39,7 +39,7 @@ pub use load::vibration::{Line, Lines, Vibration};
 pub use plant::actuator_plant::Plant;
 pub use plant::backlash_contact::{Contact, ContactLaw};
 pub use plant::friction::{Friction, FrictionLaw};
-pub use plant::motor_controller::{Drive, PositionLoop};
+pub use plant::motor_controller::Drive;
 pub use plant::two_mass;
 pub use sensors::sensor::{Channel, Clock, NoiseColour, PeriodicError, PeriodicErrors, Sensors};
 pub use up_to_three::UpToThree;

@@ -1,5 +1,7 @@
 //! Planning of a fleet: slots, departures, swaps, flight hours, wear, and the state of each actuator.
 
+use std::collections::BTreeSet;
+
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,8 +11,8 @@ use crate::fleet::fleet_events::FaultKind;
 use crate::fleet::fleet_plan_types::{
     ActuatorTruth, Assignment, Inspection, Installation, LogState, Maintenance, Plan, PlannedFlight,
 };
-use crate::fleet::fleet_roster::{FleetUnit, UnitAssignment, fleet_units};
-use crate::fleet::fleet_spec::Spec;
+use crate::fleet::fleet_roster::{FleetUnit, fleet_units, seat};
+use crate::fleet::fleet_spec::{Position, Spec};
 use crate::fleet::planted_change::ActuatorFlight;
 use crate::fleet::wear;
 use crate::flight::ExpectedOutcome;
@@ -23,7 +25,8 @@ const DAY_US: f64 = 24.0 * HOUR_US;
 pub(crate) struct Planner<'a> {
     spec: &'a Spec,
     start_us: i64,
-    unit_at: UnitAssignment,
+    /// The unit of each seat, an index into `units`.
+    unit_at: Vec<usize>,
     units: Vec<FleetUnit>,
     wear: Vec<ChaCha8Rng>,
     tail_hours: Vec<f64>,
@@ -41,7 +44,7 @@ impl<'a> Planner<'a> {
         let mut planner = Self {
             spec,
             start_us: spec.start_us()?,
-            unit_at: UnitAssignment::new(spec),
+            unit_at: (0..spec.tails.len() * spec.positions.len()).collect(),
             units,
             wear,
             tail_hours: (0..spec.tails.len()).map(|k| spec.tail_hours * (1.0 + 0.1 * k as f64)).collect(),
@@ -50,16 +53,14 @@ impl<'a> Planner<'a> {
             inspections: Vec::new(),
             flights: Vec::new(),
         };
-        for tail in 0..spec.tails.len() {
-            (0..spec.positions.len()).for_each(|position| planner.install(tail, position, planner.start_us));
-        }
+        (0..planner.unit_at.len()).for_each(|seat| planner.install(seat, planner.start_us));
         Ok(planner)
     }
 
     /// All flights, in order of their number: a unit may change tails between two of them.
     pub(crate) fn plan(mut self) -> Result<Plan, Error> {
         for number in 1..=self.spec.flights_per_tail {
-            self.swap(number)?;
+            self.exchange(number)?;
             self.inspect(number);
             self.reshim(number);
             for tail in 0..self.spec.tails.len() {
@@ -80,23 +81,46 @@ impl<'a> Planner<'a> {
         if days >= 1.0 { days.floor() } else { days }
     }
 
-    fn swap(&mut self, number: usize) -> Result<(), Error> {
+    /// Carries out the swaps and replacements that are due before a flight, counted from 1.
+    fn exchange(&mut self, number: usize) -> Result<(), Error> {
+        let (spec, mut touched) = (self.spec, BTreeSet::new());
+        for swap in spec.swaps.iter().filter(|swap| swap.before_flight == number) {
+            let [a, b] = [&swap.from, &swap.to].map(|place| seat(spec, &place.tail, &place.position));
+            let part = |seat: usize| &spec.parts[self.units[self.unit_at[seat]].part].part_number;
+            if part(a) != part(b) {
+                return Err(Error::Misfit { flight: number, from: part(a).clone(), to: part(b).clone() });
+            }
+            self.unit_at.swap(a, b);
+            touched.extend([a, b]);
+        }
+        for (k, spare) in spec.replacements.iter().enumerate().filter(|(_, s)| s.before_flight == number) {
+            let seat = seat(spec, &spare.tail, &spare.position);
+            self.unit_at[seat] = self.unit_at.len() + k;
+            touched.insert(seat);
+        }
         let at_us = self.slot_us(number);
-        for (tail, position) in self.unit_at.swap(self.spec, &self.units, number)? {
-            let (tail_number, place) = (&self.spec.tails[tail], &self.spec.positions[position].position);
-            let here = |stay: &&mut Installation| stay.tail_number == *tail_number && stay.position == *place;
+        for seat in touched {
+            let (tail, position) = self.place(seat);
+            let here =
+                |stay: &&mut Installation| stay.tail_number == *tail && stay.position == position.position;
             if let Some(stay) = self.installations.iter_mut().rev().find(here) {
                 stay.removed_us = Some(at_us);
             }
-            self.install(tail, position, at_us);
+            self.install(seat, at_us);
         }
         Ok(())
+    }
+
+    /// Tail and position of a seat.
+    fn place(&self, seat: usize) -> (&'a String, &'a Position) {
+        let positions = &self.spec.positions;
+        (&self.spec.tails[seat / positions.len()], &positions[seat % positions.len()])
     }
 
     /// Reads the play of units before a flight, to the micrometre.
     fn inspect(&mut self, number: usize) {
         for check in self.spec.play_checks.iter().filter(|check| check.before_flight == number) {
-            let unit = &self.units[self.unit_at.installed(self.spec, &check.tail, &check.position)];
+            let unit = &self.units[self.unit_at[seat(self.spec, &check.tail, &check.position)]];
             self.inspections.push(Inspection {
                 part_number: self.spec.parts[unit.part].part_number.clone(),
                 serial_number: unit.serial_number.clone(),
@@ -112,7 +136,7 @@ impl<'a> Planner<'a> {
     fn reshim(&mut self, number: usize) {
         let at_us = self.slot_us(number);
         for shim in self.spec.reshims.iter().filter(|shim| shim.before_flight == number) {
-            let index = self.unit_at.installed(self.spec, &shim.tail, &shim.position);
+            let index = self.unit_at[seat(self.spec, &shim.tail, &shim.position)];
             let unit = &mut self.units[index];
             unit.gap_m = shim.gap_m;
             if shim.is_recorded {
@@ -139,17 +163,17 @@ impl<'a> Planner<'a> {
         }
     }
 
-    fn install(&mut self, tail: usize, position: usize, installed_us: i64) {
-        let unit = &self.units[self.unit_at.unit(tail, position)];
+    fn install(&mut self, seat: usize, installed_us: i64) {
+        let ((tail, position), unit) = (self.place(seat), &self.units[self.unit_at[seat]]);
         self.installations.push(Installation {
-            tail_number: self.spec.tails[tail].clone(),
-            position: self.spec.positions[position].position.clone(),
+            tail_number: tail.clone(),
+            position: position.position.clone(),
             part_number: self.spec.parts[unit.part].part_number.clone(),
             serial_number: unit.serial_number.clone(),
             installed_us,
             removed_us: None,
             unit_hours_at_install: unit.age_hours,
-            tail_hours_at_install: self.tail_hours[tail],
+            tail_hours_at_install: self.tail_hours[seat / self.spec.positions.len()],
         });
     }
 
@@ -163,10 +187,9 @@ impl<'a> Planner<'a> {
         let flight_hours = (spec.flight_hours * (1.0 + spread) * 100.0).round() / 100.0;
         let departure_us = self.slot_us(number) + self.departure_us(flight_hours, &mut rng);
         self.tail_hours[tail] += flight_hours;
-        let seats = 0..spec.positions.len();
-        let (actuators, assignments) = seats
-            .map(|position| self.plan_actuator((tail, position), (number, &flight_id), flight_hours))
-            .unzip();
+        let seats = tail * spec.positions.len()..(tail + 1) * spec.positions.len();
+        let (actuators, assignments) =
+            seats.map(|seat| self.plan_actuator(seat, number, &flight_id, flight_hours)).unzip();
         self.flights.push(PlannedFlight {
             tail_number: name.clone(),
             seed: derive_seed(spec.seed, &["log", &flight_id]),
@@ -197,27 +220,24 @@ impl<'a> Planner<'a> {
     /// Applies the wear of the flight and assigns plant, profile and sensors.
     fn plan_actuator(
         &mut self,
-        (tail, position): (usize, usize),
-        (number, flight_id): (usize, &str),
+        seat: usize,
+        number: usize,
+        flight_id: &str,
         flight_hours: f64,
     ) -> (ActuatorTruth, Assignment) {
-        let index = self.unit_at.unit(tail, position);
+        let index = self.unit_at[seat];
         self.wear(index, flight_hours);
-        let assignment = self.assignment((tail, position), (number, flight_id));
+        let assignment = self.assignment(seat, number, flight_id);
         let unit = &self.units[index];
         let truth = ActuatorTruth {
-            position: self.spec.positions[position].position.clone(),
+            position: self.place(seat).1.position.clone(),
             part_number: self.spec.parts[unit.part].part_number.clone(),
             serial_number: unit.serial_number.clone(),
             unit_hours: unit.age_hours,
             gap_m: unit.gap_m,
             stiffness_n_per_m: assignment.plant.contact.stiffness_n_per_m,
             skew_s: assignment.sensors.skew_s(),
-            expected: if assignment.profile.is_one_sided() {
-                ExpectedOutcome::Refuse
-            } else {
-                ExpectedOutcome::Estimate
-            },
+            expected: ExpectedOutcome::of(&assignment.profile),
         };
         (truth, assignment)
     }
@@ -231,9 +251,9 @@ impl<'a> Planner<'a> {
         unit.gap_m += wear::step_m(growth_m, scatter_m, &mut self.wear[index]);
     }
 
-    fn assignment(&self, (tail, position): (usize, usize), (number, flight_id): (usize, &str)) -> Assignment {
-        let (spec, unit) = (self.spec, &self.units[self.unit_at.unit(tail, position)]);
-        let (spread, place, tail) = (&spec.spread, &spec.positions[position], &spec.tails[tail]);
+    fn assignment(&self, seat: usize, number: usize, flight_id: &str) -> Assignment {
+        let (spec, unit) = (self.spec, &self.units[self.unit_at[seat]]);
+        let (spread, (tail, place)) = (&spec.spread, self.place(seat));
         let mut of_place = seeded_rng(spec.seed, &["place", tail, &place.position]);
         let mut of_stay = seeded_rng(spec.seed, &["stay", tail, &place.position, &unit.serial_number]);
         let mut of_flight = seeded_rng(spec.seed, &["actuator", flight_id, &place.position]);
@@ -267,9 +287,8 @@ impl<'a> Planner<'a> {
 
     fn finish(self) -> Plan {
         let mut installations = self.installations;
-        let place = |name: &str| self.spec.positions.iter().position(|known| known.position == name);
-        let tail = |name: &str| self.spec.tails.iter().position(|known| known == name);
-        installations.sort_by_key(|s| (tail(&s.tail_number), place(&s.position), s.installed_us));
+        installations
+            .sort_by_key(|stay| (seat(self.spec, &stay.tail_number, &stay.position), stay.installed_us));
         Plan {
             parts: self.spec.parts.clone(),
             installations,

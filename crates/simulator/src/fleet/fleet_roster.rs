@@ -1,4 +1,4 @@
-//! Assignment of units to positions over time.
+//! The units of a fleet: those of the start and the spares.
 
 use rand::Rng;
 
@@ -69,64 +69,9 @@ fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUni
     }
 }
 
-/// Index of a place; the spec is checked before, so both names are found.
-fn seat(spec: &Spec, tail: &str, position: &str) -> usize {
+/// Index of a place, counted by tail and then by position; the spec is checked before, so both names are found.
+pub(crate) fn seat(spec: &Spec, tail: &str, position: &str) -> usize {
     let tail = spec.tails.iter().take_while(|known| *known != tail).count();
     let position = spec.positions.iter().take_while(|known| known.position != position).count();
     tail * spec.positions.len() + position
-}
-
-/// Who sits where, one flight after the other.
-#[derive(Debug, Clone)]
-pub(crate) struct UnitAssignment {
-    positions: usize,
-    units: Vec<usize>,
-}
-
-impl UnitAssignment {
-    /// Everybody where they start.
-    pub(crate) fn new(spec: &Spec) -> Self {
-        let positions = spec.positions.len();
-        Self { positions, units: (0..spec.tails.len() * positions).collect() }
-    }
-
-    /// The unit in a place.
-    pub(crate) fn unit(&self, tail: usize, position: usize) -> usize {
-        self.units[tail * self.positions + position]
-    }
-
-    /// The unit installed in a named place.
-    pub(crate) fn installed(&self, spec: &Spec, tail: &str, position: &str) -> usize {
-        self.units[seat(spec, tail, position)]
-    }
-
-    /// Carries out the swaps and replacements due before a flight, counted from 1, and names the seats they
-    /// touched.
-    pub(crate) fn swap(
-        &mut self,
-        spec: &Spec,
-        units: &[FleetUnit],
-        flight: usize,
-    ) -> Result<Vec<(usize, usize)>, Error> {
-        let mut touched = Vec::new();
-        for swap in spec.swaps.iter().filter(|swap| swap.before_flight == flight) {
-            let [a, b] = [&swap.from, &swap.to].map(|place| seat(spec, &place.tail, &place.position));
-            let part = |seat: usize| units[self.units[seat]].part;
-            if part(a) != part(b) {
-                let name = |seat| spec.parts[part(seat)].part_number.clone();
-                return Err(Error::Misfit { flight, from: name(a), to: name(b) });
-            }
-            self.units.swap(a, b);
-            touched.extend([a, b]);
-        }
-        let first_spare = spec.tails.len() * self.positions;
-        for (k, spare) in spec.replacements.iter().enumerate().filter(|(_, s)| s.before_flight == flight) {
-            let at = seat(spec, &spare.tail, &spare.position);
-            self.units[at] = first_spare + k;
-            touched.push(at);
-        }
-        touched.sort_unstable();
-        touched.dedup();
-        Ok(touched.into_iter().map(|seat| (seat / self.positions, seat % self.positions)).collect())
-    }
 }

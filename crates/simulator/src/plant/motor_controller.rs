@@ -37,7 +37,7 @@ impl Drive {
 
 /// The state of a drive: its gains for one moved mass, and its integrator.
 #[derive(Debug, Clone, Copy)]
-pub struct PositionLoop {
+pub(crate) struct PositionLoop {
     drive: Drive,
     gain_n_s_per_m: f64,
     integral_n: f64,
@@ -45,7 +45,7 @@ pub struct PositionLoop {
 
 impl PositionLoop {
     /// A loop tuned for the mass it moves.
-    pub fn new(drive: Drive, moved_kg: f64) -> Self {
+    pub(crate) fn new(drive: Drive, moved_kg: f64) -> Self {
         Self { drive, gain_n_s_per_m: TAU * drive.speed_hz * moved_kg, integral_n: 0.0 }
     }
 
@@ -53,7 +53,7 @@ impl PositionLoop {
     ///
     /// The integrator has a fifth of the speed loop's bandwidth and holds its value while the force
     /// saturates, so it does not wind up.
-    pub fn force_n(&mut self, command_m: f64, motor_m: f64, motor_m_per_s: f64, step_s: f64) -> f64 {
+    pub(crate) fn force_n(&mut self, command_m: f64, motor_m: f64, motor_m_per_s: f64, step_s: f64) -> f64 {
         let limit = self.drive.speed_limit_m_per_s;
         let wanted = (TAU * self.drive.position_hz * (command_m - motor_m)).clamp(-limit, limit);
         let push_n = self.gain_n_s_per_m * (wanted - motor_m_per_s);
