@@ -153,20 +153,8 @@ fn refusals(stats: &[ErrorStats]) -> String {
 
 fn robot_table(rows: &[RobotRow]) -> String {
     let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks |\n|---|---|---|---|---|---|---|---|\n".to_owned();
-    let cell = |v: f64, digits: usize| if v.is_nan() { "–".to_owned() } else { format!("{v:.digits$}") };
-    for r in rows {
-        let _ = writeln!(
-            table,
-            "| {} | {} | {} | {} | {} | {} | {} | {} |",
-            r.log,
-            cell(r.gap_deg, 4),
-            cell(r.se_deg, 4),
-            cell(r.skew_ms, 2),
-            cell(r.midrange_deg, 4),
-            cell(r.lines_deg, 4),
-            cell(r.spread_deg, 4),
-            if r.remarks.is_empty() { "–" } else { &r.remarks },
-        );
+    for row in rows {
+        let _ = writeln!(table, "| {} |", row.join(" | "));
     }
     table
 }

@@ -1,5 +1,6 @@
 //! Logs of a real machine: a robot whose play is near zero and whose channels are 3 ms apart.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use ingest::LogFiles;
@@ -9,26 +10,9 @@ use records::{Installations, PartNumber};
 
 use crate::methods::{load_lines_m, spread_m};
 
-/// The results of every method for a log; degrees unless the name has another unit, NaN where refused.
-#[derive(Debug, Clone)]
-pub struct RobotRow {
-    /// Name of the log.
-    pub log: String,
-    /// Contact regression.
-    pub gap_deg: f64,
-    /// Its standard error.
-    pub se_deg: f64,
-    /// The paper's statistic.
-    pub midrange_deg: f64,
-    /// Load lines.
-    pub lines_deg: f64,
-    /// P99 − P1 of δX.
-    pub spread_deg: f64,
-    /// Skew of the screw channel, ms.
-    pub skew_ms: f64,
-    /// Refusal or flags.
-    pub remarks: String,
-}
+/// The cells of a log: its name; in degrees gap, standard error; skew, ms; in degrees the paper's statistic, load lines and
+/// P99 − P1 of δX; refusal or flags. A dash where there is none.
+pub type RobotRow = [String; 8];
 
 /// Estimates the robot's axes with the configuration in the same folder.
 ///
@@ -59,25 +43,21 @@ fn estimate_log(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<Robot
 
 fn row(log: &str, look: &EstimatePlot) -> RobotRow {
     let e = &look.estimate;
+    let cell = |value: f64, digits: usize| {
+        if value.is_nan() { "–".to_owned() } else { format!("{value:.digits$}") }
+    };
     let radius_m = e.reference_radius_m.unwrap_or(f64::NAN);
-    let degrees = |m: f64| (m / radius_m).to_degrees();
-    let or_nan = |m: Option<f64>| m.map_or(f64::NAN, degrees);
-    RobotRow {
-        log: log.to_owned(),
-        gap_deg: or_nan(e.gap_m),
-        se_deg: or_nan(e.gap_se_m),
-        midrange_deg: or_nan(e.gap_midrange_m.or(look.midrange.map(|gap| gap.gap_m))),
-        lines_deg: degrees(load_lines_m(&look.dx_m, &look.load_n)),
-        spread_deg: degrees(spread_m(&look.dx_m)),
-        skew_ms: e.skew_s.map_or(f64::NAN, |s| s * 1e3),
-        remarks: e
-            .reason
-            .iter()
-            .chain(&e.flags)
-            .cloned()
-            .collect::<std::collections::BTreeSet<_>>()
-            .into_iter()
-            .collect::<Vec<_>>()
-            .join(", "),
-    }
+    let degrees = |m: Option<f64>| cell((m.unwrap_or(f64::NAN) / radius_m).to_degrees(), 4);
+    let remarks: BTreeSet<&str> = e.reason.iter().chain(&e.flags).map(String::as_str).collect();
+    let remarks = remarks.into_iter().collect::<Vec<_>>().join(", ");
+    [
+        log.to_owned(),
+        degrees(e.gap_m),
+        degrees(e.gap_se_m),
+        cell(e.skew_s.map_or(f64::NAN, |s| s * 1e3), 2),
+        degrees(e.gap_midrange_m.or(look.midrange.map(|gap| gap.gap_m))),
+        degrees(Some(load_lines_m(&look.dx_m, &look.load_n))),
+        degrees(Some(spread_m(&look.dx_m))),
+        if remarks.is_empty() { "–".to_owned() } else { remarks },
+    ]
 }

@@ -87,8 +87,13 @@ pub struct Class {
     /// How it is judged.
     pub kind: Kind,
     gap_m: f64,
-    change: fn(&mut Case, &mut ChaCha8Rng),
+    /// Draws what the flights of many classes have in common, before `change`.
+    base: Draw,
+    change: Draw,
 }
+
+/// Changes a case by chance.
+type Draw = fn(&mut Case, &mut ChaCha8Rng);
 
 /// Every class.
 pub fn classes() -> &'static [Class] {
@@ -102,87 +107,80 @@ pub fn class(name: &str) -> Option<&'static Class> {
 
 const UM: f64 = 1e-6;
 
-const fn of_gap(name: &'static str, gap_um: f64, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
-    Class { name, kind: Kind::Single, gap_m: gap_um * UM, change }
+/// A flight of 100 µm with nothing but the change.
+const fn single(name: &'static str, change: Draw) -> Class {
+    Class { name, kind: Kind::Single, gap_m: 100.0 * UM, base: nothing, change }
 }
 
-const fn single(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
-    of_gap(name, 100.0, change)
+/// A flight of a gap with the small faults of service.
+const fn mixed(name: &'static str, gap_um: f64, change: Draw) -> Class {
+    Class { gap_m: gap_um * UM, base: mixture, ..single(name, change) }
 }
 
-const fn blind(name: &'static str, code: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
-    Class { name, kind: Kind::Blind(code), gap_m: 100.0 * UM, change }
+const fn blind(name: &'static str, code: &'static str, change: Draw) -> Class {
+    Class { kind: Kind::Blind(code), ..mixed(name, 100.0, change) }
 }
 
-const fn foreign(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
-    Class { name, kind: Kind::Foreign, gap_m: 0.0, change }
+const fn foreign(name: &'static str, change: Draw) -> Class {
+    Class { name, kind: Kind::Foreign, gap_m: 0.0, base: wide, change }
 }
 
-const fn drawn(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
-    Class { name, kind: Kind::Drawn, gap_m: 0.0, change }
+const fn drawn(name: &'static str, change: Draw) -> Class {
+    Class { name, kind: Kind::Drawn, gap_m: 0.0, base: service, change }
 }
+
+fn nothing(_: &mut Case, _: &mut ChaCha8Rng) {}
 
 static CLASSES: &[Class] = &[
-    single("nominal", |_, _| ()),
+    single("nominal", nothing),
     single("stiffness assumed 30 % high", |c, _| c.assumed_factor = 1.3),
     single("stiffness assumed 30 % low", |c, _| c.assumed_factor = 0.7),
     single("load cell reads 5 % high", |c, _| c.sensors.load.gain_error = 0.05),
     single("friction × 8", |c, _| c.plant = c.plant.with_friction_factor(8.0)),
     single("screw channel 5 ms late", |c, _| c.sensors.screw.delay_s = 5e-3),
     single("load channel 5 ms late", |c, _| c.sensors.load.delay_s = 5e-3),
-    single("spikes of 2 mm", |c, _| {
-        (c.sensors.screw.spikes_per_minute, c.sensors.screw.spike) = (1.0, 2e-3);
-    }),
+    single("spikes of 2 mm", |c, _| (c.sensors.screw.spikes_per_minute, c.sensors.screw.spike) = (1.0, 2e-3)),
     single("5 % of samples missing", |c, _| c.sensors.screw.dropout_share = 0.05),
     single("screw channel freezes for 2 s", |c, _| {
         (c.sensors.screw.freezes_per_minute, c.sensors.screw.freeze_s) = (1.0, 2.0);
     }),
     single("drift of 50 µm", |c, _| c.sensors.screw.drift = 50.0 * UM),
     single("transducer bent by 15 µm", |c, _| c.sensors.screw.nonlinearity = 15.0 * UM),
-    single("airload of 800 N", |c, rng| {
-        mixture(c, rng);
-        c.profile.load_n = 800.0;
-    }),
-    single("mixture, 100 µm", mixture),
-    Class { name: "mixture, 30 µm", kind: Kind::Single, gap_m: 30.0 * UM, change: mixture },
-    Class { name: "mixture, no gap", kind: Kind::Zero, gap_m: 0.0, change: mixture },
-    Class { name: "wide", kind: Kind::Wide, gap_m: 0.0, change: wide },
+    mixed("airload of 800 N", 100.0, |c, _| c.profile.load_n = 800.0),
+    mixed("mixture, 100 µm", 100.0, nothing),
+    mixed("mixture, 30 µm", 30.0, nothing),
+    Class { kind: Kind::Zero, ..mixed("mixture, no gap", 0.0, nothing) },
+    Class { kind: Kind::Wide, ..foreign("wide", nothing) },
     foreign("wide, Stribeck friction", |c, rng| {
-        wide(c, rng);
         let ratio = rng.random_range(1.1..1.6);
         c.plant.friction_law = FrictionLaw::Stribeck { ratio, speed_m_per_s: rng.random_range(1e-3..1e-2) };
     }),
     foreign("wide, pre-sliding friction", |c, rng| {
-        wide(c, rng);
         c.plant.friction_law = FrictionLaw::Presliding { travel_m: rng.random_range(2e-6..20e-6) };
     }),
-    single("soft flanks, 20 µm deep", |c, rng| {
-        mixture(c, rng);
+    mixed("soft flanks, 20 µm deep", 100.0, |c, _| {
         c.plant.contact.law = ContactLaw::Soft { share: 0.4, depth_m: 20.0 * UM };
     }),
-    single("soft flanks, 100 µm deep", |c, rng| {
-        mixture(c, rng);
+    mixed("soft flanks, 100 µm deep", 100.0, |c, _| {
         c.plant.contact.law = ContactLaw::Soft { share: 0.4, depth_m: 100.0 * UM };
     }),
-    single("flanks partly Hertzian", |c, rng| {
-        mixture(c, rng);
+    mixed("flanks partly Hertzian", 100.0, |c, _| {
         c.plant.contact.law = ContactLaw::Hertz { share: 0.3, reference_m: 100.0 * UM };
     }),
-    single("Hertzian flanks", |c, rng| {
-        mixture(c, rng);
+    mixed("Hertzian flanks", 100.0, |c, _| {
         c.plant.contact.law = ContactLaw::Hertz { share: 1.0, reference_m: 100.0 * UM };
     }),
-    of_gap("vibration of 0 N, 80 µm", 80.0, vibration::<0>),
-    of_gap("vibration of 200 N, 80 µm", 80.0, vibration::<200>),
-    of_gap("vibration of 500 N, 80 µm", 80.0, vibration::<500>),
-    of_gap("vibration of 1000 N, 80 µm", 80.0, vibration::<1000>),
-    of_gap("vibration of 2000 N, 80 µm", 80.0, vibration::<2000>),
-    of_gap("vibration of 0 N, 25 µm", 25.0, vibration::<0>),
-    of_gap("vibration of 200 N, 25 µm", 25.0, vibration::<200>),
-    of_gap("vibration of 500 N, 25 µm", 25.0, vibration::<500>),
-    of_gap("vibration of 1000 N, 25 µm", 25.0, vibration::<1000>),
-    of_gap("vibration of 2000 N, 25 µm", 25.0, vibration::<2000>),
-    drawn("no fault", |_, _| ()),
+    mixed("vibration of 0 N, 80 µm", 80.0, vibration::<0>),
+    mixed("vibration of 200 N, 80 µm", 80.0, vibration::<200>),
+    mixed("vibration of 500 N, 80 µm", 80.0, vibration::<500>),
+    mixed("vibration of 1000 N, 80 µm", 80.0, vibration::<1000>),
+    mixed("vibration of 2000 N, 80 µm", 80.0, vibration::<2000>),
+    mixed("vibration of 0 N, 25 µm", 25.0, vibration::<0>),
+    mixed("vibration of 200 N, 25 µm", 25.0, vibration::<200>),
+    mixed("vibration of 500 N, 25 µm", 25.0, vibration::<500>),
+    mixed("vibration of 1000 N, 25 µm", 25.0, vibration::<1000>),
+    mixed("vibration of 2000 N, 25 µm", 25.0, vibration::<2000>),
+    drawn("no fault", nothing),
     drawn("load-cell zero", load_zero),
     drawn("load-cell zero that drifts", |c, rng| {
         c.sensors.load.drift = either(rng) * rng.random_range(0.02..0.1) * c.profile.load_n;
@@ -224,9 +222,7 @@ static CLASSES: &[Class] = &[
         (c.profile.rest_share, c.profile.rest_s) = (rng.random_range(0.4..0.85), rng.random_range(8.0..30.0));
     }),
     drawn("stiffness that moves", moving_stiffness),
-    drawn("unequal flanks", |c, rng| {
-        c.plant.contact.lower_stiffness_factor = log_uniform(rng, 0.7..1.4);
-    }),
+    drawn("unequal flanks", |c, rng| c.plant.contact.lower_stiffness_factor = log_uniform(rng, 0.7..1.4)),
     drawn("soft flanks, bilinear", |c, rng| soft(c, rng, bilinear)),
     drawn("soft flanks, Hertz", |c, rng| soft(c, rng, hertz)),
     drawn("soft flanks, exponential toe", |c, rng| soft(c, rng, toe)),
@@ -242,84 +238,39 @@ static CLASSES: &[Class] = &[
     drawn("worn in mid-stroke", |c, rng| worn(c, rng, 0.0)),
     drawn("worn off centre", |c, rng| worn(c, rng, 0.2)),
     drawn("load cell clipped", |c, rng| c.sensors.load.clip = rng.random_range(0.45..0.9) * c.profile.load_n),
-    Class {
-        name: "preloaded nut",
-        kind: Kind::Drawn,
-        gap_m: 0.0,
-        change: |c, rng| {
-            let windup_m = c.profile.load_n / c.plant.contact.stiffness_n_per_m;
-            c.plant.contact.gap_m = -rng.random_range(0.1..0.6) * windup_m;
-        },
-    },
-    Class {
-        name: "zero gap, drawn wide",
-        kind: Kind::Drawn,
-        gap_m: 0.0,
-        change: |c, rng| {
-            everything(c, rng);
-            c.plant.contact.gap_m = 0.0;
-        },
-    },
+    drawn("preloaded nut", |c, rng| {
+        let windup_m = c.profile.load_n / c.plant.contact.stiffness_n_per_m;
+        c.plant.contact.gap_m = -rng.random_range(0.1..0.6) * windup_m;
+    }),
+    drawn("zero gap, drawn wide", |c, rng| {
+        everything(c, rng);
+        c.plant.contact.gap_m = 0.0;
+    }),
     drawn("everything, hard flanks", everything),
     drawn("everything, soft flanks", |c, rng| {
         everything(c, rng);
         let law = *[bilinear as LawDraw, hertz, toe].choose(rng).unwrap_or(&(toe as LawDraw));
         soft(c, rng, law);
     }),
-    blind("the load never reverses", "no_load_reversal", |c, rng| {
-        mixture(c, rng);
-        c.profile.no_reversal = true;
-    }),
+    blind("the load never reverses", "no_load_reversal", |c, _| c.profile.no_reversal = true),
     blind("load on one side, its zero off", "no_load_reversal", |c, rng| {
-        mixture(c, rng);
         c.profile.no_reversal = true;
         c.profile.load_n = rng.random_range(2.5e3..4e3);
         c.sensors.load.bias = rng.random_range(0.25..0.4) * c.profile.load_n;
     }),
-    blind("load sign flipped", "load_sign_flipped", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::LoadFlipped;
-    }),
-    blind("positions swapped", "positions_swapped", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::Swapped;
-    }),
-    blind("screw position 2 % off its lead", "position_ratio", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::Ratio;
-    }),
-    blind("10 samples a second", "rate_too_low", |c, rng| {
-        mixture(c, rng);
-        c.profile.sample_rate_hz = 10.0;
-    }),
-    blind("eight seconds", "too_short", |c, rng| {
-        mixture(c, rng);
-        c.profile.duration_s = 8.0;
-    }),
-    blind("airload below friction", "load_too_small", |c, rng| {
-        mixture(c, rng);
-        c.profile.load_n = 100.0;
-    }),
-    blind("another actuator's load", "motion_unexplained", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::OtherLoad;
-    }),
-    blind("the motor hardly moves", "travel_too_small", |c, rng| {
-        mixture(c, rng);
+    blind("load sign flipped", "load_sign_flipped", |c, _| c.mapping = Mapping::LoadFlipped),
+    blind("positions swapped", "positions_swapped", |c, _| c.mapping = Mapping::Swapped),
+    blind("screw position 2 % off its lead", "position_ratio", |c, _| c.mapping = Mapping::Ratio),
+    blind("10 samples a second", "rate_too_low", |c, _| c.profile.sample_rate_hz = 10.0),
+    blind("eight seconds", "too_short", |c, _| c.profile.duration_s = 8.0),
+    blind("airload below friction", "load_too_small", |c, _| c.profile.load_n = 100.0),
+    blind("another actuator's load", "motion_unexplained", |c, _| c.mapping = Mapping::OtherLoad),
+    blind("the motor hardly moves", "travel_too_small", |c, _| {
         (c.profile.stroke_m, c.profile.stick_share, c.profile.trim_share) = (2e-5, 0.01, 0.003);
     }),
-    blind("load cell dead", "channel_constant", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::DeadLoad;
-    }),
-    blind("screw channel dead", "channel_constant", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::DeadScrew;
-    }),
-    blind("motor channel dead", "channel_constant", |c, rng| {
-        mixture(c, rng);
-        c.mapping = Mapping::DeadMotor;
-    }),
+    blind("load cell dead", "channel_constant", |c, _| c.mapping = Mapping::DeadLoad),
+    blind("screw channel dead", "channel_constant", |c, _| c.mapping = Mapping::DeadScrew),
+    blind("motor channel dead", "channel_constant", |c, _| c.mapping = Mapping::DeadMotor),
 ];
 
 /// Several small faults at once, as in service.
@@ -380,8 +331,7 @@ fn service(case: &mut Case, rng: &mut ChaCha8Rng) {
 }
 
 /// ± 7 kN and vibration of 5 to 60 Hz.
-fn vibration<const RMS_N: u32>(case: &mut Case, rng: &mut ChaCha8Rng) {
-    mixture(case, rng);
+fn vibration<const RMS_N: u32>(case: &mut Case, _: &mut ChaCha8Rng) {
     case.profile.load_n = 7e3;
     case.profile.buffet = Vibration::band(5.0, 60.0, f64::from(RMS_N) / 7e3);
 }
@@ -518,7 +468,7 @@ fn toe(rng: &mut ChaCha8Rng) -> ContactLaw {
 }
 
 /// Faults of which each flight of *everything* has about two.
-const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 10] = [
+const FAULTS: [Draw; 10] = [
     buffet,
     lines,
     turbulence,
@@ -591,9 +541,7 @@ impl Class {
             seed: (own >> 20) + 1000 + index,
         };
         case.plant.contact.offset_m = rng.random_range(-3e-4..3e-4);
-        if self.kind == Kind::Drawn {
-            service(&mut case, &mut rng);
-        }
+        (self.base)(&mut case, &mut rng);
         (self.change)(&mut case, &mut rng);
         case
     }
