@@ -4,6 +4,7 @@ use crate::data::series::{DAY_US, Flight, Series};
 use crate::error::Error;
 use crate::math::distributions::{self, NORMAL_95};
 use crate::measured::exceedance::Exceedance;
+use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
@@ -11,7 +12,7 @@ use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
 use crate::statement::types::{Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus};
-use crate::unit_fit::{Fit, RiseCrossing, UnitFit, hours_per_usage};
+use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// Number of last days that give the utilisation.
 const UTILIZATION_DAYS: i64 = 90;
@@ -90,6 +91,7 @@ pub fn assess(
 }
 
 /// Numbers of an assessment that need a forecast.
+#[derive(Default)]
 struct Forecasts {
     crossing: Option<Crossing>,
     method: Option<ForecastMethod>,
@@ -112,7 +114,7 @@ impl Forecasts {
             (None, Some(rise)) => Self {
                 crossing: Some(within(rise, settings.horizon_hours)),
                 method: Some(ForecastMethod::Line),
-                rate: unit.measured.rise.map(|rise| Rate {
+                rate: Some(Rate {
                     p05_m_per_hour: rise.m_per_hour - NORMAL_95 * rise.m_per_hour_se,
                     m_per_hour: rise.m_per_hour,
                     p95_m_per_hour: rise.m_per_hour + NORMAL_95 * rise.m_per_hour_se,
@@ -121,14 +123,7 @@ impl Forecasts {
                 growth_probability: Some(1.0),
                 check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
             },
-            (None, None) => Self {
-                crossing: None,
-                method: None,
-                rate: None,
-                wear: WearStatus::Unknown,
-                growth_probability: None,
-                check_probability: None,
-            },
+            (None, None) => Self::default(),
         };
         let is_over =
             matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held));
@@ -167,17 +162,17 @@ fn not_after(crossing: Crossing, p05_hours: f64) -> Crossing {
 }
 
 /// The crossing without times beyond the horizon.
-fn within(crossing: RiseCrossing, horizon_hours: f64) -> Crossing {
+fn within(rise: Rise, horizon_hours: f64) -> Crossing {
     let within = |hours: f64| Some(hours).filter(|hours| *hours <= horizon_hours);
     Crossing {
-        p05_hours: within(crossing.p05_hours),
-        p50_hours: within(crossing.p50_hours),
-        p95_hours: within(crossing.p95_hours),
+        p05_hours: within(rise.p05_hours),
+        p50_hours: within(rise.p50_hours),
+        p95_hours: within(rise.p95_hours),
     }
 }
 
 /// Probability that the line meets the limit within some hours: log-normal through its early and middle time.
-fn chance_by(hours: f64, rise: &RiseCrossing) -> f64 {
+fn chance_by(hours: f64, rise: &Rise) -> f64 {
     if rise.p50_hours <= hours {
         return 1.0 - 0.5 * rise.p50_hours / hours.max(f64::MIN_POSITIVE);
     }

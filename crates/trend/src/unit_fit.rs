@@ -6,6 +6,7 @@ use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::inference::consistency::Evidence;
 use crate::inference::posterior::{Posterior, posterior};
+use crate::measured::rise::Rise;
 use crate::measured::{Jump, Measured};
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
@@ -67,15 +68,16 @@ impl<'a> UnitFit<'a> {
         outliers.map(|flight| flights[*flight].departure_us).collect()
     }
 
-    /// The line's crossing, counted from the last flight.
-    pub(crate) fn rise_now(&self, flights: &[Flight]) -> Option<RiseCrossing> {
+    /// The rise of the last records, its hours counted from the last flight.
+    pub(crate) fn rise_now(&self, flights: &[Flight]) -> Option<Rise> {
         let (rise, record) = (self.measured.rise?, self.measured.sound.last()?);
         let flown = flights.last()?.hours - record.hours;
         let left = |hours: f64| (hours - flown).max(0.0);
-        Some(RiseCrossing {
+        Some(Rise {
             p05_hours: left(rise.p05_hours),
             p50_hours: left(rise.p50_hours),
             p95_hours: left(rise.p95_hours),
+            ..rise
         })
     }
 }
@@ -150,14 +152,6 @@ fn onset(
     let first = flights.partition_point(|flight| prior.usage(flight) < segment.begin + start);
     let departure_us = flights.get(first)?.departure_us;
     Some(ChangePoint { departure_us, kind: ChangePointKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
-}
-
-/// Hours from the last flight to the limit by the line through the last records.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RiseCrossing {
-    pub(crate) p05_hours: f64,
-    pub(crate) p50_hours: f64,
-    pub(crate) p95_hours: f64,
 }
 
 /// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last

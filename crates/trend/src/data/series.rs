@@ -39,25 +39,17 @@ pub struct UsageDefaults {
 }
 
 /// Where the hours of a unit are known from, the most complete source first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::Display)]
+#[strum(serialize_all = "snake_case")]
 pub enum UsageSource {
     /// The flights table: every flight of the aircraft, with or without a log.
     FlightsTable,
     /// The hour meter of the aircraft, which also counts flights without a log.
+    #[strum(serialize = "tail_hours")]
     TailHourMeter,
     /// The lengths of the logged flights alone: flights without a log are missing.
     #[default]
     LoggedFlights,
-}
-
-impl std::fmt::Display for UsageSource {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::FlightsTable => "flights_table",
-            Self::TailHourMeter => "tail_hours",
-            Self::LoggedFlights => "logged_flights",
-        })
-    }
 }
 
 impl Default for UsageDefaults {

@@ -1,7 +1,5 @@
 //! Fleet prior: distribution of the parameters of a new unit of one part number (empirical Bayes).
 
-use std::fmt;
-
 use crate::data::series::Flight;
 use crate::data::steps::WEAR_NOISE;
 use crate::math::distributions::{NORMAL_95, ln_peak_density};
@@ -37,13 +35,16 @@ const FIRST_SPREAD: f64 = 0.1;
 const RULED_OUT: f64 = 0.003;
 
 /// What wear of a part number follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, strum::Display)]
+#[strum(serialize_all = "snake_case")]
 pub enum UsageAxis {
     /// Hours flown.
+    #[strum(serialize = "flight_hours")]
     Hours,
     /// Flights.
     Flights,
     /// Load reversals.
+    #[strum(serialize = "load_reversals")]
     Reversals,
 }
 
@@ -58,16 +59,6 @@ impl UsageAxis {
             Self::Flights => flight.flights,
             Self::Reversals => flight.reversals,
         }
-    }
-}
-
-impl fmt::Display for UsageAxis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Hours => "flight_hours",
-            Self::Flights => "flights",
-            Self::Reversals => "load_reversals",
-        })
     }
 }
 

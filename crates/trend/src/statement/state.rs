@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use strum::{EnumString, IntoStaticStr};
+
 use crate::data::series::DAY_US;
 use crate::measured::exceedance::Exceedance;
 use crate::measured::thresholds::HYSTERESIS;
@@ -10,7 +12,8 @@ use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// Alert state of a unit, from least to most urgent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, EnumString)]
+#[strum(serialize_all = "snake_case")]
 pub enum State {
     /// No action.
     Normal,
@@ -30,23 +33,18 @@ impl State {
 
     /// Its word in columns, keys and messages.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Watch => "watch",
-            Self::Unassessed => "unassessed",
-            Self::Plan => "plan",
-            Self::Act => "act",
-        }
+        self.into()
     }
 
     /// The state with this word.
     pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|state| state.as_str() == word)
+        word.parse().ok()
     }
 }
 
 /// Why a state.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub enum Reason {
     /// No flight of this installation has a gap without a doubt.
@@ -81,20 +79,8 @@ impl Reason {
     /// Its code in columns.
     pub fn code(self) -> &'static str {
         match self {
-            Self::NoRecord { .. } => "no_record",
-            Self::NoLimit => "no_limit",
-            Self::Stale { .. } => "stale",
-            Self::Renewed { .. } => "renewed",
-            Self::AboveLimit { .. } => "above_limit",
-            Self::LimitHeld { .. } => "limit_held",
-            Self::Unconfirmed { .. } => "unconfirmed",
-            Self::CrossesSoon { .. } => "crosses_soon",
-            Self::RisesToLimit { .. } => "rises_to_limit",
-            Self::AtWatch { .. } => "at_watch",
-            Self::Jumped { .. } => "jumped",
             Self::Changed { kind: ChangePointKind::Onset, .. } => "onset",
-            Self::Changed { .. } => "changed",
-            Self::Clear { .. } => "clear",
+            other => other.into(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Result types of an assessment.
 
-use std::fmt;
+use strum::{Display, IntoStaticStr};
 
 /// Number of estimates below which no wear law is fitted.
 pub(crate) const MIN_ESTIMATES: usize = 8;
@@ -28,7 +28,8 @@ pub struct LatestRecord {
 }
 
 /// What a crossing was computed by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum ForecastMethod {
     /// The records are at the limit: nothing is left to forecast.
     Measured,
@@ -43,12 +44,7 @@ pub enum ForecastMethod {
 impl ForecastMethod {
     /// Its word in columns.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Fleet => "fleet",
-            Self::SingleUnit => "single_unit",
-            Self::Line => "line",
-        }
+        self.into()
     }
 }
 
@@ -92,13 +88,14 @@ pub struct Utilization {
 }
 
 /// Whether a unit wears.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum WearStatus {
     /// It has grown by 2 % of the limit or more with a probability above 95 %.
     Wearing,
     /// It has not grown that much, more likely than not.
     Steady,
     /// Too little is known, or growth is likely and not certain.
+    #[default]
     Unknown,
 }
 
@@ -119,7 +116,8 @@ pub struct ChangePoint {
 }
 
 /// Kinds of change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, Display)]
+#[strum(serialize_all = "snake_case")]
 pub enum ChangePointKind {
     /// The measurement moved: re-rigging, another reference. The wear did not.
     Step,
@@ -132,30 +130,18 @@ pub enum ChangePointKind {
     /// Records above the limit, confirmed by a second one.
     Exceedance,
     /// One record above the limit that the next ones did not confirm.
+    #[strum(serialize = "exceedance_not_confirmed")]
     UnconfirmedExceedance,
 }
 
 impl ChangePointKind {
     /// Its word in columns.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Step => "step",
-            Self::Reset => "reset",
-            Self::Onset => "onset",
-            Self::Recorded => "recorded",
-            Self::Exceedance => "exceedance",
-            Self::UnconfirmedExceedance => "exceedance_not_confirmed",
-        }
+        self.into()
     }
 
     /// A change of the gap that no record explains.
     pub fn is_unexplained(self) -> bool {
         matches!(self, Self::Step | Self::Reset | Self::Onset)
-    }
-}
-
-impl fmt::Display for ChangePointKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.as_str())
     }
 }

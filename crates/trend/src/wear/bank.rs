@@ -16,7 +16,6 @@
 //! A power or an exponential has no change of rate to come. Stages separate a fleet whose units all wear out late from
 //! one whose units do not: the share of each is learned, and a unit that still wears evenly is forecast from the others.
 
-use std::fmt;
 use std::sync::LazyLock;
 
 /// Age that a power law's amplitude refers to, hours.
@@ -115,7 +114,8 @@ pub(crate) struct Candidate {
 }
 
 /// Class of wear laws that is reported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]
+#[strum(serialize_all = "snake_case")]
 pub enum WearClass {
     /// No wear.
     None,
@@ -127,18 +127,6 @@ pub enum WearClass {
     Linear,
     /// Wear with a rising rate.
     Accelerating,
-}
-
-impl fmt::Display for WearClass {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Onset => "onset",
-            Self::Slowing => "slowing",
-            Self::Linear => "linear",
-            Self::Accelerating => "accelerating",
-        })
-    }
 }
 
 /// Share of each family in a fleet without data.
