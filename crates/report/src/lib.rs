@@ -19,12 +19,11 @@ pub use model::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
     QuantityView, Report, Tail, TimedInterval, UnitView,
 };
-pub use page::{Error, Page, flight_path, part_path, tail_path, unit_path};
+pub use page::{Error, Page, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
 pub use pages::part::part_pages;
 pub use pages::tail::tail_page;
 pub use pages::unit::unit_page;
 pub use state_badge::StateBadge;
-pub use stats::agreement::Agreement;
 pub use stats::rate_spread::RateSpreads;
 pub use stats::removal_forecast::{Month, removal_forecast};

@@ -46,12 +46,12 @@ pub fn flight_path(tail_number: &str, flight_id: &str, position: &str) -> String
 }
 
 /// Path of a page of a part number, relative to the report folder; a part with many units has several.
-pub fn part_path(part_number: &str, page: usize) -> String {
+pub(crate) fn part_path(part_number: &str, page: usize) -> String {
     let stem = file_stem("part", &[part_number]);
     if page == 0 { format!("part/{stem}.html") } else { format!("part/{stem}.page-{}.html", page + 1) }
 }
 
 /// Path of a tail's page, relative to the report folder.
-pub fn tail_path(tail_number: &str) -> String {
+pub(crate) fn tail_path(tail_number: &str) -> String {
     format!("tail/{}.html", file_stem("tail", &[tail_number]))
 }

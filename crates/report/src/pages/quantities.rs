@@ -1,7 +1,7 @@
 //! Followed quantities on the pages of unit, tail and fleet: small charts, levels, and what changed.
 
 use jiff::Timestamp;
-use records::{ChangeScope, Quantity, QuantityChange};
+use records::{Quantity, QuantityChange};
 
 use crate::charts::quantities::{Line, small_chart};
 use crate::format::{NO_DATA, date};
@@ -170,13 +170,9 @@ fn change(report: &Report, root: &str, change: &QuantityChange) -> Change {
         (None, Some(tail), _) => tail.clone(),
         (None, None, part) => part.clone().unwrap_or_else(|| NO_DATA.to_owned()),
     };
-    let whose = [ChangeScope::Unit, ChangeScope::Tail, ChangeScope::Part]
-        .into_iter()
-        .find(|scope| scope.as_str() == change.scope)
-        .map_or("", ChangeScope::as_str);
     Change {
         since: date(change.since_utc),
-        whose,
+        whose: change.scope,
         link: link.map(|path| format!("{root}{path}")),
         name,
         evidence: change.evidence.clone(),

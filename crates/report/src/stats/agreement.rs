@@ -4,22 +4,22 @@ use records::uncertainty::NORMAL_95;
 
 /// Bias and limits of agreement of two measurements of the same gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Agreement {
+pub(crate) struct Agreement {
     /// Pairs.
-    pub pairs: usize,
+    pub(crate) pairs: usize,
     /// Mean of estimate minus inspection, m.
-    pub bias_m: f64,
+    pub(crate) bias_m: f64,
     /// 90 % interval of the bias, m: half its width.
-    pub bias_half_width_m: f64,
+    pub(crate) bias_half_width_m: f64,
     /// Bias less 1.96 standard deviations, m.
-    pub lower_m: f64,
+    pub(crate) lower_m: f64,
     /// Bias plus 1.96 standard deviations, m.
-    pub upper_m: f64,
+    pub(crate) upper_m: f64,
 }
 
 impl Agreement {
     /// Computes the agreement from pairs of estimate and inspection, m; `None` for fewer than three pairs.
-    pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
+    pub(crate) fn of(pairs: &[(f64, f64)]) -> Option<Self> {
         if pairs.len() < 3 {
             return None;
         }
