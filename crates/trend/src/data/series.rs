@@ -148,7 +148,7 @@ impl Series {
             return Err(Error::Setting { name: "nominal_flight_hours", value: nominal });
         }
         let (rows, faults) = in_order(rows)?;
-        let mut meter = UsageAccumulator::new(nominal);
+        let mut meter = UsageAccumulator { nominal_flight_hours: nominal, ..UsageAccumulator::default() };
         let flights: Vec<Flight> = rows.iter().map(|row| meter.add_flight(row)).collect();
         debug_assert!(
             flights.is_sorted_by_key(|flight| flight.departure_us),
@@ -286,7 +286,7 @@ fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
 }
 
 /// The unit's usage so far, and the hour meter it was last read against.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct UsageAccumulator {
     nominal_flight_hours: f64,
     hours: f64,
@@ -301,18 +301,6 @@ struct UsageAccumulator {
 }
 
 impl UsageAccumulator {
-    fn new(nominal_flight_hours: f64) -> Self {
-        Self {
-            nominal_flight_hours,
-            hours: 0.0,
-            flights: 0.0,
-            reversals: 0.0,
-            stated: (0.0, 0.0),
-            rows: (0.0, 0.0),
-            anchor: None,
-        }
-    }
-
     /// Adds a flight.
     fn add_flight(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
