@@ -12,7 +12,7 @@ use crate::format::{level, or_no_data, percent};
 use crate::state_badge::StateBadge;
 
 /// Content of a report. Serialised, it is `report.json`; field names there follow the first version.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Report {
     pub made_utc: Timestamp,
@@ -82,7 +82,7 @@ pub struct LogError {
 }
 
 /// Data of one aircraft.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Tail {
     pub tail_number: String,
@@ -95,7 +95,7 @@ pub struct Tail {
 }
 
 /// One unit: its assessment and the data behind it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct UnitView {
     pub part_number: Option<String>,

@@ -3,8 +3,7 @@
 
 use records::WorkRequest;
 use report::{
-    Assessment, Quality, RateSpreads, Report, Tail, UnitView, fleet_pages, part_pages, tail_page, unit_page,
-    unit_path,
+    Assessment, RateSpreads, Report, Tail, UnitView, fleet_pages, part_pages, tail_page, unit_page, unit_path,
 };
 
 const HOSTILE: &str = "<script>alert(1)</script>";
@@ -21,17 +20,8 @@ fn unit(serial: &str, state: Option<&str>) -> UnitView {
             limit_m: state.map(|_| 150e-6),
             ..Assessment::default()
         },
-        quality: Quality::default(),
-        events: Vec::new(),
-        installations: Vec::new(),
-        past_forecasts: Vec::new(),
-        inspections: Vec::new(),
-        work_requests: Vec::new(),
-        quantities: Vec::new(),
         sketch_m: vec![40e-6, 50e-6, 60e-6],
-        level: Vec::new(),
-        forecast: Vec::new(),
-        flights: Vec::new(),
+        ..UnitView::default()
     }
 }
 
@@ -39,30 +29,11 @@ fn report(units: Vec<UnitView>) -> Report {
     Report {
         made_utc: "2026-11-20T02:09:00Z".parse().unwrap(),
         program: "Freeplay".to_owned(),
-        store_version: None,
-        scope: None,
         as_of_utc: Some("2026-11-19T23:41:00Z".parse().unwrap()),
-        newest_departure_utc: None,
-        logs_known: 0,
         check_interval_hours: 300.0,
-        log_errors: Vec::new(),
-        priors: Vec::new(),
-        tails: vec![Tail {
-            tail_number: HOSTILE.to_owned(),
-            flights: 0,
-            records: 0,
-            refused: 0,
-            logs_in_error: 0,
-            last_departure_utc: None,
-            last_estimate_utc: None,
-        }],
+        tails: vec![Tail { tail_number: HOSTILE.to_owned(), ..Tail::default() }],
         units,
-        inspections_given: false,
-        inspections_unmatched: 0,
-        quantity_changes: Vec::new(),
-        mapping_faults: Vec::new(),
-        notes: Vec::new(),
-        trend_rows: Vec::new(),
+        ..Report::default()
     }
 }
 

@@ -16,7 +16,7 @@ use crate::pages::quantities::{self, Change};
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
 use crate::stats::rate_spread::{RateSpread, spreads};
-use crate::stats::removal_forecast::removal_forecast;
+use crate::stats::removal_forecast::{Month, removal_forecast};
 
 /// Maximum number of work-list rows on one page.
 const WORK_ROWS: usize = 100;
@@ -72,7 +72,7 @@ struct FleetView<'a> {
     tail_pages: Vec<String>,
     /// Part numbers, each with a page.
     parts: Vec<&'a str>,
-    months: Vec<(String, String, String, u32)>,
+    months: Vec<Month>,
     undated: usize,
     spreads: Vec<RateSpread<'a>>,
     /// The tails that have been without an estimate for longest.
@@ -184,7 +184,7 @@ fn index_page<'a>(
         map: map(report, &worst),
         tail_pages,
         parts: report.by_part().into_keys().collect(),
-        months: months(report),
+        months: removal_forecast(report),
         undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
         spreads: spreads(report),
         gaps: longest_without_estimate(report),
@@ -311,14 +311,10 @@ fn map<'a>(report: &'a Report, tails: &[&'a str]) -> Map<'a> {
     Map { positions, rows }
 }
 
-fn months(report: &Report) -> Vec<(String, String, String, u32)> {
-    let months = removal_forecast(report);
+/// Length of a month's bar, % of the largest bound of all months.
+fn bar_percent(month: &Month, months: &[Month]) -> u32 {
     let most = months.iter().map(|m| m.high).fold(1.0, f64::max);
-    let row = |m: &crate::stats::removal_forecast::Month| {
-        let interval = format!("{:.1} to {:.1}", m.low, m.high);
-        (m.name.clone(), format!("{:.1}", m.expected), interval, (100.0 * m.expected / most) as u32)
-    };
-    months.iter().map(row).collect()
+    (100.0 * month.expected / most) as u32
 }
 
 fn longest_without_estimate(report: &Report) -> Vec<&Tail> {
