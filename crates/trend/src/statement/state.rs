@@ -90,100 +90,92 @@ fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
 
+/// A length, µm.
+fn um(m: f64) -> String {
+    format!("{:.1} µm", 1e6 * m)
+}
+
+/// Text of records above the limit that nothing has confirmed.
+fn unconfirmed(gap_m: f64, limit_m: f64, before_m: Option<f64>, count: usize) -> String {
+    let which = match count {
+        0 | 1 => format!("1 record of {} is", um(gap_m)),
+        _ => format!("{} with quality flags, up to {}, are", records(count), um(gap_m)),
+    };
+    let before = before_m.map_or_else(
+        || "no record of this installation before".to_owned(),
+        |before_m| format!("the records before read {}", um(before_m)),
+    );
+    format!("{which} above the limit of {}, not confirmed yet; {before}", um(limit_m))
+}
+
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let um = |m: f64| m * 1e6;
-        match *self {
-            Self::NoRecord { flagged: 0 } => write!(f, "no record of a gap"),
+        let text = match *self {
+            Self::NoRecord { flagged: 0 } => "no record of a gap".to_owned(),
             Self::NoRecord { flagged } => {
-                write!(f, "no sound record of this installation: {} with a quality flag", records(flagged))
+                format!("no sound record of this installation: {} with a quality flag", records(flagged))
             }
-            Self::NoLimit => write!(f, "no limit is configured"),
+            Self::NoLimit => "no limit is configured".to_owned(),
             Self::Stale { days, gap_m } => {
-                write!(f, "no sound record for {days:.0} days; the gap was {:.1} µm then", um(gap_m))
+                format!("no sound record for {days:.0} days; the gap was {} then", um(gap_m))
             }
-            Self::Renewed { days } => write!(f, "no record since the maintenance {days:.0} days ago"),
-            Self::AboveLimit { gap_m, limit_m, records: count } => write!(
-                f,
-                "gap {:.1} µm is at or above the limit of {:.1} µm, by the last {}",
-                um(gap_m),
-                um(limit_m),
-                records(count)
-            ),
-            Self::LimitHeld { gap_m, limit_m, latest_m } => write!(
-                f,
-                "was at the limit of {:.1} µm; gap {:.1} µm, latest record {:.1} µm: `act` holds until two records are below {:.1} µm",
-                um(limit_m),
-                um(gap_m),
-                um(latest_m),
-                um(HYSTERESIS * limit_m)
-            ),
-            Self::Unconfirmed { gap_m, limit_m, before_m, records: count } => {
-                let (gap_um, limit_um) = (um(gap_m), um(limit_m));
-                if count > 1 {
-                    write!(f, "{} with quality flags, up to {gap_um:.1} µm, are", records(count))?;
-                } else {
-                    write!(f, "1 record of {gap_um:.1} µm is")?;
-                }
-                write!(f, " above the limit of {limit_um:.1} µm, not confirmed yet")?;
-                match before_m {
-                    Some(before_m) => write!(f, "; the records before read {:.1} µm", um(before_m)),
-                    None => write!(f, "; no record of this installation before"),
-                }
+            Self::Renewed { days } => format!("no record since the maintenance {days:.0} days ago"),
+            Self::AboveLimit { gap_m, limit_m, records: count } => {
+                let (gap, limit) = (um(gap_m), um(limit_m));
+                format!("gap {gap} is at or above the limit of {limit}, by the last {}", records(count))
             }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours < 0.5 => {
-                write!(
-                    f,
-                    "may already be at the limit (5 % point); planning horizon {planning_horizon_hours:.0} FH"
+            Self::LimitHeld { gap_m, limit_m, latest_m } => {
+                let (gap, limit, latest) = (um(gap_m), um(limit_m), um(latest_m));
+                let below = um(HYSTERESIS * limit_m);
+                format!(
+                    "was at the limit of {limit}; gap {gap}, latest record {latest}: `act` holds until two records are below {below}"
                 )
             }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
-                write!(
-                    f,
-                    "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {planning_horizon_hours:.0} FH"
+            Self::Unconfirmed { gap_m, limit_m, before_m, records } => {
+                unconfirmed(gap_m, limit_m, before_m, records)
+            }
+            Self::CrossesSoon { p05_hours, planning_horizon_hours: horizon } if p05_hours < 0.5 => {
+                format!("may already be at the limit (5 % point); planning horizon {horizon:.0} FH")
+            }
+            Self::CrossesSoon { p05_hours, planning_horizon_hours: horizon } => {
+                format!(
+                    "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {horizon:.0} FH"
                 )
             }
-            Self::RisesToLimit { p05_hours, records: count, m_per_hour, .. } if p05_hours < 0.5 => {
-                write!(
-                    f,
-                    "rises {:.2} µm/FH over the last {} and may be at the limit with the next flight",
-                    um(m_per_hour),
+            Self::RisesToLimit { p05_hours, planning_horizon_hours, records: count, m_per_hour } => {
+                let end = match p05_hours {
+                    ..0.5 => "may be at the limit with the next flight".to_owned(),
+                    _ => format!(
+                        "could reach the limit within {p05_hours:.0} FH; planning horizon {planning_horizon_hours:.0} FH"
+                    ),
+                };
+                format!("rises {:.2} µm/FH over the last {} and {end}", 1e6 * m_per_hour, records(count))
+            }
+            Self::AtWatch { gap_m, watch_m, .. } if gap_m < watch_m => {
+                let (gap, watch, below) = (um(gap_m), um(watch_m), um(HYSTERESIS * watch_m));
+                format!(
+                    "gap {gap} was above the watch limit of {watch}; `watch` holds until it is below {below}"
+                )
+            }
+            Self::AtWatch { gap_m, watch_m, records: count } => {
+                let (gap, watch) = (um(gap_m), um(watch_m));
+                format!("gap {gap} is above the watch limit of {watch}, by the last {}", records(count))
+            }
+            Self::Jumped { before_m, after_m, records: count } => {
+                format!(
+                    "gap rose at once from {:.1} to {}, {} ago",
+                    1e6 * before_m,
+                    um(after_m),
                     records(count)
                 )
             }
-            Self::RisesToLimit { p05_hours, planning_horizon_hours, records: count, m_per_hour } => write!(
-                f,
-                "rises {:.2} µm/FH over the last {} and could reach the limit within {p05_hours:.0} FH; planning horizon {planning_horizon_hours:.0} FH",
-                um(m_per_hour),
-                records(count)
-            ),
-            Self::AtWatch { gap_m, watch_m, .. } if gap_m < watch_m => write!(
-                f,
-                "gap {:.1} µm was above the watch limit of {:.1} µm; `watch` holds until it is below {:.1} µm",
-                um(gap_m),
-                um(watch_m),
-                um(HYSTERESIS * watch_m)
-            ),
-            Self::AtWatch { gap_m, watch_m, records: count } => write!(
-                f,
-                "gap {:.1} µm is above the watch limit of {:.1} µm, by the last {}",
-                um(gap_m),
-                um(watch_m),
-                records(count)
-            ),
-            Self::Jumped { before_m, after_m, records: count } => write!(
-                f,
-                "gap rose at once from {:.1} to {:.1} µm, {} ago",
-                um(before_m),
-                um(after_m),
-                records(count)
-            ),
             Self::Changed { kind: ChangePointKind::Onset, days } => {
-                write!(f, "wear began or sped up {days:.0} days ago")
+                format!("wear began or sped up {days:.0} days ago")
             }
-            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
-            Self::Clear { records: count } => write!(f, "below all limits, by the last {}", records(count)),
-        }
+            Self::Changed { kind, days } => format!("{kind} {days:.0} days ago, not on record"),
+            Self::Clear { records: count } => format!("below all limits, by the last {}", records(count)),
+        };
+        f.write_str(&text)
     }
 }
 
@@ -212,18 +204,8 @@ pub(crate) fn alert_state(
     let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
     let Some(level) = measured.level else { return (State::Unassessed, Reason::NoRecord { flagged: 0 }) };
     let gap_m = level.gap_m;
-    match measured.exceedance {
-        Some(Exceedance::Confirmed { records }) => {
-            return (State::Act, Reason::AboveLimit { gap_m, limit_m, records });
-        }
-        Some(Exceedance::Held) => {
-            let latest_m = measured.latest.map_or(gap_m, |record| record.gap_m);
-            return (State::Act, Reason::LimitHeld { gap_m, limit_m, latest_m });
-        }
-        Some(Exceedance::Unconfirmed { gap_m, before_m, records }) => {
-            return (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m, records });
-        }
-        None => {}
+    if let Some(exceeded) = exceeded(measured, gap_m, limit_m) {
+        return exceeded;
     }
     if let Some(utc_us) = measured.renewed_us {
         return (State::Unassessed, Reason::Renewed { days: days_since(utc_us) });
@@ -274,4 +256,18 @@ pub(crate) fn alert_state(
         }
         _ => (State::Normal, Reason::Clear { records: level.records }),
     }
+}
+
+/// State and reason of an exceedance.
+fn exceeded(measured: &Measured, gap_m: f64, limit_m: f64) -> Option<(State, Reason)> {
+    Some(match measured.exceedance? {
+        Exceedance::Confirmed { records } => (State::Act, Reason::AboveLimit { gap_m, limit_m, records }),
+        Exceedance::Held => {
+            let latest_m = measured.latest.map_or(gap_m, |record| record.gap_m);
+            (State::Act, Reason::LimitHeld { gap_m, limit_m, latest_m })
+        }
+        Exceedance::Unconfirmed { gap_m, before_m, records } => {
+            (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m, records })
+        }
+    })
 }
