@@ -15,7 +15,7 @@ use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
-use crate::stats::rate_spread::{RateSpread, spreads};
+use crate::stats::rate_spread::spreads;
 use crate::stats::removal_forecast::{Month, removal_forecast};
 
 /// Maximum number of work-list rows on one page.
@@ -57,32 +57,15 @@ struct FleetView<'a> {
     title: String,
     footer: String,
     report: &'a Report,
-    heading: String,
-    decision: String,
-    lead: String,
-    counts: Vec<(StateBadge, String)>,
-    data_summary: String,
     groups: Vec<Group<'a>>,
     more_work: Vec<String>,
     label: &'static str,
-    changes: Vec<(String, String, String, String)>,
     quantity_changes: Vec<Change>,
     more_quantity_changes: usize,
     map: Map<'a>,
     tail_pages: Vec<String>,
-    /// Part numbers, each with a page.
-    parts: Vec<&'a str>,
-    months: Vec<Month>,
-    undated: usize,
-    spreads: Vec<RateSpread<'a>>,
-    /// The tails that have been without an estimate for longest.
-    gaps: Vec<&'a Tail>,
-    more_log_errors: usize,
-    forecast_accuracy: Vec<(String, String, String)>,
-    inspections: String,
-    inspection_bias: Vec<(String, String, String, String)>,
+    /// Plot of estimates against inspections; empty without a pair.
     scatter: String,
-    pairs: Vec<(&'a UnitView, &'a Inspection)>,
 }
 
 #[derive(Template)]
@@ -149,51 +132,20 @@ fn index_page<'a>(
     more_work: Vec<String>,
     tail_pages: Vec<String>,
 ) -> Result<FleetView<'a>, Error> {
-    let number = |s: StateBadge| report.units.iter().filter(|u| u.badge() == s).count();
-    let worst = most_urgent_tails(report);
-    let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
-    let pairs = if report.inspections_given { checks.take(WORK_ROWS).collect() } else { Vec::new() };
     let quantity_changes = quantities::changes(report, "", |_| true);
     Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
-        heading: heading(report),
-        decision: unbroken(&decision(report)),
-        report,
         footer: report.footer(),
-        lead: format!(
-            "{} · data to {} · assessed {}",
-            report.scope.as_deref().unwrap_or("Whole fleet"),
-            minute_or(report.newest_departure_utc),
-            minute_or(report.as_of_utc),
-        ),
-        counts: StateBadge::ALL.map(|s| (s, count(number(s)))).into(),
-        data_summary: format!(
-            "{} read · {} failed · {} · {}",
-            counted(report.logs_known, "log"),
-            count(report.log_errors.len()),
-            counted(report.tails.len(), "tail"),
-            counted(report.units.len(), "unit"),
-        ),
+        report,
         groups,
         more_work,
         label: "Work list",
-        changes: changes(report),
         more_quantity_changes: quantity_changes.len().saturating_sub(FEW),
         quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
-        map: map(report, &worst),
+        map: map(report, &most_urgent_tails(report)),
         tail_pages,
-        parts: report.by_part().into_keys().collect(),
-        months: removal_forecast(report),
-        undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
-        spreads: spreads(report),
-        gaps: longest_without_estimate(report),
-        more_log_errors: report.log_errors.len().saturating_sub(FEW),
-        forecast_accuracy: forecast_accuracy(report),
-        inspections: inspection_agreement(report),
-        inspection_bias: inspection_bias(report),
         scatter: agreement_plot(&inspection_pairs(report))?,
-        pairs,
     })
 }
 
@@ -206,10 +158,35 @@ fn heading(report: &Report) -> String {
     }
 }
 
+/// What the report covers, and until when.
+fn lead(report: &Report) -> String {
+    format!(
+        "{} · data to {} · assessed {}",
+        report.scope.as_deref().unwrap_or("Whole fleet"),
+        minute_or(report.newest_departure_utc),
+        minute_or(report.as_of_utc),
+    )
+}
+
+/// Number of units in a state.
+fn in_state(report: &Report, badge: StateBadge) -> usize {
+    report.units.iter().filter(|unit| unit.badge() == badge).count()
+}
+
+/// Number of units whose removal has no date, because their utilisation is unknown.
+fn undated(report: &Report) -> usize {
+    report.units.iter().filter(|unit| unit.assessment.hours_per_day.is_none()).count()
+}
+
+/// Inspections one by one, with their units.
+fn checks(report: &Report) -> Vec<(&UnitView, &Inspection)> {
+    let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
+    if report.inspections_given { checks.take(WORK_ROWS).collect() } else { Vec::new() }
+}
+
 /// What to do first, and how many units are in each state.
 fn decision(report: &Report) -> String {
-    let number = |badge: StateBadge| report.units.iter().filter(|u| u.badge() == badge).count();
-    let counts = StateBadge::ALL.map(|badge| (number(badge), badge.word()));
+    let counts = StateBadge::ALL.map(|badge| (in_state(report, badge), badge.word()));
     let counts: Vec<String> =
         counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{} {word}", count(n))).collect();
     let first = work(report).into_iter().find(|unit| unit.badge().needs_action());

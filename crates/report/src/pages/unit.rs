@@ -11,7 +11,7 @@ use crate::format::{
 use crate::model::{Report, TimedInterval, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::fleet::{when, why};
-use crate::pages::quantities::{self, Change, Chart, Level};
+use crate::pages::quantities::{self, Change, Chart};
 use crate::state_badge::StateBadge;
 use crate::stats::crossing_probability::probability_text;
 use crate::stats::rate_spread::RateSpreads;
@@ -22,28 +22,17 @@ struct View<'a> {
     root: &'static str,
     title: String,
     footer: String,
+    report: &'a Report,
+    spreads: &'a RateSpreads<'a>,
     unit: &'a UnitView,
-    name: String,
+    /// Page and number of the tail, and the position.
     place: Option<(String, String, String)>,
-    badge: StateBadge,
-    reason: String,
-    /// What to do and until when.
-    action: String,
-    now: Facts,
-    remaining: Facts,
     plot: String,
-    plot_description: String,
-    limit: String,
-    watch: String,
     /// Dates of the crossing, earliest, median and latest; empty where unknown.
     crossing: [String; 3],
     forecast: Vec<(&'static str, String)>,
     quantity_changes: Vec<Change>,
     charts: Vec<Chart>,
-    levels: Vec<Level>,
-    quality: Facts,
-    statistics: Facts,
-    prior: String,
     /// The forecast as far as it is drawn.
     drawn_forecast: Vec<TimedInterval>,
     /// Number of flights with a diagnostic plot.
@@ -64,31 +53,20 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         root: "../",
         title: format!("{} · actuator free play", unit.name()),
         footer: report.footer(),
+        report,
+        spreads,
         unit,
-        name: unit.name(),
-        action: s.action_text.clone().unwrap_or_default(),
         crossing: forecast.map(|(_, at)| at.map(date).unwrap_or_default()),
         place: unit.tail_number.as_ref().map(|tail| {
             (format!("../{}", tail_path(tail)), tail.clone(), unit.position.clone().unwrap_or_default())
         }),
-        badge: unit.badge(),
-        reason: why(unit),
-        now: now(spreads, unit),
-        remaining: remaining(report, unit),
         plot: history(unit)?,
-        plot_description: plot_description(unit),
-        limit: micrometres_cell(s.limit_m),
-        watch: micrometres_cell(s.watch_m),
         forecast: forecast.into_iter().filter_map(|(word, t)| Some((word, date(t?)))).collect(),
         quantity_changes: quantities::changes(report, "../", |change| {
             change.serial_number.as_ref() == Some(&unit.serial_number)
                 && change.part_number == unit.part_number
         }),
         charts: quantities::unit_charts(unit)?,
-        levels: quantities::levels(unit),
-        quality: quality(unit),
-        statistics: statistics(unit),
-        prior: prior(report, unit),
         drawn_forecast: drawn_forecast(unit),
         plots: unit.flights.iter().filter(|flight| flight.plot_path.is_some()).count(),
     };
