@@ -7,6 +7,7 @@ use job::Part;
 use job::config::EstimateSettings;
 use job::filter_cache::FilterCache;
 use records::Position;
+use simulator::Sensors;
 
 use crate::scenarios::{Case, Class, FlownCase};
 
@@ -32,6 +33,8 @@ pub const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load l
 const LEAD_M_PER_REV: f64 = 0.005;
 /// The friction that a fleet expects, N.
 const UNKNOWN_FORCE_N: f64 = 200.0;
+/// Bandwidth of the backlash, Hz.
+const BANDWIDTH_HZ: f64 = 10.0;
 
 /// Flies a flight of a class and applies every method, as `freeplay estimate` would.
 ///
@@ -84,23 +87,27 @@ pub fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
     arrays.to_channels(position).map_err(|e| e.diagnostic().to_string())
 }
 
+/// The noise as a fleet would configure it: that of the sensors, and friction that it expects.
+pub fn expected_noise(sensors: &Sensors) -> NoiseModel {
+    NoiseModel::Sensors(SensorNoise {
+        screw_rms_m: sensors.screw.noise_rms,
+        screw_resolution_m: sensors.screw.resolution,
+        motor_rms_m: sensors.motor.noise_rms,
+        motor_resolution_m: sensors.motor.resolution,
+        unknown_force_n: UNKNOWN_FORCE_N,
+        bandwidth_hz: BANDWIDTH_HZ,
+    })
+}
+
 /// The part as a fleet would configure it: the assumed stiffness and the true sensor noise.
 ///
 /// # Errors
 /// A stiffness that is not positive.
 pub fn part(case: &Case) -> Result<Part, estimator::Error> {
-    let noise = SensorNoise {
-        screw_rms_m: case.sensors.screw.noise_rms,
-        screw_resolution_m: case.sensors.screw.resolution,
-        motor_rms_m: case.sensors.motor.noise_rms,
-        motor_resolution_m: case.sensors.motor.resolution,
-        unknown_force_n: UNKNOWN_FORCE_N,
-        bandwidth_hz: 10.0,
-    };
     Ok(Part {
         actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
         geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
-        noise: NoiseModel::Sensors(noise),
+        noise: expected_noise(&case.sensors),
         initial: InitialVariances::default(),
         reference_load_n: None,
         limit_m: None,

@@ -11,15 +11,13 @@ pub use operations::{OperationCount, count_step};
 pub use page::page;
 
 use estimator::gap::{GapStatistic, mid_range};
-use estimator::{ActuatorModel, Filter, KalmanState, NoiseModel, SensorNoise};
+use estimator::{ActuatorModel, Filter, KalmanState, NoiseModel};
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
+
+use crate::methods::expected_noise;
 
 /// True gap of the flights, m.
 pub const GAP_M: f64 = 100e-6;
-/// The friction that a fleet expects, N.
-const UNKNOWN_FORCE_N: f64 = 200.0;
-/// Bandwidth of the backlash, Hz.
-const BANDWIDTH_HZ: f64 = 10.0;
 
 /// An operational flight of the nominal actuator: 120 s, 250 samples a second, loads to about ± 8 kN.
 ///
@@ -61,15 +59,7 @@ pub fn filter(assumed: Assumed, sensors: &Sensors, step_s: f64) -> Result<Filter
         plant.contact.damping_n_s_per_m * assumed.damping,
         plant.screw_mass_kg * assumed.mass,
     )?;
-    let noise = NoiseModel::Sensors(SensorNoise {
-        screw_rms_m: sensors.screw.noise_rms,
-        screw_resolution_m: sensors.screw.resolution,
-        motor_rms_m: sensors.motor.noise_rms,
-        motor_resolution_m: sensors.motor.resolution,
-        unknown_force_n: UNKNOWN_FORCE_N,
-        bandwidth_hz: BANDWIDTH_HZ,
-    });
-    let usual = Filter::new(&actuator, step_s, &noise)?;
+    let usual = Filter::new(&actuator, step_s, &expected_noise(sensors))?;
     let given =
         NoiseModel::PerStep { w_d: usual.noise().w_d * assumed.process_noise, v_d_m2: usual.noise().v_d_m2 };
     Filter::new(&actuator, step_s, &given)
