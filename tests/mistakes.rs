@@ -86,7 +86,6 @@ const NAMES: &[Mistake] = &[
     (Nothing, &["work", "close", "W99", "--reason", "x", "--by", "me"], 2, &["`W99`", "work list"]),
     (Nothing, &["store", "runs", "--run", "99"], 2, &["`99`", "freeplay store runs"]),
     (Nothing, &["estimate", LOG, "--part", "EMA-27-104"], 2, &["EMA-27-104", "EMA-27-1040, EMA-27-1060"]),
-    (Nothing, &["store", "adopt", "nowhere"], 3, &["nowhere", "freeplay run"]),
     (Remove("results"), &["report", "--output", "report"], 3, &["results", "freeplay run", "[store]"]),
     (Remove("results"), &["trend"], 3, &["results", "freeplay run", "[store]"]),
 ];

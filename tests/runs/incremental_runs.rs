@@ -223,38 +223,6 @@ fn two_methods_live_side_by_side_and_are_compared() {
     assert_eq!(rows.lines().count(), 41);
 }
 
-/// The store takes over what a trial found, and the next run under the trial's settings has nothing to do.
-#[test]
-fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N4*/*000[1-4].parquet");
-    fleet.run_ok(&["run"]);
-    let before = fleet.exported();
-    fleet.configure("path = \"results\"", "path = \"trial\"");
-    fleet.configure("method = \"contact\"", "method = \"midrange\"");
-    fleet.run_ok(&["run", "--tail", "N412FP"]);
-    let trial = fleet.exported();
-    fleet.configure("path = \"trial\"", "path = \"results\"");
-    let output = fleet.run_ok(&["store", "adopt", "trial"]);
-    assert!(output.starts_with("adopted 16 records of 4 logs"), "{output}");
-    assert!(fleet.run_ok(&["diff", "results", "trial"]).contains("differ"));
-
-    let now = fleet.exported();
-    let of = |rows: &str, tail: &str| -> Vec<String> {
-        rows.lines().filter(|row| row.contains(tail)).map(str::to_owned).collect()
-    };
-    assert_eq!(of(&now, "N412FP"), of(&trial, "N412FP"));
-    let others: Vec<&str> = before.lines().filter(|row| !row.contains("N412FP")).collect();
-    assert_eq!(now.lines().filter(|row| !row.contains("N412FP")).collect::<Vec<_>>(), others);
-    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert!(plan.starts_with("Dry run: 0 logs"), "{plan}");
-    fleet.run_ok(&["store", "verify"]);
-
-    let result = fleet.freeplay(&["store", "adopt", "results"]);
-    assert_eq!(result.code, Some(3));
-    assert!(result.err.contains("error[store_itself]"), "{}", result.err);
-}
-
 #[test]
 fn metrics_tell_when_a_run_last_completed_and_how() {
     let fleet = TestFleet::sample();

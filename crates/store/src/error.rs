@@ -29,9 +29,6 @@ pub enum Error {
     /// Another process writes.
     #[error("the store is {holder}")]
     Held { holder: String },
-    /// A store was to take over itself.
-    #[error("{} is the store itself", dir.display())]
-    Itself { dir: PathBuf },
     /// The system refused to read or write.
     #[error("{} cannot be {verb}: {source}", path.display())]
     Io { path: PathBuf, verb: &'static str, source: std::io::Error },
@@ -109,7 +106,6 @@ impl Error {
             Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
             Self::Format { .. } | Self::Torn { .. } => "store_format",
             Self::Held { .. } => "store_held",
-            Self::Itself { .. } => "store_itself",
             Self::Io { .. } => "store_io",
             Self::Table { .. } | Self::LogTable { .. } => "store_table",
             Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
@@ -121,10 +117,7 @@ impl Error {
 
     fn file(&self) -> Option<&PathBuf> {
         match self {
-            Self::Missing { dir }
-            | Self::Foreign { dir, .. }
-            | Self::Name { dir, .. }
-            | Self::Itself { dir } => Some(dir),
+            Self::Missing { dir } | Self::Foreign { dir, .. } | Self::Name { dir, .. } => Some(dir),
             Self::Format { file, .. } | Self::Torn { file, .. } => Some(file),
             Self::Io { path, .. } | Self::Damaged { path, .. } | Self::LogDamaged { path, .. } => Some(path),
             _ => None,
@@ -142,9 +135,6 @@ impl Error {
             Self::Format { .. } => "read it with the release that wrote it",
             Self::Torn { .. } => "restore this file from a backup; its content is in docs/store.md",
             Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
-            Self::Itself { .. } => {
-                "name the store of the trial, and let the configuration name the one that takes it over"
-            }
             Self::Io { source, .. } => io_remedy(source),
             Self::Table { verb: "read", .. } => {
                 "its log (`_delta_log` in the table's folder) may be truncated: restore the store from a backup; without \

@@ -55,5 +55,4 @@ pub use read::query::Query;
 pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};
 pub use write::compact::Compaction;
 pub use write::lock::Holder;
-pub use write::promote::PromotionSummary;
 pub use write::writer::{HeldRecord, LogResult, Writer};

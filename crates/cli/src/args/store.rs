@@ -1,7 +1,5 @@
 //! Arguments of `store`.
 
-use std::path::PathBuf;
-
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
@@ -61,12 +59,6 @@ pub(crate) enum StoreCommand {
     Verify,
     /// Merge small files, sorted for queries
     Compact,
-    /// Adopt the results of another store, e.g. a trial of other settings
-    Adopt {
-        /// Folder of the other store; it is not changed.
-        #[arg(value_name = "TRIAL")]
-        trial: PathBuf,
-    },
     /// Take records out, e.g. those of a log that was sent under a wrong tail; nothing is deleted
     Forget(ForgetArgs),
     /// Export all records

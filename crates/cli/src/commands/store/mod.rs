@@ -3,7 +3,6 @@
 mod alerts;
 mod runs;
 
-use std::path::Path;
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -17,7 +16,7 @@ use store::{Holder, Info, Query, RunRecord, Store};
 use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
-use crate::progress::{Progress, span};
+use crate::progress::span;
 use crate::row_output;
 use crate::table::count;
 
@@ -40,7 +39,6 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
         StoreCommand::Files { table } => files(&store, *table, output),
         StoreCommand::Verify => verify(&store, output),
         StoreCommand::Compact => compact(&store, output),
-        StoreCommand::Adopt { trial } => adopt(&store, trial, output),
         StoreCommand::Forget(args) => forget(&store, args, output),
         StoreCommand::Export { rows } => export(&config, rows, output),
     }
@@ -182,28 +180,6 @@ fn verify(store: &Store, output: &Output) -> Result<Code, Failure> {
     output.diagnostics(&findings);
     output.write_result(&format!("{} in {}\n", count(findings.len(), "finding"), store.dir().display()))?;
     Ok(Code::LogsInError)
-}
-
-fn adopt(store: &Store, trial: &Path, output: &Output) -> Result<Code, Failure> {
-    let trial = Store::open(trial)?;
-    let mut writer = store.lock(&Holder::this_process(), None)?;
-    let progress = Progress::new("adopt", output);
-    let mut begun = false;
-    let done = writer.promote(&trial, |tail, total| {
-        if !std::mem::replace(&mut begun, true) {
-            progress.total(total);
-        }
-        progress.finished(tail, 0, 0);
-    });
-    progress.end();
-    let done = done?;
-    output.write_result(&format!(
-        "adopted {} of {} from {}\n  next  copy the settings of the trial into pipeline.toml; `freeplay run --dry-run` must then list no logs\n",
-        count(done.records, "record"),
-        count(done.logs, "log"),
-        trial.dir().display(),
-    ))?;
-    Ok(Code::Success)
 }
 
 fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Failure> {
