@@ -32,7 +32,7 @@ const LOOKS: usize = 4000;
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
 /// A gap under this share of the wind-up does not show the zero of the load cell.
-const UNSEEN_GAP: f64 = 0.1;
+pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Largest error of that zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
@@ -245,16 +245,23 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         line,
     };
     if gap_m.0 < UNSEEN_GAP * windup_m {
-        check_both_sides(&workspace.whole, scaling)?;
+        check_both_sides(&workspace.whole, scaling, false)?;
     }
     if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
 }
 
+/// Whether the logged load presses on both flanks for long enough.
+///
 /// Without a gap nothing in a flight shows the zero of its load cell. A flank then counts as pressed under loads that no
 /// zero error explains: a load that only seems to change its side shows no gap either.
-fn check_both_sides(blocks: &BlockMeans, scaling: &Scaling) -> Result<(), Rejection> {
+pub(crate) fn check_both_sides(
+    blocks: &BlockMeans,
+    scaling: &Scaling,
+    shows_gap: bool,
+) -> Result<(), Rejection> {
+    let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
     let beyond_s = |side: f64| {
-        let is_beyond = |load_n: &&f64| side * **load_n > ZERO_ERROR * scaling.load_n;
+        let is_beyond = |load_n: &&f64| side * **load_n > share * scaling.load_n;
         blocks.load_n.iter().filter(is_beyond).count() as f64 * blocks.period_s
     };
     rejection_of_contact(beyond_s(1.0).min(beyond_s(-1.0)))
