@@ -17,6 +17,8 @@ use crate::gap::load_band::quantiles;
 const PERIOD_S: f64 = 0.004;
 /// Length of a block, s, where the load hardly vibrates.
 const CALM_PERIOD_S: f64 = 0.012;
+/// Length of a block in the search, s, there.
+const SEARCH_PERIOD_S: f64 = 0.024;
 /// The load hardly vibrates where the rms of its second difference is a smaller share of its rms.
 const CALM_SHARE: f64 = 0.05;
 /// Half of the time over which the speed of the motor is taken, s.
@@ -61,6 +63,10 @@ const REVERSAL_SHARE: f64 = 0.15;
 pub(crate) struct BlockMeans {
     /// Length of a block, s.
     pub(crate) period_s: f64,
+    /// One over the length of two blocks, 1/s.
+    pub(crate) per_two_s: f64,
+    /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
+    is_calm: bool,
     /// The block at which each segment starts.
     pub(crate) starts: Vec<usize>,
     /// Middle of each block, s from the first sample of the log.
@@ -105,7 +111,8 @@ impl BlockMeans {
                 }
             }
         }
-        if self.is_calm() {
+        self.is_calm = second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n);
+        if self.is_calm {
             self.merge((CALM_PERIOD_S / self.period_s).ceil() as usize);
         }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
@@ -128,7 +135,11 @@ impl BlockMeans {
         }
         starts.clear();
         self.phases.clear();
-        self.period_s = period_s;
+        self.set_period(period_s);
+    }
+
+    fn set_period(&mut self, period_s: f64) {
+        (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
     }
 
     /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
@@ -169,11 +180,6 @@ impl BlockMeans {
         is_whole
     }
 
-    /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
-    fn is_calm(&self) -> bool {
-        second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n)
-    }
-
     /// Replaces every `count` blocks of a segment by their mean; NaN where fewer than half of them are sound.
     fn merge(&mut self, count: usize) {
         let segments: Vec<Range<usize>> = self.segments().collect();
@@ -190,7 +196,7 @@ impl BlockMeans {
         for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
             column.truncate(len);
         }
-        self.period_s *= count as f64;
+        self.set_period(self.period_s * count as f64);
     }
 
     fn push(&mut self, mean: Option<[f64; 3]>) {
@@ -218,10 +224,6 @@ impl BlockMeans {
         self.time_s.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
-    }
-
     /// The blocks of each segment.
     pub(crate) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(self.len()));
@@ -243,21 +245,27 @@ impl BlockMeans {
         })
     }
 
-    /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
-    /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
+    /// Takes in what a search needs of a flight: of a long one, windows in which the load changes sides most often, and
+    /// others spread over the flight; in longer blocks where the load hardly vibrates. δX and the load are there once
+    /// [delays are applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
-        self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
+        let count =
+            if whole.is_calm { ((SEARCH_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
+        self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s * count as f64);
         self.in_range_n = whole.in_range_n.clone();
-        if whole.len() < EXCERPT_BLOCKS * 3 / 2 {
-            return;
-        }
-        for window in whole.windows(load_n) {
+        let is_long = whole.len() >= EXCERPT_BLOCKS * 3 / 2;
+        let windows = if is_long { whole.windows(load_n) } else { whole.segments().collect() };
+        for window in windows {
             self.starts.push(self.len());
-            self.time_s.extend_from_slice(&whole.time_s[window.clone()]);
-            self.motor_m.extend_from_slice(&whole.motor_m[window.clone()]);
-            self.screw_m.extend_from_slice(&whole.screw_m[window.clone()]);
-            self.slowness.extend_from_slice(&whole.slowness[window.clone()]);
-            self.logged_n.extend_from_slice(&whole.logged_n[window]);
+            for (taken, column) in [
+                (&mut self.time_s, &whole.time_s),
+                (&mut self.motor_m, &whole.motor_m),
+                (&mut self.screw_m, &whole.screw_m),
+                (&mut self.slowness, &whole.slowness),
+                (&mut self.logged_n, &whole.logged_n),
+            ] {
+                taken.extend(column[window.clone()].chunks_exact(count).map(mean_of_sound));
+            }
         }
         self.dx_m.resize(self.len(), f64::NAN);
         self.load_n.resize(self.len(), f64::NAN);

@@ -13,7 +13,7 @@ use crate::contact::fit::design_matrix::{
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
-use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::scaling::{LATE_S, SEARCH_ROW_S, SPEED_M_PER_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
@@ -188,13 +188,6 @@ impl FlankFit {
         beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE]) + force * beta[SIDE_FORCE]
     }
 
-    /// δX of a block without drift, skew and transducer error, m.
-    pub(crate) fn without_slow_parts_m(&self, source: RowSource<'_>, k: usize) -> f64 {
-        let (x, y_m) = source.slow_columns(k);
-        let slow = x.iter().zip(&self.line.fit.beta).skip(ORIGIN + 1).map(|(x, b)| x * b);
-        y_m - slow.sum::<f64>()
-    }
-
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         (FORCE + 1..COLUMNS)
@@ -281,9 +274,8 @@ pub(crate) fn midrange_at_fit_m(
     let ContactWorkspace { whole, excerpt, .. } = workspace;
     let of = |blocks: &BlockMeans| midrange_of_m(blocks, scaling, fit, unknown_force_n);
     let of_whole = if whole.len() < SHORT_BLOCKS { of(whole) } else { None };
-    let of_excerpt = if excerpt.is_empty() { None } else { of(excerpt) };
     let off_m = |midrange_m: &f64| (midrange_m - fit.gap_m.0).abs();
-    of_whole.into_iter().chain(of_excerpt).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+    of_whole.into_iter().chain(of(excerpt)).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
 }
 
 fn midrange_of_m(
@@ -293,8 +285,9 @@ fn midrange_of_m(
     unknown_force_n: Option<f64>,
 ) -> Option<f64> {
     let source = RowSource { blocks, scaling };
+    let beta = &fit.line.fit.beta;
     let residual =
-        |k: usize| if blocks.is_complete(k) { fit.without_slow_parts_m(source, k) } else { f64::NAN };
+        |k: usize| if blocks.is_complete(k) { source.without_slow_parts_m(k, beta) } else { f64::NAN };
     let dx_m: Vec<f64> = (0..blocks.len()).map(residual).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
     let segments: Vec<Range<usize>> = blocks.segments().collect();
@@ -334,14 +327,12 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let ContactWorkspace { whole, excerpt, path } = workspace;
     let has_period = scaling.per_period > 0.0;
     if has_period {
-        if excerpt.is_empty() { &mut *whole } else { &mut *excerpt }.find_phases(scaling.per_period);
+        excerpt.find_phases(scaling.per_period);
     }
-    let coarse = Scaling { row_blocks: scaling.search_row_blocks, ..*scaling };
-    let of_excerpt =
-        if excerpt.is_empty() { None } else { ParameterSearch::new(excerpt, path, &coarse).run().ok() };
-    let best = match of_excerpt {
-        Some(best) => best,
-        None => ParameterSearch::new(whole, path, &coarse).run()?,
+    let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
+    let best = match ParameterSearch::new(excerpt, path, &coarse).run() {
+        Ok(best) => best,
+        Err(_) => ParameterSearch::new(whole, path, &coarse).run()?,
     };
     if has_period && is_periodic(&best.found) {
         whole.find_phases(scaling.per_period);
@@ -463,8 +454,7 @@ fn is_explained(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &Flank
 /// How far δX travels, m: as seen once everything else is taken off, as gap and wind-up predict, and by noise alone;
 /// each from the 5 % to the 95 % quantile.
 fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> (f64, f64, f64) {
-    let ContactWorkspace { whole, excerpt, path } = workspace;
-    let blocks = if excerpt.is_empty() { whole } else { excerpt };
+    let ContactWorkspace { excerpt: blocks, path, .. } = workspace;
     let state = &fit.line.at;
     blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
     let source = RowSource { blocks, scaling };

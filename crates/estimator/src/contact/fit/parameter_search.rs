@@ -7,7 +7,7 @@
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, SIDE_FORCE, STRIBECK,
+    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, ORIGIN, RowSource, SHARE, SIDE_FORCE, STRIBECK,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
 use crate::contact::fit::scaling::Scaling;
@@ -299,16 +299,10 @@ impl<'a> ParameterSearch<'a> {
 
 /// δX less all that does not depend on the force in the coupling, for every block; NaN where something is missing.
 fn linear_parts(source: RowSource<'_>, beta: &[f64; COLUMNS], parts_m: &mut Vec<f64>) {
-    let mut without = *beta;
-    for column in [GAP, FORCE, DRY, SHARE, STRIBECK, FORCE_DRIFT, SIDE_FORCE] {
-        without[column] = 0.0;
-    }
+    let part_m = |k| {
+        let is_complete = source.blocks.is_complete(k);
+        if is_complete { source.without_slow_parts_m(k, beta) - beta[ORIGIN] } else { f64::NAN }
+    };
     parts_m.clear();
-    parts_m.extend((0..source.blocks.len()).map(|k| {
-        if !source.blocks.is_complete(k) {
-            return f64::NAN;
-        }
-        let (x, y_m) = source.slow_columns(k);
-        y_m - x.iter().zip(&without).map(|(x, b)| x * b).sum::<f64>()
-    }));
+    parts_m.extend((0..source.blocks.len()).map(part_m));
 }
