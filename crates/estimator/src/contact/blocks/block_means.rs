@@ -2,11 +2,7 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
-
 use crate::Samples;
-use crate::simd::Lanes;
-
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
 use crate::contact::stats::{middle_and_half, rms, second_difference_rms};
@@ -36,10 +32,6 @@ const TWENTY_FOURTH: f64 = 1.0 / 24.0;
 const START_S: f64 = 1.0;
 /// Residuals are taken as dependent within this time, s.
 const STRETCH_S: f64 = 2.0;
-
-/// Blocks that are checked and averaged together: their channels stay in the first cache between the two, and each
-/// channel is read in long enough runs to be prefetched.
-const SPAN: usize = 16;
 
 /// The end of a clipped load cell's range is near this quantile of the loads of one side.
 const PILE_QUANTILE: f64 = 0.998;
@@ -102,13 +94,9 @@ impl BlockMeans {
             self.starts.push(self.len());
             let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
-            for from in (segment.start..end).step_by(SPAN * each) {
-                let span = from..end.min(from + SPAN * each);
-                self.time_s.extend(span.clone().step_by(each).map(middle_s));
-                if !(watch.is_calm(&span) && self.push_means(samples, span.clone(), each)) {
-                    let means = span.step_by(each).map(|start| watch.mean(&(start..start + each), segment));
-                    means.for_each(|mean| self.push(mean));
-                }
+            for start in (segment.start..end).step_by(each) {
+                self.time_s.push(middle_s(start));
+                self.push(watch.mean(&(start..start + each), segment));
             }
         }
         self.is_calm = second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n);
@@ -162,22 +150,6 @@ impl BlockMeans {
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
         let is_pile = pile > PILE_RATIO * below && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
         if is_pile { top_n - width_n } else { f64::INFINITY }
-    }
-
-    /// Takes the means of a span of whole blocks in which nothing leaps; none of them, and false, where something is
-    /// missing.
-    fn push_means(&mut self, samples: &Samples<'_>, span: Range<usize>, each: usize) -> bool {
-        let before = self.dx_m.len();
-        let Samples { motor_m, dx_m, load_n, .. } = samples;
-        push_means(&mut self.motor_m, &motor_m[span.clone()], each);
-        push_means(&mut self.dx_m, &dx_m[span.clone()], each);
-        push_means(&mut self.load_n, &load_n[span], each);
-        let mut pushed = [&mut self.motor_m, &mut self.dx_m, &mut self.load_n];
-        let is_whole = pushed.iter().all(|means| means[before..].iter().all(|mean| mean.is_finite()));
-        if !is_whole {
-            pushed.iter_mut().for_each(|means| means.truncate(before));
-        }
-        is_whole
     }
 
     /// Replaces every `count` blocks of a segment by their mean; NaN where fewer than half of them are sound.
@@ -237,12 +209,11 @@ impl BlockMeans {
 
     /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
     pub(crate) fn is_complete(&self, k: usize) -> bool {
-        let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
-        let rates = around(&self.motor_m).zip(around(&self.load_n));
-        rates.is_some_and(|(motor_m, load_n)| {
-            is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n)
-                && self.in_range_n.contains(&load_n[1])
-        })
+        let change = |values: &[f64]| Some(values.get(k + 1)? - values.get(k.wrapping_sub(1))?);
+        let changes = change(&self.motor_m).zip(change(&self.load_n));
+        changes.is_some_and(|(motor_m, load_n)| (self.dx_m[k] + motor_m + load_n).is_finite())
+            && self.time_s[k] > START_S
+            && self.in_range_n.contains(&self.load_n[k])
     }
 
     /// Takes in what a search needs of a flight: of a long one, windows in which the load changes sides most often, and
@@ -393,55 +364,6 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
     }
 }
 
-/// Whether δX of a block and the rates of the other two channels are known, and the flight has more than begun.
-#[inline]
-pub(crate) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
-    let all = dx_m + (motor_m[2] - motor_m[0]) + (load_n[2] - load_n[0]);
-    (time_s > START_S) & (all.abs() < f64::INFINITY)
-}
-
-/// The furthest that a value lies from the one before it; a missing one lies nowhere.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn furthest_leap(values: &[f64]) -> f64 {
-    let (mut furthest, mut done) = (Lanes::ZERO, 0);
-    while let Some(group) = values[done..].first_chunk::<{ Lanes::COUNT + 1 }>() {
-        for lane in 0..Lanes::COUNT {
-            furthest.0[lane] = greater(furthest.0[lane], (group[lane + 1] - group[lane]).abs());
-        }
-        done += Lanes::COUNT;
-    }
-    let mut all = 0.0;
-    for lane in furthest.0 {
-        all = greater(all, lane);
-    }
-    for pair in values[done..].windows(2) {
-        all = greater(all, (pair[1] - pair[0]).abs());
-    }
-    all
-}
-
-/// Appends the mean of each block, summed in its own order, eight side by side.
-fn push_means(means: &mut Vec<f64>, values: &[f64], each: usize) {
-    let n = each as f64;
-    let eights = values.chunks_exact(Lanes::COUNT * each);
-    let rest = eights.remainder().chunks_exact(each);
-    for eight in eights {
-        means.extend(sums(eight, each).map(|sum| sum / n));
-    }
-    means.extend(rest.map(|block| block.iter().sum::<f64>() / n));
-}
-
-fn sums(values: &[f64], each: usize) -> [f64; Lanes::COUNT] {
-    let blocks: [&[f64]; Lanes::COUNT] = std::array::from_fn(|k| &values[k * each..][..each]);
-    let mut sums = [0.0; Lanes::COUNT];
-    for k in 0..each {
-        for (sum, block) in sums.iter_mut().zip(&blocks) {
-            *sum += block[k];
-        }
-    }
-    sums
-}
-
 /// Mean of the finite values; NaN where they are fewer than half.
 fn mean_of_sound(values: &[f64]) -> f64 {
     let (sum, count) =
@@ -480,17 +402,6 @@ impl<'a> SpikeGate<'a> {
             |channel: &[f64]| SpikeThreshold::of(channel, samples.segments).ok_or(Rejection::ChannelConstant);
         of(samples.motor_m)?;
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
-    }
-
-    /// Whether nothing leaps within a span, nor from the sample before it; the first span of a log is left to be
-    /// tested block by block.
-    fn is_calm(&self, span: &Range<usize>) -> bool {
-        if span.start == 0 {
-            return false;
-        }
-        let with_before = span.start - 1..span.end;
-        furthest_leap(&self.samples.dx_m[with_before.clone()]) <= self.dx.leap
-            && furthest_leap(&self.samples.load_n[with_before]) <= self.load.leap
     }
 
     /// Means of motor, δX and load over a block; none where fewer than half of its samples are sound.

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::friction::coupling_path::{CouplingPath, PathColumns, Touch};
-use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::friction::coupling_path::{CouplingPath, Touch};
+use crate::contact::friction::friction_model::{Coupling, FrictionState};
 
 /// Columns of the regression.
 pub(crate) const COLUMNS: usize = 17;
@@ -93,7 +93,7 @@ pub(crate) fn rows(source: RowSource<'_>, state: &FrictionState, path: &mut Coup
                 design.close_all(&mut open, blocks.period_s);
                 stretch = Some(here);
             }
-            let sum = source.sum(&path.columns, run, touch.flank().sign());
+            let sum = source.sum(&path.couplings, run, touch.flank().sign());
             let row = &mut open[touch.index()];
             if row.blocks > 0.0 && row.blocks + sum.blocks > row_blocks as f64 {
                 design.close(touch.index(), row, blocks.period_s);
@@ -133,7 +133,7 @@ impl DesignMatrix {
 
 impl RowSource<'_> {
     /// The sums of a row of complete blocks.
-    pub(crate) fn sum(&self, path: &PathColumns, within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
+    pub(crate) fn sum(&self, couplings: &[Coupling], within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
         let Self { blocks, scaling } = self;
         let (first, end) = (within.start, within.end);
         let mut sum =
@@ -146,12 +146,12 @@ impl RowSource<'_> {
         sum.x[LOAD_RATE] = change(&blocks.load_n) * blocks.per_two_s * scaling.per_load_rate;
         for k in within {
             let (time, place) = self.time_and_place(k);
-            let force_n = path.force_n[k];
+            let Coupling { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, .. } = couplings[k];
             sum.y_m += blocks.dx_m[k];
             sum.x[FORCE] += force_n;
-            sum.x[DRY] += path.dforce_ddry[k];
-            sum.x[SHARE] += path.dforce_dloss_n[k];
-            sum.x[STRIBECK] += path.dforce_dstribeck_n[k];
+            sum.x[DRY] += dforce_ddry;
+            sum.x[SHARE] += dforce_dloss_n;
+            sum.x[STRIBECK] += dforce_dstribeck_n;
             sum.x[DRIFT] += time;
             sum.x[DRIFT_SQUARE] += time * time;
             sum.x[PLACE] += place;

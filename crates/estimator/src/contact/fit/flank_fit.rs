@@ -462,12 +462,12 @@ fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit
     let stride = blocks.len().div_ceil(LOOKS).max(1);
     let (mut seen_m, mut expected_m) = (Vec::new(), Vec::new());
     for k in (0..blocks.len()).step_by(stride).filter(|&k| blocks.is_complete(k)) {
-        let force_n = path.columns.force_n[k];
+        let force_n = path.couplings[k].force_n;
         if !force_n.is_finite() {
             continue;
         }
         let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        let row = source.sum(&path.columns, k..k + 1, side);
+        let row = source.sum(&path.couplings, k..k + 1, side);
         seen_m.push(row.y_m - fit.other_m(&row));
         expected_m.push(fit.flank_m(side, row.x[FORCE].abs()));
     }

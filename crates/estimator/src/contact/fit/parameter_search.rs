@@ -277,18 +277,17 @@ impl<'a> ParameterSearch<'a> {
         let (force, force_drift) = (beta[FORCE] / scaling.load_n, beta[FORCE_DRIFT] / scaling.load_n);
         let side_force = beta[SIDE_FORCE] / scaling.load_n;
         let (share, stribeck) = (beta[SHARE] / scaling.load_n, beta[STRIBECK] / scaling.load_n);
-        let columns = &path.columns;
-        for (k, linear_m) in linear_m.iter().enumerate() {
-            let force_n = columns.force_n[k];
+        for (k, (linear_m, coupling)) in linear_m.iter().zip(&path.couplings).enumerate() {
+            let force_n = coupling.force_n;
             let side = if force_n == 0.0 { 0.0 } else { 0.5 * force_n.signum() };
-            let inside_m = if force_n == 0.0 { columns.relative_m[k] } else { 0.0 };
+            let inside_m = if force_n == 0.0 { coupling.relative_m } else { 0.0 };
             let time = scaling.time_share(blocks.time_s[k]);
             let coupling_m = side * beta[GAP]
                 + force_n * (force + force_drift * time)
                 + force_n.abs() * side_force
-                + beta[DRY] * columns.dforce_ddry[k]
-                + share * columns.dforce_dloss_n[k]
-                + stribeck * columns.dforce_dstribeck_n[k];
+                + beta[DRY] * coupling.dforce_ddry
+                + share * coupling.dforce_dloss_n
+                + stribeck * coupling.dforce_dstribeck_n;
             let residual_m = linear_m - shift_m - inside_m - coupling_m;
             if residual_m.is_finite() {
                 take(residual_m);
