@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::Samples;
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
-use crate::contact::stats::{middle_and_half, rms, second_difference_rms};
+use crate::contact::stats::middle_and_half;
 use crate::contact::types::{PartPrior, SHORTEST_S};
 use crate::gap::load_band::quantiles;
 
@@ -87,7 +87,10 @@ impl BlockMeans {
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
     pub(crate) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
-        let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
+        let shortest = ((PERIOD_S / samples.step_s).round() as usize).max(1);
+        let is_calm = is_calm(samples, shortest);
+        let count = (CALM_PERIOD_S / (shortest as f64 * samples.step_s)).ceil() as usize;
+        let each = if is_calm { shortest * count } else { shortest };
         let watch = SpikeGate::over(samples)?;
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
@@ -99,10 +102,7 @@ impl BlockMeans {
                 self.push(watch.mean(&(start..start + each), segment));
             }
         }
-        self.is_calm = second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n);
-        if self.is_calm {
-            self.merge((CALM_PERIOD_S / self.period_s).ceil() as usize);
-        }
+        self.is_calm = is_calm;
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
@@ -123,10 +123,6 @@ impl BlockMeans {
         }
         starts.clear();
         self.phases.clear();
-        self.set_period(period_s);
-    }
-
-    fn set_period(&mut self, period_s: f64) {
         (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
     }
 
@@ -150,25 +146,6 @@ impl BlockMeans {
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
         let is_pile = pile > PILE_RATIO * below && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
         if is_pile { top_n - width_n } else { f64::INFINITY }
-    }
-
-    /// Replaces every `count` blocks of a segment by their mean; NaN where fewer than half of them are sound.
-    fn merge(&mut self, count: usize) {
-        let segments: Vec<Range<usize>> = self.segments().collect();
-        let mut len = 0;
-        for (start, segment) in self.starts.iter_mut().zip(segments) {
-            *start = len;
-            for from in segment.clone().step_by(count).take(segment.len() / count) {
-                for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
-                    column[len] = mean_of_sound(&column[from..from + count]);
-                }
-                len += 1;
-            }
-        }
-        for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
-            column.truncate(len);
-        }
-        self.set_period(self.period_s * count as f64);
     }
 
     fn push(&mut self, mean: Option<[f64; 3]>) {
@@ -332,6 +309,25 @@ impl BlockMeans {
             }
         }
     }
+}
+
+/// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is a small share of
+/// their rms.
+fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
+    let (mut differences, mut loads) = (0.0, 0.0);
+    for segment in samples.segments {
+        let (mut before, mut here) = (f64::NAN, f64::NAN);
+        for part in samples.load_n[segment.clone()].chunks_exact(summed) {
+            let after: f64 = part.iter().sum();
+            let difference = before - 2.0 * here + after;
+            if difference.is_finite() {
+                differences += difference * difference;
+                loads += here * here;
+            }
+            (before, here) = (here, after);
+        }
+    }
+    differences < CALM_SHARE * CALM_SHARE * loads
 }
 
 /// How often a load changes sides, at least so far to either.
