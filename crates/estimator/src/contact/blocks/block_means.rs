@@ -43,9 +43,7 @@ const PILE_RATIO: f64 = 2.0;
 /// Shortest time in that band of a clipped cell, s.
 const SHORTEST_PILE_S: f64 = 1.0;
 
-/// Blocks that the search begins with, in windows of this many.
-const EXCERPT_BLOCKS: usize = 6000;
-/// See [`EXCERPT_BLOCKS`].
+/// Blocks of a window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
 /// Share of the 95 % load that a reversal passes on either side.
 const REVERSAL_SHARE: f64 = 0.15;
@@ -193,16 +191,17 @@ impl BlockMeans {
             && self.in_range_n.contains(&self.load_n[k])
     }
 
-    /// Takes in what a search needs of a flight: of a long one, windows in which the load changes sides most often, and
-    /// others spread over the flight; in longer blocks where the load hardly vibrates. δX and the load are there once
-    /// [delays are applied](Self::apply_delays).
-    pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
+    /// Takes in what a search needs of a flight: of one that has more than some number of blocks, windows in which the load
+    /// changes sides most often, and others spread over the flight; in longer blocks where the load hardly vibrates. δX
+    /// and the load are there once [delays are applied](Self::apply_delays).
+    pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
         let count =
             if whole.is_calm { ((SEARCH_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
-        self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s * count as f64);
+        self.clear(most.min(whole.len()), whole.period_s * count as f64);
         self.in_range_n = whole.in_range_n.clone();
-        let is_long = whole.len() >= EXCERPT_BLOCKS * 3 / 2;
-        let windows = if is_long { whole.windows(load_n) } else { whole.segments().collect() };
+        let is_long = whole.len() >= most * 3 / 2;
+        let windows =
+            if is_long { whole.windows(load_n, most / WINDOW_BLOCKS) } else { whole.segments().collect() };
         for window in windows {
             self.starts.push(self.len());
             for (taken, column) in [
@@ -221,7 +220,7 @@ impl BlockMeans {
 
     /// The windows of an excerpt in order of time: one half by the number of load reversals in them, the other evenly
     /// among the rest. The load alone selects, so that what is estimated does not select its own data.
-    fn windows(&self, load_n: f64) -> Vec<Range<usize>> {
+    fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
         let windows: Vec<Range<usize>> = self
             .segments()
             .flat_map(|segment| {
@@ -230,7 +229,6 @@ impl BlockMeans {
             })
             .filter(|window| window.len() == WINDOW_BLOCKS)
             .collect();
-        let count = EXCERPT_BLOCKS / WINDOW_BLOCKS;
         let mut by_reversals: Vec<(usize, usize)> = windows
             .iter()
             .map(|window| reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))

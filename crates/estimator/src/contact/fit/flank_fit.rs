@@ -35,6 +35,9 @@ const UNEXPLAINED: f64 = 0.25;
 pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Largest error of that zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
+/// Blocks that the search begins with, and the factor by which it takes more where these show too little contact.
+const EXCERPT_BLOCKS: usize = 6000;
+const LONGER: usize = 4;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
 /// Reweightings of the rows in each of them.
@@ -203,7 +206,6 @@ impl FlankFit {
 /// As [`search`]; [`Rejection::RateTooLow`] for a load that vibrates faster than it is sampled, so that neighbouring
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
-    workspace.excerpt.excerpt_of(&workspace.whole, scaling.load_n);
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
     let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
     let windup_m = scaling.windup_m();
@@ -322,17 +324,22 @@ pub(crate) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 
     of_part_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n)
 }
 
-/// Searches with long rows, in an excerpt of a long flight, and iterates over the whole with short rows from there.
+/// Searches with long rows, in an excerpt as long as it must be, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
     let ContactWorkspace { whole, excerpt, path } = workspace;
     let has_period = scaling.per_period > 0.0;
-    if has_period {
-        excerpt.find_phases(scaling.per_period);
-    }
     let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
-    let best = match ParameterSearch::new(excerpt, path, &coarse).run() {
-        Ok(best) => best,
-        Err(_) => ParameterSearch::new(whole, path, &coarse).run()?,
+    let mut blocks = EXCERPT_BLOCKS;
+    let best = loop {
+        excerpt.excerpt_of(whole, scaling.load_n, blocks);
+        if has_period {
+            excerpt.find_phases(scaling.per_period);
+        }
+        match ParameterSearch::new(excerpt, path, &coarse).run() {
+            Ok(best) => break best,
+            Err(why) if blocks >= whole.len() => return Err(why),
+            Err(_) => blocks *= LONGER,
+        }
     };
     if has_period && is_periodic(&best.found) {
         whole.find_phases(scaling.per_period);
