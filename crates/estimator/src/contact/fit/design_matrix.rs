@@ -171,9 +171,7 @@ impl RowSource<'_> {
         }
         sum
     }
-}
 
-impl RowSource<'_> {
     /// Time and screw position of a block, from −1 to 1. The screw's own position: its transducer's slope acts on the gap
     /// as well.
     fn time_and_place(&self, k: usize) -> (f64, f64) {

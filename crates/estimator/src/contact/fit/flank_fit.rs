@@ -80,19 +80,6 @@ const LEAST_PERIODIC_M: f64 = 2e-7;
 /// Factor of the error where the load cell is at its end for a part of the time: the friction model is driven by its reading.
 const CLIPPED: f64 = 1.5;
 
-/// Weight of each part of the uncertainty of a gap; see [`Doubt`].
-const WEIGHTS: Doubt = Doubt {
-    jackknife_m: 0.92,
-    search_m: 0.48,
-    choice_m: 2.65,
-    bend_m: 3.0,
-    light_m: 0.095,
-    vibration_m: 0.36,
-    aliased_m: 0.5,
-    floor_m: 1.13,
-    changes: 0.58,
-    friction_share: 1.42,
-};
 /// The uncertainty grows with the share of friction in the load up to this share.
 const MAX_DOUBTED_SHARE: f64 = 0.6;
 
@@ -127,22 +114,18 @@ pub(crate) struct Doubt {
 
 impl Doubt {
     fn standard_error_m(&self) -> f64 {
-        let parts = |doubt: &Self| {
-            [
-                doubt.jackknife_m,
-                doubt.search_m,
-                doubt.choice_m,
-                doubt.bend_m,
-                doubt.light_m,
-                doubt.vibration_m,
-                doubt.aliased_m,
-                doubt.floor_m,
-            ]
-        };
-        let variance_m2: f64 =
-            parts(self).iter().zip(parts(&WEIGHTS)).map(|(part_m, weight)| (part_m * weight).powi(2)).sum();
-        let growth = WEIGHTS.changes * self.changes
-            + WEIGHTS.friction_share * self.friction_share.min(MAX_DOUBTED_SHARE);
+        let weighted_m = [
+            0.92 * self.jackknife_m,
+            0.48 * self.search_m,
+            2.65 * self.choice_m,
+            3.0 * self.bend_m,
+            0.095 * self.light_m,
+            0.36 * self.vibration_m,
+            0.5 * self.aliased_m,
+            1.13 * self.floor_m,
+        ];
+        let variance_m2: f64 = weighted_m.iter().map(|part_m| part_m * part_m).sum();
+        let growth = 0.58 * self.changes + 1.42 * self.friction_share.min(MAX_DOUBTED_SHARE);
         variance_m2.sqrt() * growth.exp()
     }
 }
@@ -374,10 +357,11 @@ fn gap_and_doubt(
     let standard_error_m = line.fit.standard_error_m(GAP, rows);
     let low = refit(FIRM_SHARE);
     let high = refit(STIFF_SHARE).filter(|_| has_both_flanks(rows));
-    let jackknife_m = low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_m(parts.iter().copied()));
+    let jackknife_m =
+        low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_error_m(parts.iter().copied()));
     let (difference_m, error_m) = match (&low, &high) {
         (Some((low_m, lows)), Some((high_m, highs))) => {
-            (high_m - low_m, jackknife_m_of_difference(lows, highs))
+            (high_m - low_m, jackknife_error_m(lows.iter().zip(highs).map(|(low_m, high_m)| high_m - low_m)))
         }
         _ => (0.0, 0.0),
     };
@@ -439,14 +423,10 @@ fn has_both_flanks(rows: &[DesignRow<COLUMNS>]) -> bool {
 }
 
 /// Jackknife error of a statistic from its values with one group left out (Tukey 1958).
-fn jackknife_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
+fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
     let count = parts_m.clone().count() as f64;
     let mean_m = parts_m.clone().sum::<f64>() / count;
     ((count - 1.0) / count * parts_m.map(|part_m| (part_m - mean_m).powi(2)).sum::<f64>()).sqrt()
-}
-
-fn jackknife_m_of_difference(lows_m: &[f64], highs_m: &[f64]) -> f64 {
-    jackknife_m(lows_m.iter().zip(highs_m).map(|(low_m, high_m)| high_m - low_m))
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
