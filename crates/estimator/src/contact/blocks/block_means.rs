@@ -191,6 +191,11 @@ impl BlockMeans {
             && self.in_range_n.contains(&self.load_n[k])
     }
 
+    /// Whether an excerpt of so many blocks saves much.
+    pub(crate) fn is_longer(&self, blocks: usize) -> bool {
+        self.len() >= blocks * 3 / 2
+    }
+
     /// Takes in what a search needs of a flight: of one that has more than some number of blocks, windows in which the load
     /// changes sides most often, and others spread over the flight; in longer blocks where the load hardly vibrates. δX
     /// and the load are there once [delays are applied](Self::apply_delays).
@@ -199,9 +204,11 @@ impl BlockMeans {
             if whole.is_calm { ((SEARCH_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
         self.clear(most.min(whole.len()), whole.period_s * count as f64);
         self.in_range_n = whole.in_range_n.clone();
-        let is_long = whole.len() >= most * 3 / 2;
-        let windows =
-            if is_long { whole.windows(load_n, most / WINDOW_BLOCKS) } else { whole.segments().collect() };
+        let windows = if whole.is_longer(most) {
+            whole.windows(load_n, most / WINDOW_BLOCKS)
+        } else {
+            whole.segments().collect()
+        };
         for window in windows {
             self.starts.push(self.len());
             for (taken, column) in [

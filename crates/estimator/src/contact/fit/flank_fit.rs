@@ -259,8 +259,9 @@ pub(crate) fn midrange_at_fit_m(
     let ContactWorkspace { whole, excerpt, .. } = workspace;
     let of = |blocks: &BlockMeans| midrange_of_m(blocks, scaling, fit, unknown_force_n);
     let of_whole = if whole.len() < SHORT_BLOCKS { of(whole) } else { None };
+    let of_excerpt = if whole.is_longer(EXCERPT_BLOCKS) { of(excerpt) } else { None };
     let off_m = |midrange_m: &f64| (midrange_m - fit.gap_m.0).abs();
-    of_whole.into_iter().chain(of(excerpt)).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+    of_whole.into_iter().chain(of_excerpt).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
 }
 
 fn midrange_of_m(
@@ -320,7 +321,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         }
         match ParameterSearch::new(excerpt, path, &coarse).run() {
             Ok(best) => break best,
-            Err(why) if blocks >= whole.len() => return Err(why),
+            Err(why) if !whole.is_longer(blocks) => return Err(why),
             Err(_) => blocks *= LONGER,
         }
     };
