@@ -30,19 +30,6 @@ impl Lanes {
         Self([value; Self::COUNT])
     }
 
-    /// `COUNT` numbers from some place on, filled up with zeros behind the last. One by one: a copy of a part would be
-    /// put into memory, and could not be taken from there as a whole before all of it had arrived.
-    #[inline(always)]
-    pub(crate) fn of<const N: usize>(values: &[f64; N], from: usize) -> Self {
-        let mut lanes = Self::ZERO;
-        for lane in 0..Self::COUNT {
-            if from + lane < N {
-                lanes.0[lane] = values[from + lane];
-            }
-        }
-        lanes
-    }
-
     #[inline(always)]
     pub(crate) fn plus(mut self, other: Self) -> Self {
         for lane in 0..Self::COUNT {

@@ -1,4 +1,4 @@
-//! Estimate of one actuator from its channels: both methods run, the configured one gives the gap.
+//! Estimate of one actuator from its channels: the configured method gives the gap.
 
 use std::cell::RefCell;
 
@@ -22,8 +22,8 @@ const MISSING_SHARE: f64 = 0.005;
 
 /// Estimates the gap, or returns the reason why the channels do not allow an estimate.
 ///
-/// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is
-/// rejected; secondary results of the contact regression are kept whenever it returns any.
+/// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is rejected. The results
+/// of the contact regression are there under [`Method::Contact`] only: no other method runs it.
 ///
 /// # Errors
 /// A diagnostic when the settings of the part do not fit the step of the log.
@@ -48,9 +48,13 @@ pub fn estimate(
                     Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
                     Err(other) => return Err(failed(other)),
                 };
-            let outcome = contact::estimate_with(&samples(channels), &prior, &mut workspaces.contact)
-                .map_err(failed)?;
-            Ok(combine_methods(published.as_ref(), &outcome, settings.method))
+            let of_method = match settings.method {
+                Method::Contact => contact_estimate(channels, &prior, &mut workspaces.contact),
+                Method::Midrange => {
+                    midrange_estimate(channels, &prior, published.as_ref(), &mut workspaces.contact)
+                }
+            };
+            Ok(with_published(of_method.map_err(failed)?, published.as_ref()))
         })?
     };
     estimate.temperature_c = channels.temperature_c;
@@ -187,19 +191,41 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
 }
 
-/// The configured method gives the gap; the other method's result is kept in its own column.
-///
-/// The published statistic never rejects a flight. So under either method a flight without usable contact, as the
-/// regression finds it, is rejected: its mid-range value is kept, and is not given as the gap.
-fn combine_methods(
-    published: Option<&MidRangeEstimate>,
-    outcome: &ContactOutcome,
-    method: Method,
-) -> GapEstimate {
-    let mut estimate = match outcome {
-        ContactOutcome::Estimated(found) => from_contact(found),
+/// The gap by contact regression.
+fn contact_estimate(
+    channels: &ActuatorChannels,
+    prior: &PartPrior,
+    workspace: &mut contact::ContactWorkspace,
+) -> Result<GapEstimate, estimator::Error> {
+    Ok(match contact::estimate_with(&samples(channels), prior, workspace)? {
+        ContactOutcome::Estimated(found) => from_contact(&found),
         ContactOutcome::Refused(why) => GapEstimate::refused(why.code()),
-    };
+    })
+}
+
+/// The gap by the published statistic, for a flight whose channels show one.
+///
+/// The statistic rejects no flight itself. Its naive standard error covers 4–21 %: none is better.
+fn midrange_estimate(
+    channels: &ActuatorChannels,
+    prior: &PartPrior,
+    published: Option<&MidRangeEstimate>,
+    workspace: &mut contact::ContactWorkspace,
+) -> Result<GapEstimate, estimator::Error> {
+    let Some(published) = published else { return Ok(GapEstimate::refused("channel_constant")) };
+    let why = contact::find_rejection(&samples(channels), prior, workspace)?;
+    Ok(why.map_or_else(
+        || GapEstimate {
+            status: Status::Estimated,
+            gap_m: Some(published.gap.gap_m),
+            ..GapEstimate::default()
+        },
+        |why| GapEstimate::refused(why.code()),
+    ))
+}
+
+/// An estimate with the published statistic in columns of its own.
+fn with_published(mut estimate: GapEstimate, published: Option<&MidRangeEstimate>) -> GapEstimate {
     let Some(published) = published else { return estimate };
     estimate.gap_midrange_m = Some(published.gap.gap_m);
     estimate.load_reversals = published.load.reversals as i64;
@@ -210,11 +236,6 @@ fn combine_methods(
     estimate.load_p95_n = Some(published.load.p95_n);
     (estimate.nis, estimate.nis_se) = (Some(published.nis.mean), published.nis.standard_error);
     if estimate.status == Status::Estimated {
-        if method == Method::Midrange {
-            estimate.gap_m = Some(published.gap.gap_m);
-            // The naive standard error of this statistic covers 4–21 %: none is better.
-            (estimate.gap_se_m, estimate.gap_p05_m, estimate.gap_p95_m) = (None, None, None);
-        }
         estimate.reason = estimate.flags.first().cloned();
     }
     estimate
@@ -253,8 +274,7 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         preload_n: found.preload_n.map(|preload| preload.0),
         preload_se_n: found.preload_n.map(|preload| preload.1),
         gap_midrange_fitted_m: found.midrange_at_fit_m,
-        reason: None,
-        ..GapEstimate::refused("")
+        ..GapEstimate::default()
     }
 }
 

@@ -56,8 +56,10 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
             () => continue,
         };
         let wound_m = load_n * contact.compliance_m_per_n.0;
-        branch
-            .add(contact.without_slow_parts_m(RowSource { blocks, scaling }, k) - wound_m, blocks.stretch(k));
+        branch.add(
+            RowSource { blocks, scaling }.without_slow_parts_m(k, &contact.line.fit.beta) - wound_m,
+            blocks.stretch(k),
+        );
     }
     let (upper, lower) = (falling.median_m()?, rising.median_m()?);
     Some((upper.0 - lower.0, upper.1.hypot(lower.1)))

@@ -41,7 +41,7 @@ use crate::error::Error;
 use crate::{Samples, model};
 use fit::flank_fit::{self, FlankFit};
 use fit::scaling::Scaling;
-use fit::sign_check;
+use fit::sign_check::{self, SignCheck};
 use types::{LONGEST_STEP_S, NORMAL_95};
 
 /// Standard errors by which no gap of a sound log is below zero.
@@ -79,6 +79,28 @@ pub fn estimate_with(
     })
 }
 
+/// Why a flight does not allow an estimate, as far as the channels show it without a regression: for the published
+/// statistic, which rejects no flight itself.
+///
+/// It finds wrong signs and ratios, exchanged positions, a load that presses on one flank only, and the load of another
+/// actuator. It does not find a screw that friction holds within its gap, nor a load that vibrates faster than it is
+/// sampled.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn find_rejection(
+    samples: &Samples<'_>,
+    prior: &PartPrior,
+    room: &mut ContactWorkspace,
+) -> Result<Option<Rejection>, Error> {
+    check(samples, prior)?;
+    let found = prepare(samples, prior, room).and_then(|(frame, signs)| {
+        flank_fit::check_both_sides(&room.whole, &frame, signs.shows_gap)?;
+        if signs.follows_load { Ok(()) } else { Err(Rejection::MotionUnexplained) }
+    });
+    Ok(found.err())
+}
+
 /// Plot data of an estimate: the intervals in contact and the flanks fitted through them. None where the flight was
 /// rejected.
 ///
@@ -99,21 +121,28 @@ fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
     prior.period_m.map_or(Ok(()), |period_m| model::positive("period_m", period_m))
 }
 
-fn look(
+/// Blocks and scales of a flight, and what its channels show at first sight.
+fn prepare(
     samples: &Samples<'_>,
     prior: &PartPrior,
     room: &mut ContactWorkspace,
-) -> Result<(Scaling, FlankFit), Rejection> {
+) -> Result<(Scaling, SignCheck), Rejection> {
     if samples.step_s > LONGEST_STEP_S {
         return Err(Rejection::RateTooLow);
     }
     room.whole.gather(samples, prior)?;
     let mut frame = Scaling::of(&room.whole, prior)?;
-    if !prior.output_locked
-        && let Some(stiffness_n_per_m) = sign_check::check(&room.whole, &frame)?
-    {
-        frame.stiffness_n_per_m = stiffness_n_per_m;
-    }
+    let found = if prior.output_locked { SignCheck::NONE } else { sign_check::check(&room.whole, &frame)? };
+    frame.stiffness_n_per_m = found.stiffness_n_per_m.unwrap_or(frame.stiffness_n_per_m);
+    Ok((frame, found))
+}
+
+fn look(
+    samples: &Samples<'_>,
+    prior: &PartPrior,
+    room: &mut ContactWorkspace,
+) -> Result<(Scaling, FlankFit), Rejection> {
+    let (frame, _) = prepare(samples, prior, room)?;
     let contact = flank_fit::fit(room, &frame)?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n.0 > 0.0;

@@ -22,14 +22,6 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Root mean square of the finite values.
-pub(crate) fn rms(values: &[f64]) -> f64 {
-    let finite = values.iter().filter(|value| value.is_finite());
-    let (squares, count) =
-        finite.fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
-    (squares / count.max(1) as f64).sqrt()
-}
-
 /// Rms of the second difference of a channel, which slow loads do not show.
 pub(crate) fn second_difference_rms(values: &[f64]) -> f64 {
     let (mut squares, mut count) = (0.0, 0_usize);

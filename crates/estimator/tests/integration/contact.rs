@@ -1,6 +1,8 @@
 //! Contact regression against flights of `simulator`, which shares no equation with it.
 
-use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
+use estimator::contact::{
+    self, ContactEstimate, ContactOutcome, ContactWorkspace, PartPrior, QualityFlag, Rejection,
+};
 use estimator::{Error, Samples};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -50,7 +52,18 @@ impl Case {
 
     fn estimate(&self, samples: &Samples<'_>) -> ContactOutcome {
         let prior = PartPrior { reference_load_n: Some(4000.0), ..self.prior() };
-        contact::estimate(samples, &prior).unwrap()
+        let outcome = contact::estimate(samples, &prior).unwrap();
+        let without_fit = contact::find_rejection(samples, &prior, &mut ContactWorkspace::default()).unwrap();
+        match outcome {
+            ContactOutcome::Estimated(_) => assert_eq!(without_fit, None),
+            // A mixture of both flanks, and a screw that sticks within its gap, take the regression.
+            ContactOutcome::Refused(Rejection::RateTooLow | Rejection::MotionUnexplained) => (),
+            ContactOutcome::Refused(Rejection::NoLoadReversal | Rejection::OneSideBrief) => {
+                assert!(matches!(without_fit, Some(Rejection::NoLoadReversal | Rejection::OneSideBrief)));
+            }
+            ContactOutcome::Refused(why) => assert_eq!(without_fit, Some(why)),
+        }
+        outcome
     }
 
     fn with_samples_of<T>(&self, flight: &Flight, take: impl FnOnce(&Samples<'_>) -> T) -> T {

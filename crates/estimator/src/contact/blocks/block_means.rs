@@ -2,14 +2,10 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
-
 use crate::Samples;
-use crate::simd::Lanes;
-
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
-use crate::contact::stats::{middle_and_half, rms, second_difference_rms};
+use crate::contact::stats::middle_and_half;
 use crate::contact::types::{PartPrior, SHORTEST_S};
 use crate::gap::load_band::quantiles;
 
@@ -17,6 +13,8 @@ use crate::gap::load_band::quantiles;
 const PERIOD_S: f64 = 0.004;
 /// Length of a block, s, where the load hardly vibrates.
 const CALM_PERIOD_S: f64 = 0.012;
+/// Length of a block in the search, s, there.
+const SEARCH_PERIOD_S: f64 = 0.024;
 /// The load hardly vibrates where the rms of its second difference is a smaller share of its rms.
 const CALM_SHARE: f64 = 0.05;
 /// Half of the time over which the speed of the motor is taken, s.
@@ -35,10 +33,6 @@ const START_S: f64 = 1.0;
 /// Residuals are taken as dependent within this time, s.
 const STRETCH_S: f64 = 2.0;
 
-/// Blocks that are checked and averaged together: their channels stay in the first cache between the two, and each
-/// channel is read in long enough runs to be prefetched.
-const SPAN: usize = 16;
-
 /// The end of a clipped load cell's range is near this quantile of the loads of one side.
 const PILE_QUANTILE: f64 = 0.998;
 /// Width of the band of loads at that end, as a share of it.
@@ -49,9 +43,7 @@ const PILE_RATIO: f64 = 2.0;
 /// Shortest time in that band of a clipped cell, s.
 const SHORTEST_PILE_S: f64 = 1.0;
 
-/// Blocks that the search begins with, in windows of this many.
-const EXCERPT_BLOCKS: usize = 6000;
-/// See [`EXCERPT_BLOCKS`].
+/// Blocks of a window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
 /// Share of the 95 % load that a reversal passes on either side.
 const REVERSAL_SHARE: f64 = 0.15;
@@ -61,6 +53,10 @@ const REVERSAL_SHARE: f64 = 0.15;
 pub(crate) struct BlockMeans {
     /// Length of a block, s.
     pub(crate) period_s: f64,
+    /// One over the length of two blocks, 1/s.
+    pub(crate) per_two_s: f64,
+    /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
+    is_calm: bool,
     /// The block at which each segment starts.
     pub(crate) starts: Vec<usize>,
     /// Middle of each block, s from the first sample of the log.
@@ -89,25 +85,22 @@ impl BlockMeans {
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
     pub(crate) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
-        let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
+        let shortest = ((PERIOD_S / samples.step_s).round() as usize).max(1);
+        let is_calm = is_calm(samples, shortest);
+        let count = (CALM_PERIOD_S / (shortest as f64 * samples.step_s)).ceil() as usize;
+        let each = if is_calm { shortest * count } else { shortest };
         let watch = SpikeGate::over(samples)?;
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
             self.starts.push(self.len());
             let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
-            for from in (segment.start..end).step_by(SPAN * each) {
-                let span = from..end.min(from + SPAN * each);
-                self.time_s.extend(span.clone().step_by(each).map(middle_s));
-                if !(watch.is_calm(&span) && self.push_means(samples, span.clone(), each)) {
-                    let means = span.step_by(each).map(|start| watch.mean(&(start..start + each), segment));
-                    means.for_each(|mean| self.push(mean));
-                }
+            for start in (segment.start..end).step_by(each) {
+                self.time_s.push(middle_s(start));
+                self.push(watch.mean(&(start..start + each), segment));
             }
         }
-        if self.is_calm() {
-            self.merge((CALM_PERIOD_S / self.period_s).ceil() as usize);
-        }
+        self.is_calm = is_calm;
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
@@ -128,7 +121,7 @@ impl BlockMeans {
         }
         starts.clear();
         self.phases.clear();
-        self.period_s = period_s;
+        (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
     }
 
     /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
@@ -151,46 +144,6 @@ impl BlockMeans {
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
         let is_pile = pile > PILE_RATIO * below && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
         if is_pile { top_n - width_n } else { f64::INFINITY }
-    }
-
-    /// Takes the means of a span of whole blocks in which nothing leaps; none of them, and false, where something is
-    /// missing.
-    fn push_means(&mut self, samples: &Samples<'_>, span: Range<usize>, each: usize) -> bool {
-        let before = self.dx_m.len();
-        let Samples { motor_m, dx_m, load_n, .. } = samples;
-        push_means(&mut self.motor_m, &motor_m[span.clone()], each);
-        push_means(&mut self.dx_m, &dx_m[span.clone()], each);
-        push_means(&mut self.load_n, &load_n[span], each);
-        let mut pushed = [&mut self.motor_m, &mut self.dx_m, &mut self.load_n];
-        let is_whole = pushed.iter().all(|means| means[before..].iter().all(|mean| mean.is_finite()));
-        if !is_whole {
-            pushed.iter_mut().for_each(|means| means.truncate(before));
-        }
-        is_whole
-    }
-
-    /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
-    fn is_calm(&self) -> bool {
-        second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n)
-    }
-
-    /// Replaces every `count` blocks of a segment by their mean; NaN where fewer than half of them are sound.
-    fn merge(&mut self, count: usize) {
-        let segments: Vec<Range<usize>> = self.segments().collect();
-        let mut len = 0;
-        for (start, segment) in self.starts.iter_mut().zip(segments) {
-            *start = len;
-            for from in segment.clone().step_by(count).take(segment.len() / count) {
-                for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
-                    column[len] = mean_of_sound(&column[from..from + count]);
-                }
-                len += 1;
-            }
-        }
-        for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
-            column.truncate(len);
-        }
-        self.period_s *= count as f64;
     }
 
     fn push(&mut self, mean: Option<[f64; 3]>) {
@@ -218,10 +171,6 @@ impl BlockMeans {
         self.time_s.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
-    }
-
     /// The blocks of each segment.
     pub(crate) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(self.len()));
@@ -235,29 +184,42 @@ impl BlockMeans {
 
     /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
     pub(crate) fn is_complete(&self, k: usize) -> bool {
-        let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
-        let rates = around(&self.motor_m).zip(around(&self.load_n));
-        rates.is_some_and(|(motor_m, load_n)| {
-            is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n)
-                && self.in_range_n.contains(&load_n[1])
-        })
+        let change = |values: &[f64]| Some(values.get(k + 1)? - values.get(k.wrapping_sub(1))?);
+        let changes = change(&self.motor_m).zip(change(&self.load_n));
+        changes.is_some_and(|(motor_m, load_n)| (self.dx_m[k] + motor_m + load_n).is_finite())
+            && self.time_s[k] > START_S
+            && self.in_range_n.contains(&self.load_n[k])
     }
 
-    /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
-    /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
-    pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
-        self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
+    /// Whether an excerpt of so many blocks saves much.
+    pub(crate) fn is_longer(&self, blocks: usize) -> bool {
+        self.len() >= blocks * 3 / 2
+    }
+
+    /// Takes in what a search needs of a flight: of one that has more than some number of blocks, windows in which the load
+    /// changes sides most often, and others spread over the flight; in longer blocks where the load hardly vibrates. δX
+    /// and the load are there once [delays are applied](Self::apply_delays).
+    pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
+        let count =
+            if whole.is_calm { ((SEARCH_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
+        self.clear(most.min(whole.len()), whole.period_s * count as f64);
         self.in_range_n = whole.in_range_n.clone();
-        if whole.len() < EXCERPT_BLOCKS * 3 / 2 {
-            return;
-        }
-        for window in whole.windows(load_n) {
+        let windows = if whole.is_longer(most) {
+            whole.windows(load_n, most / WINDOW_BLOCKS)
+        } else {
+            whole.segments().collect()
+        };
+        for window in windows {
             self.starts.push(self.len());
-            self.time_s.extend_from_slice(&whole.time_s[window.clone()]);
-            self.motor_m.extend_from_slice(&whole.motor_m[window.clone()]);
-            self.screw_m.extend_from_slice(&whole.screw_m[window.clone()]);
-            self.slowness.extend_from_slice(&whole.slowness[window.clone()]);
-            self.logged_n.extend_from_slice(&whole.logged_n[window]);
+            for (taken, column) in [
+                (&mut self.time_s, &whole.time_s),
+                (&mut self.motor_m, &whole.motor_m),
+                (&mut self.screw_m, &whole.screw_m),
+                (&mut self.slowness, &whole.slowness),
+                (&mut self.logged_n, &whole.logged_n),
+            ] {
+                taken.extend(column[window.clone()].chunks_exact(count).map(mean_of_sound));
+            }
         }
         self.dx_m.resize(self.len(), f64::NAN);
         self.load_n.resize(self.len(), f64::NAN);
@@ -265,7 +227,7 @@ impl BlockMeans {
 
     /// The windows of an excerpt in order of time: one half by the number of load reversals in them, the other evenly
     /// among the rest. The load alone selects, so that what is estimated does not select its own data.
-    fn windows(&self, load_n: f64) -> Vec<Range<usize>> {
+    fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
         let windows: Vec<Range<usize>> = self
             .segments()
             .flat_map(|segment| {
@@ -274,7 +236,6 @@ impl BlockMeans {
             })
             .filter(|window| window.len() == WINDOW_BLOCKS)
             .collect();
-        let count = EXCERPT_BLOCKS / WINDOW_BLOCKS;
         let mut by_reversals: Vec<(usize, usize)> = windows
             .iter()
             .map(|window| reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))
@@ -355,6 +316,25 @@ impl BlockMeans {
     }
 }
 
+/// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is a small share of
+/// their rms.
+fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
+    let (mut differences, mut loads) = (0.0, 0.0);
+    for segment in samples.segments {
+        let (mut before, mut here) = (f64::NAN, f64::NAN);
+        for part in samples.load_n[segment.clone()].chunks_exact(summed) {
+            let after: f64 = part.iter().sum();
+            let difference = before - 2.0 * here + after;
+            if difference.is_finite() {
+                differences += difference * difference;
+                loads += here * here;
+            }
+            (before, here) = (here, after);
+        }
+    }
+    differences < CALM_SHARE * CALM_SHARE * loads
+}
+
 /// How often a load changes sides, at least so far to either.
 fn reversals(load_n: &[f64], least_n: f64) -> usize {
     let (mut side, mut count) = (0.0, 0);
@@ -383,55 +363,6 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
         let [a, b, c, d] = weights;
         *read = a * four[0] + b * four[1] + c * four[2] + d * four[3];
     }
-}
-
-/// Whether δX of a block and the rates of the other two channels are known, and the flight has more than begun.
-#[inline]
-pub(crate) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
-    let all = dx_m + (motor_m[2] - motor_m[0]) + (load_n[2] - load_n[0]);
-    (time_s > START_S) & (all.abs() < f64::INFINITY)
-}
-
-/// The furthest that a value lies from the one before it; a missing one lies nowhere.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn furthest_leap(values: &[f64]) -> f64 {
-    let (mut furthest, mut done) = (Lanes::ZERO, 0);
-    while let Some(group) = values[done..].first_chunk::<{ Lanes::COUNT + 1 }>() {
-        for lane in 0..Lanes::COUNT {
-            furthest.0[lane] = greater(furthest.0[lane], (group[lane + 1] - group[lane]).abs());
-        }
-        done += Lanes::COUNT;
-    }
-    let mut all = 0.0;
-    for lane in furthest.0 {
-        all = greater(all, lane);
-    }
-    for pair in values[done..].windows(2) {
-        all = greater(all, (pair[1] - pair[0]).abs());
-    }
-    all
-}
-
-/// Appends the mean of each block, summed in its own order, eight side by side.
-fn push_means(means: &mut Vec<f64>, values: &[f64], each: usize) {
-    let n = each as f64;
-    let eights = values.chunks_exact(Lanes::COUNT * each);
-    let rest = eights.remainder().chunks_exact(each);
-    for eight in eights {
-        means.extend(sums(eight, each).map(|sum| sum / n));
-    }
-    means.extend(rest.map(|block| block.iter().sum::<f64>() / n));
-}
-
-fn sums(values: &[f64], each: usize) -> [f64; Lanes::COUNT] {
-    let blocks: [&[f64]; Lanes::COUNT] = std::array::from_fn(|k| &values[k * each..][..each]);
-    let mut sums = [0.0; Lanes::COUNT];
-    for k in 0..each {
-        for (sum, block) in sums.iter_mut().zip(&blocks) {
-            *sum += block[k];
-        }
-    }
-    sums
 }
 
 /// Mean of the finite values; NaN where they are fewer than half.
@@ -472,17 +403,6 @@ impl<'a> SpikeGate<'a> {
             |channel: &[f64]| SpikeThreshold::of(channel, samples.segments).ok_or(Rejection::ChannelConstant);
         of(samples.motor_m)?;
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
-    }
-
-    /// Whether nothing leaps within a span, nor from the sample before it; the first span of a log is left to be
-    /// tested block by block.
-    fn is_calm(&self, span: &Range<usize>) -> bool {
-        if span.start == 0 {
-            return false;
-        }
-        let with_before = span.start - 1..span.end;
-        furthest_leap(&self.samples.dx_m[with_before.clone()]) <= self.dx.leap
-            && furthest_leap(&self.samples.load_n[with_before]) <= self.load.leap
     }
 
     /// Means of motor, δX and load over a block; none where fewer than half of its samples are sound.

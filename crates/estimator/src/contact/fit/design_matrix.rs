@@ -2,13 +2,10 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
-
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::friction::coupling_path::{CouplingPath, PathColumns, Touch};
-use crate::contact::friction::friction_model::FrictionState;
-use crate::simd::Lanes;
+use crate::contact::friction::coupling_path::{CouplingPath, Touch};
+use crate::contact::friction::friction_model::{Coupling, FrictionState};
 
 /// Columns of the regression.
 pub(crate) const COLUMNS: usize = 17;
@@ -86,18 +83,19 @@ pub(crate) fn rows(source: RowSource<'_>, state: &FrictionState, path: &mut Coup
     let mut design = DesignMatrix { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
     let mut open: [DesignRow<COLUMNS>; 4] = [DesignRow::ZERO; 4];
     let mut stretch = None;
+    let row_blocks = scaling.row_blocks(blocks.period_s);
     for segment in blocks.segments() {
         let mut first = segment.start;
-        while let Some((touch, run)) = path.next_stable_run(blocks, first..segment.end, scaling.row_blocks) {
+        while let Some((touch, run)) = path.next_stable_run(blocks, first..segment.end, row_blocks) {
             first = run.end;
             let here = blocks.stretch(run.start);
             if stretch != Some(here) {
                 design.close_all(&mut open, blocks.period_s);
                 stretch = Some(here);
             }
-            let sum = source.sum(&path.columns, run, touch.flank().sign());
+            let sum = source.sum(&path.couplings, run, touch.flank().sign());
             let row = &mut open[touch.index()];
-            if row.blocks > 0.0 && row.blocks + sum.blocks > scaling.row_blocks as f64 {
+            if row.blocks > 0.0 && row.blocks + sum.blocks > row_blocks as f64 {
                 design.close(touch.index(), row, blocks.period_s);
             }
             row.add(&sum);
@@ -135,7 +133,7 @@ impl DesignMatrix {
 
 impl RowSource<'_> {
     /// The sums of a row of complete blocks.
-    pub(crate) fn sum(&self, path: &PathColumns, within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
+    pub(crate) fn sum(&self, couplings: &[Coupling], within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
         let Self { blocks, scaling } = self;
         let (first, end) = (within.start, within.end);
         let mut sum =
@@ -144,30 +142,26 @@ impl RowSource<'_> {
         let change = |values: &[f64]| values[end] + values[end - 1] - values[first] - values[first - 1];
         sum.x[ORIGIN] = sum.blocks;
         sum.x[GAP] = 0.5 * side * sum.blocks;
-        sum.x[SPEED] = change(&blocks.motor_m) * scaling.per_speed;
-        sum.x[LOAD_RATE] = change(&blocks.load_n) * scaling.per_load_rate;
-        let sums = channel_sums(
-            [&blocks.motor_m[within.clone()], &blocks.dx_m[within.clone()], &blocks.time_s[within.clone()]],
-            [
-                &path.force_n[within.clone()],
-                &path.dforce_ddry[within.clone()],
-                &path.dforce_dloss_n[within.clone()],
-                &path.dforce_dstribeck_n[within],
-            ],
-            (scaling.time_s.0, scaling.per_time),
-            (scaling.place_m.0, scaling.per_place),
-        );
-        sum.y_m = sums[0];
-        sum.x[FORCE] = sums[1] * scaling.per_load;
-        sum.x[DRY] = sums[2];
-        sum.x[SHARE] = sums[3] * scaling.per_load;
-        sum.x[STRIBECK] = sums[4] * scaling.per_load;
-        sum.x[DRIFT] = sums[5];
-        sum.x[DRIFT_SQUARE] = sums[6];
-        sum.x[PLACE] = sums[7];
-        sum.x[PLACE_SQUARE] = sums[8];
-        sum.x[PLACE_CUBE] = sums[9];
-        sum.x[FORCE_DRIFT] = sums[10] * scaling.per_load;
+        sum.x[SPEED] = change(&blocks.motor_m) * blocks.per_two_s * scaling.per_speed;
+        sum.x[LOAD_RATE] = change(&blocks.load_n) * blocks.per_two_s * scaling.per_load_rate;
+        for k in within {
+            let (time, place) = self.time_and_place(k);
+            let Coupling { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, .. } = couplings[k];
+            sum.y_m += blocks.dx_m[k];
+            sum.x[FORCE] += force_n;
+            sum.x[DRY] += dforce_ddry;
+            sum.x[SHARE] += dforce_dloss_n;
+            sum.x[STRIBECK] += dforce_dstribeck_n;
+            sum.x[DRIFT] += time;
+            sum.x[DRIFT_SQUARE] += time * time;
+            sum.x[PLACE] += place;
+            sum.x[PLACE_SQUARE] += place * place;
+            sum.x[PLACE_CUBE] += place * place * place;
+            sum.x[FORCE_DRIFT] += force_n * time;
+        }
+        for column in [FORCE, SHARE, STRIBECK, FORCE_DRIFT] {
+            sum.x[column] *= scaling.per_load;
+        }
         sum.x[SIDE_FORCE] = side * sum.x[FORCE];
         if let Some(phases) = blocks.phases.get(first..end) {
             for [sine, cosine] in phases {
@@ -177,97 +171,30 @@ impl RowSource<'_> {
         }
         sum
     }
-}
 
-impl RowSource<'_> {
-    /// The columns of a block that do not depend on the force in the coupling, and δX, m.
-    pub(crate) fn slow_columns(&self, k: usize) -> ([f64; COLUMNS], f64) {
+    /// Time and screw position of a block, from −1 to 1. The screw's own position: its transducer's slope acts on the gap
+    /// as well.
+    fn time_and_place(&self, k: usize) -> (f64, f64) {
         let Self { blocks, scaling } = self;
-        let time = scaling.time_share(blocks.time_s[k]);
-        let place = (blocks.motor_m[k] + blocks.dx_m[k] - scaling.place_m.0) * scaling.per_place;
-        let mut x = [0.0; COLUMNS];
-        x[ORIGIN] = 1.0;
-        x[SPEED] = (blocks.motor_m[k + 1] - blocks.motor_m[k - 1]) * scaling.per_speed;
-        x[LOAD_RATE] = (blocks.load_n[k + 1] - blocks.load_n[k - 1]) * scaling.per_load_rate;
-        (x[DRIFT], x[DRIFT_SQUARE]) = (time, time * time);
-        (x[PLACE], x[PLACE_SQUARE], x[PLACE_CUBE]) = (place, place * place, place * place * place);
-        if let Some([sine, cosine]) = blocks.phases.get(k) {
-            (x[PERIODIC], x[PERIODIC_COSINE]) = (*sine, *cosine);
-        }
-        (x, blocks.dx_m[k])
+        let screw_m = blocks.motor_m[k] + blocks.dx_m[k];
+        (scaling.time_share(blocks.time_s[k]), (screw_m - scaling.place_m.0) * scaling.per_place)
     }
-}
 
-/// What [`channel_sums`] sums: δX, c, its three derivatives, t, t², X, X², X³ and c·t.
-const SUMS: usize = 11;
-
-/// Sums over the blocks of a run, in eight lanes: `[X₁, δX, time]` and `[c, ∂c/∂F_d, ∂c/∂η, ∂c/∂p]`; time and
-/// position from a middle and times a scale.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn channel_sums(
-    channels: [&[f64]; 3],
-    coupling: [&[f64]; 4],
-    time: (f64, f64),
-    place: (f64, f64),
-) -> [f64; SUMS] {
-    let mut lanes = [Lanes::ZERO; SUMS];
-    let blocks = channels[0].len();
-    let mut first = 0;
-    while first < blocks {
-        let count = if blocks - first < Lanes::COUNT { blocks - first } else { Lanes::COUNT };
-        if count == Lanes::COUNT {
-            for lane in 0..Lanes::COUNT {
-                let k = first + lane;
-                let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
-                let t = (channels[2][k] - time.0) * time.1;
-                // The screw's own: its transducer's slope acts on the gap as well.
-                let x = (motor_m + dx_m - place.0) * place.1;
-                let force_n = coupling[0][k];
-                lanes[0].0[lane] += dx_m;
-                lanes[1].0[lane] += force_n;
-                lanes[2].0[lane] += coupling[1][k];
-                lanes[3].0[lane] += coupling[2][k];
-                lanes[4].0[lane] += coupling[3][k];
-                lanes[5].0[lane] += t;
-                lanes[6].0[lane] += t * t;
-                lanes[7].0[lane] += x;
-                lanes[8].0[lane] += x * x;
-                lanes[9].0[lane] += x * x * x;
-                lanes[10].0[lane] += force_n * t;
-            }
-        } else {
-            for k in first..blocks {
-                let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
-                let t = (channels[2][k] - time.0) * time.1;
-                let x = (motor_m + dx_m - place.0) * place.1;
-                let force_n = coupling[0][k];
-                let all = [
-                    dx_m,
-                    force_n,
-                    coupling[1][k],
-                    coupling[2][k],
-                    coupling[3][k],
-                    t,
-                    t * t,
-                    x,
-                    x * x,
-                    x * x * x,
-                    force_n * t,
-                ];
-                for sum in 0..SUMS {
-                    lanes[sum].0[k - first] += all[sum];
-                }
-            }
-        }
-        first += count;
+    /// δX of a block that has neighbours, without all that does not depend on the force in the coupling, m.
+    pub(crate) fn without_slow_parts_m(&self, k: usize, beta: &[f64; COLUMNS]) -> f64 {
+        let Self { blocks, scaling } = self;
+        let (time, place) = self.time_and_place(k);
+        let rate = |values: &[f64]| (values[k + 1] - values[k - 1]) * blocks.per_two_s;
+        let delays_m = beta[SPEED] * scaling.per_speed * rate(&blocks.motor_m)
+            + beta[LOAD_RATE] * scaling.per_load_rate * rate(&blocks.load_n);
+        let drift_m = time * (beta[DRIFT] + time * beta[DRIFT_SQUARE]);
+        let transducer_m = place * (beta[PLACE] + place * (beta[PLACE_SQUARE] + place * beta[PLACE_CUBE]));
+        let periodic_m = blocks
+            .phases
+            .get(k)
+            .map_or(0.0, |[sine, cosine]| beta[PERIODIC] * sine + beta[PERIODIC_COSINE] * cosine);
+        blocks.dx_m[k] - delays_m - drift_m - transducer_m - periodic_m
     }
-    let mut sums = [0.0; SUMS];
-    for sum in 0..SUMS {
-        for lane in 0..Lanes::COUNT {
-            sums[sum] += lanes[sum].0[lane];
-        }
-    }
-    sums
 }
 
 impl<const N: usize> DesignRow<N> {

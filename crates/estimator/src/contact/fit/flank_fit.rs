@@ -13,7 +13,7 @@ use crate::contact::fit::design_matrix::{
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
-use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::scaling::{LATE_S, SEARCH_ROW_S, SPEED_M_PER_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
@@ -32,9 +32,12 @@ const LOOKS: usize = 4000;
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
 /// A gap under this share of the wind-up does not show the zero of the load cell.
-const UNSEEN_GAP: f64 = 0.1;
+pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Largest error of that zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
+/// Blocks that the search begins with, and the factor by which it takes more where these show too little contact.
+const EXCERPT_BLOCKS: usize = 6000;
+const LONGER: usize = 4;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
 /// Reweightings of the rows in each of them.
@@ -77,19 +80,6 @@ const LEAST_PERIODIC_M: f64 = 2e-7;
 /// Factor of the error where the load cell is at its end for a part of the time: the friction model is driven by its reading.
 const CLIPPED: f64 = 1.5;
 
-/// Weight of each part of the uncertainty of a gap; see [`Doubt`].
-const WEIGHTS: Doubt = Doubt {
-    jackknife_m: 0.92,
-    search_m: 0.48,
-    choice_m: 2.65,
-    bend_m: 3.0,
-    light_m: 0.095,
-    vibration_m: 0.36,
-    aliased_m: 0.5,
-    floor_m: 1.13,
-    changes: 0.58,
-    friction_share: 1.42,
-};
 /// The uncertainty grows with the share of friction in the load up to this share.
 const MAX_DOUBTED_SHARE: f64 = 0.6;
 
@@ -124,22 +114,18 @@ pub(crate) struct Doubt {
 
 impl Doubt {
     fn standard_error_m(&self) -> f64 {
-        let parts = |doubt: &Self| {
-            [
-                doubt.jackknife_m,
-                doubt.search_m,
-                doubt.choice_m,
-                doubt.bend_m,
-                doubt.light_m,
-                doubt.vibration_m,
-                doubt.aliased_m,
-                doubt.floor_m,
-            ]
-        };
-        let variance_m2: f64 =
-            parts(self).iter().zip(parts(&WEIGHTS)).map(|(part_m, weight)| (part_m * weight).powi(2)).sum();
-        let growth = WEIGHTS.changes * self.changes
-            + WEIGHTS.friction_share * self.friction_share.min(MAX_DOUBTED_SHARE);
+        let weighted_m = [
+            0.92 * self.jackknife_m,
+            0.48 * self.search_m,
+            2.65 * self.choice_m,
+            3.0 * self.bend_m,
+            0.095 * self.light_m,
+            0.36 * self.vibration_m,
+            0.5 * self.aliased_m,
+            1.13 * self.floor_m,
+        ];
+        let variance_m2: f64 = weighted_m.iter().map(|part_m| part_m * part_m).sum();
+        let growth = 0.58 * self.changes + 1.42 * self.friction_share.min(MAX_DOUBTED_SHARE);
         variance_m2.sqrt() * growth.exp()
     }
 }
@@ -188,13 +174,6 @@ impl FlankFit {
         beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE]) + force * beta[SIDE_FORCE]
     }
 
-    /// δX of a block without drift, skew and transducer error, m.
-    pub(crate) fn without_slow_parts_m(&self, source: RowSource<'_>, k: usize) -> f64 {
-        let (x, y_m) = source.slow_columns(k);
-        let slow = x.iter().zip(&self.line.fit.beta).skip(ORIGIN + 1).map(|(x, b)| x * b);
-        y_m - slow.sum::<f64>()
-    }
-
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         (FORCE + 1..COLUMNS)
@@ -210,7 +189,6 @@ impl FlankFit {
 /// As [`search`]; [`Rejection::RateTooLow`] for a load that vibrates faster than it is sampled, so that neighbouring
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
-    workspace.excerpt.excerpt_of(&workspace.whole, scaling.load_n);
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
     let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
     let windup_m = scaling.windup_m();
@@ -245,16 +223,23 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         line,
     };
     if gap_m.0 < UNSEEN_GAP * windup_m {
-        check_both_sides(&workspace.whole, scaling)?;
+        check_both_sides(&workspace.whole, scaling, false)?;
     }
     if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
 }
 
+/// Whether the logged load presses on both flanks for long enough.
+///
 /// Without a gap nothing in a flight shows the zero of its load cell. A flank then counts as pressed under loads that no
 /// zero error explains: a load that only seems to change its side shows no gap either.
-fn check_both_sides(blocks: &BlockMeans, scaling: &Scaling) -> Result<(), Rejection> {
+pub(crate) fn check_both_sides(
+    blocks: &BlockMeans,
+    scaling: &Scaling,
+    shows_gap: bool,
+) -> Result<(), Rejection> {
+    let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
     let beyond_s = |side: f64| {
-        let is_beyond = |load_n: &&f64| side * **load_n > ZERO_ERROR * scaling.load_n;
+        let is_beyond = |load_n: &&f64| side * **load_n > share * scaling.load_n;
         blocks.load_n.iter().filter(is_beyond).count() as f64 * blocks.period_s
     };
     rejection_of_contact(beyond_s(1.0).min(beyond_s(-1.0)))
@@ -274,7 +259,7 @@ pub(crate) fn midrange_at_fit_m(
     let ContactWorkspace { whole, excerpt, .. } = workspace;
     let of = |blocks: &BlockMeans| midrange_of_m(blocks, scaling, fit, unknown_force_n);
     let of_whole = if whole.len() < SHORT_BLOCKS { of(whole) } else { None };
-    let of_excerpt = if excerpt.is_empty() { None } else { of(excerpt) };
+    let of_excerpt = if whole.is_longer(EXCERPT_BLOCKS) { of(excerpt) } else { None };
     let off_m = |midrange_m: &f64| (midrange_m - fit.gap_m.0).abs();
     of_whole.into_iter().chain(of_excerpt).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
 }
@@ -286,8 +271,9 @@ fn midrange_of_m(
     unknown_force_n: Option<f64>,
 ) -> Option<f64> {
     let source = RowSource { blocks, scaling };
+    let beta = &fit.line.fit.beta;
     let residual =
-        |k: usize| if blocks.is_complete(k) { fit.without_slow_parts_m(source, k) } else { f64::NAN };
+        |k: usize| if blocks.is_complete(k) { source.without_slow_parts_m(k, beta) } else { f64::NAN };
     let dx_m: Vec<f64> = (0..blocks.len()).map(residual).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
     let segments: Vec<Range<usize>> = blocks.segments().collect();
@@ -322,19 +308,22 @@ pub(crate) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 
     of_part_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n)
 }
 
-/// Searches with long rows, in an excerpt of a long flight, and iterates over the whole with short rows from there.
+/// Searches with long rows, in an excerpt as long as it must be, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
     let ContactWorkspace { whole, excerpt, path } = workspace;
     let has_period = scaling.per_period > 0.0;
-    if has_period {
-        if excerpt.is_empty() { &mut *whole } else { &mut *excerpt }.find_phases(scaling.per_period);
-    }
-    let coarse = Scaling { row_blocks: scaling.search_row_blocks, ..*scaling };
-    let of_excerpt =
-        if excerpt.is_empty() { None } else { ParameterSearch::new(excerpt, path, &coarse).run().ok() };
-    let best = match of_excerpt {
-        Some(best) => best,
-        None => ParameterSearch::new(whole, path, &coarse).run()?,
+    let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
+    let mut blocks = EXCERPT_BLOCKS;
+    let best = loop {
+        excerpt.excerpt_of(whole, scaling.load_n, blocks);
+        if has_period {
+            excerpt.find_phases(scaling.per_period);
+        }
+        match ParameterSearch::new(excerpt, path, &coarse).run() {
+            Ok(best) => break best,
+            Err(why) if !whole.is_longer(blocks) => return Err(why),
+            Err(_) => blocks *= LONGER,
+        }
     };
     if has_period && is_periodic(&best.found) {
         whole.find_phases(scaling.per_period);
@@ -369,10 +358,11 @@ fn gap_and_doubt(
     let standard_error_m = line.fit.standard_error_m(GAP, rows);
     let low = refit(FIRM_SHARE);
     let high = refit(STIFF_SHARE).filter(|_| has_both_flanks(rows));
-    let jackknife_m = low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_m(parts.iter().copied()));
+    let jackknife_m =
+        low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_error_m(parts.iter().copied()));
     let (difference_m, error_m) = match (&low, &high) {
         (Some((low_m, lows)), Some((high_m, highs))) => {
-            (high_m - low_m, jackknife_m_of_difference(lows, highs))
+            (high_m - low_m, jackknife_error_m(lows.iter().zip(highs).map(|(low_m, high_m)| high_m - low_m)))
         }
         _ => (0.0, 0.0),
     };
@@ -434,14 +424,10 @@ fn has_both_flanks(rows: &[DesignRow<COLUMNS>]) -> bool {
 }
 
 /// Jackknife error of a statistic from its values with one group left out (Tukey 1958).
-fn jackknife_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
+fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
     let count = parts_m.clone().count() as f64;
     let mean_m = parts_m.clone().sum::<f64>() / count;
     ((count - 1.0) / count * parts_m.map(|part_m| (part_m - mean_m).powi(2)).sum::<f64>()).sqrt()
-}
-
-fn jackknife_m_of_difference(lows_m: &[f64], highs_m: &[f64]) -> f64 {
-    jackknife_m(lows_m.iter().zip(highs_m).map(|(low_m, high_m)| high_m - low_m))
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
@@ -456,8 +442,7 @@ fn is_explained(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &Flank
 /// How far δX travels, m: as seen once everything else is taken off, as gap and wind-up predict, and by noise alone;
 /// each from the 5 % to the 95 % quantile.
 fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> (f64, f64, f64) {
-    let ContactWorkspace { whole, excerpt, path } = workspace;
-    let blocks = if excerpt.is_empty() { whole } else { excerpt };
+    let ContactWorkspace { excerpt: blocks, path, .. } = workspace;
     let state = &fit.line.at;
     blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
     let source = RowSource { blocks, scaling };
@@ -465,12 +450,12 @@ fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit
     let stride = blocks.len().div_ceil(LOOKS).max(1);
     let (mut seen_m, mut expected_m) = (Vec::new(), Vec::new());
     for k in (0..blocks.len()).step_by(stride).filter(|&k| blocks.is_complete(k)) {
-        let force_n = path.columns.force_n[k];
+        let force_n = path.couplings[k].force_n;
         if !force_n.is_finite() {
             continue;
         }
         let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        let row = source.sum(&path.columns, k..k + 1, side);
+        let row = source.sum(&path.couplings, k..k + 1, side);
         seen_m.push(row.y_m - fit.other_m(&row));
         expected_m.push(fit.flank_m(side, row.x[FORCE].abs()));
     }

@@ -44,8 +44,6 @@ const MAX_STRIBECK: f64 = 1.2;
 const MAX_LOAD_DELAY_S: f64 = 0.04;
 /// Widest gap in wind-ups that the iteration assumes.
 const MAX_GAP_WINDUPS: f64 = 20.0;
-/// An iteration that moves the state by less than this share of the gap's standard error is the last.
-const CONVERGENCE_SHARE: f64 = 0.05;
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
@@ -70,38 +68,16 @@ pub(crate) fn search(
     (iterations, rounds): (usize, usize),
 ) -> Result<GaussNewtonResult, Rejection> {
     let mut found = None;
-    for iteration in 1..=iterations {
+    for _ in 0..iterations {
         blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
         let design = design_matrix::rows(RowSource { blocks, scaling }, &state, path);
         check_contact(&design)?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
-        let moved_m = scaling.windup_m() * step(scaling, &state, &after);
-        let is_last =
-            iteration == iterations || moved_m < CONVERGENCE_SHARE * fit.standard_error_m(GAP, &design.firm);
         found = Some(GaussNewtonResult { design, fit, at: state, state: after });
         state = after;
-        if is_last {
-            break;
-        }
     }
     found.ok_or(Rejection::TooShort)
-}
-
-/// How far an iteration moved the state, over what each of its numbers is about.
-fn step(scaling: &Scaling, before: &FrictionState, after: &FrictionState) -> f64 {
-    let (was, is) = (&before.friction, &after.friction);
-    [
-        after.stiffness_n_per_m / before.stiffness_n_per_m - 1.0,
-        (after.gap_m - before.gap_m) / scaling.windup_m(),
-        (is.dry_n - was.dry_n) / scaling.load_n,
-        is.lost_share - was.lost_share,
-        (after.skew_s - before.skew_s) / 0.02,
-        (after.load_delay_s - before.load_delay_s) / 0.02,
-        0.1 * (after.stribeck - before.stribeck),
-    ]
-    .into_iter()
-    .fold(0.0, |most, part| part.abs().max(most))
 }
 
 /// The start of a search: the part's stiffness, a usual friction, no gap and no delays.

@@ -7,7 +7,7 @@
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, SIDE_FORCE, STRIBECK,
+    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, ORIGIN, RowSource, SHARE, SIDE_FORCE, STRIBECK,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
 use crate::contact::fit::scaling::Scaling;
@@ -277,18 +277,17 @@ impl<'a> ParameterSearch<'a> {
         let (force, force_drift) = (beta[FORCE] / scaling.load_n, beta[FORCE_DRIFT] / scaling.load_n);
         let side_force = beta[SIDE_FORCE] / scaling.load_n;
         let (share, stribeck) = (beta[SHARE] / scaling.load_n, beta[STRIBECK] / scaling.load_n);
-        let columns = &path.columns;
-        for (k, linear_m) in linear_m.iter().enumerate() {
-            let force_n = columns.force_n[k];
+        for (k, (linear_m, coupling)) in linear_m.iter().zip(&path.couplings).enumerate() {
+            let force_n = coupling.force_n;
             let side = if force_n == 0.0 { 0.0 } else { 0.5 * force_n.signum() };
-            let inside_m = if force_n == 0.0 { columns.relative_m[k] } else { 0.0 };
+            let inside_m = if force_n == 0.0 { coupling.relative_m } else { 0.0 };
             let time = scaling.time_share(blocks.time_s[k]);
             let coupling_m = side * beta[GAP]
                 + force_n * (force + force_drift * time)
                 + force_n.abs() * side_force
-                + beta[DRY] * columns.dforce_ddry[k]
-                + share * columns.dforce_dloss_n[k]
-                + stribeck * columns.dforce_dstribeck_n[k];
+                + beta[DRY] * coupling.dforce_ddry
+                + share * coupling.dforce_dloss_n
+                + stribeck * coupling.dforce_dstribeck_n;
             let residual_m = linear_m - shift_m - inside_m - coupling_m;
             if residual_m.is_finite() {
                 take(residual_m);
@@ -299,16 +298,10 @@ impl<'a> ParameterSearch<'a> {
 
 /// δX less all that does not depend on the force in the coupling, for every block; NaN where something is missing.
 fn linear_parts(source: RowSource<'_>, beta: &[f64; COLUMNS], parts_m: &mut Vec<f64>) {
-    let mut without = *beta;
-    for column in [GAP, FORCE, DRY, SHARE, STRIBECK, FORCE_DRIFT, SIDE_FORCE] {
-        without[column] = 0.0;
-    }
+    let part_m = |k| {
+        let is_complete = source.blocks.is_complete(k);
+        if is_complete { source.without_slow_parts_m(k, beta) - beta[ORIGIN] } else { f64::NAN }
+    };
     parts_m.clear();
-    parts_m.extend((0..source.blocks.len()).map(|k| {
-        if !source.blocks.is_complete(k) {
-            return f64::NAN;
-        }
-        let (x, y_m) = source.slow_columns(k);
-        y_m - x.iter().zip(&without).map(|(x, b)| x * b).sum::<f64>()
-    }));
+    parts_m.extend((0..source.blocks.len()).map(part_m));
 }

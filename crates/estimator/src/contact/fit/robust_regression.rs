@@ -111,64 +111,89 @@ fn variance_of_a_row<const N: usize>(rows: &[DesignRow<N>], weights: &[f64], res
 }
 
 /// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
-fn normal_equations<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
-    let NormalEquations { squares, right } = products(rows, weights);
-    let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
-    for (i, line) in normal.iter_mut().enumerate() {
-        side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
-        for (j, entry) in line.iter_mut().enumerate().take(i + 1) {
-            let square = &squares[square_index(i / Lanes::COUNT, j / Lanes::COUNT)];
-            *entry = square[i % Lanes::COUNT].0[j % Lanes::COUNT];
-        }
-    }
-    (normal, side)
+fn normal_equations<const N: usize>(
+    rows: &[DesignRow<N>],
+    weights: &[f64],
+) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
+    let squares = products(rows, weights);
+    // δX comes before the columns of x.
+    let sum = |i: usize, j: usize| {
+        squares[square_index(i / Lanes::COUNT, j / Lanes::COUNT)][i % Lanes::COUNT].0[j % Lanes::COUNT]
+    };
+    (
+        SMatrix::from_fn(|i, j| if j <= i { sum(i + 1, j + 1) } else { 0.0 }),
+        SVector::from_fn(|i, _| sum(i + 1, 0)),
+    )
 }
 
-/// Lanes of a row.
+/// Most lanes of a row: δX and the columns of x.
 const ROW_LANES: usize = 5;
 /// Squares on and below the diagonal.
 const SQUARES: usize = ROW_LANES * (ROW_LANES + 1) / 2;
+/// Rows whose lanes stay in the first cache while every square takes them in.
+const CHUNK: usize = 32;
+
+/// Sums of products of eight columns with eight others.
+type Square = [Lanes; Lanes::COUNT];
 
 /// Where the square of two lanes of a row stands, the second of which is not after the first.
 const fn square_index(line: usize, column: usize) -> usize {
     line * (line + 1) / 2 + column
 }
 
-/// Sums over rows: Σ w x xᵀ in squares of eight by eight on and below the diagonal, filled up with zeros; and Σ w x y.
-struct NormalEquations {
-    squares: [[Lanes; Lanes::COUNT]; SQUARES],
-    right: [Lanes; ROW_LANES],
-}
-
-/// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
+/// Sums over rows: Σ w z zᵀ with z = [y, x], in squares on and below the diagonal, filled up with zeros. Whole squares:
+/// what is above the diagonal comes for nothing.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
-    const { assert!(N <= ROW_LANES * Lanes::COUNT) };
+fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> [Square; SQUARES] {
+    const { assert!(N < ROW_LANES * Lanes::COUNT) };
     let mut squares = [[Lanes::ZERO; Lanes::COUNT]; SQUARES];
-    let mut right = [Lanes::ZERO; ROW_LANES];
-    for (row, &w) in rows.iter().zip(weights) {
-        let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
-        let mut x = [Lanes::ZERO; ROW_LANES];
-        for line in 0..N.div_ceil(Lanes::COUNT) {
-            x[line] = Lanes::of(&row.x, line * Lanes::COUNT);
-            let wx = w.times(x[line]);
-            right[line] = right[line].plus(wx.times(y_m));
-            let count = (N - line * Lanes::COUNT).min(Lanes::COUNT);
+    let mut plain = [[Lanes::ZERO; CHUNK]; ROW_LANES];
+    let mut weighted = plain;
+    let lines = N / Lanes::COUNT + 1;
+    for (rows, weights) in rows.chunks(CHUNK).zip(weights.chunks(CHUNK)) {
+        for (k, (row, &w)) in rows.iter().zip(weights).enumerate() {
+            for line in 0..lines {
+                let mut lanes = Lanes::ZERO;
+                for (lane, value) in lanes.0.iter_mut().enumerate() {
+                    let column = line * Lanes::COUNT + lane;
+                    *value = match column {
+                        0 => row.y_m,
+                        _ if column <= N => row.x[column - 1],
+                        _ => 0.0,
+                    };
+                }
+                plain[line][k] = lanes;
+                weighted[line][k] = Lanes::all(w).times(lanes);
+            }
+        }
+        for line in 0..lines {
+            let left = &weighted[line][..rows.len()];
             for column in 0..=line {
-                add_products(&mut squares[square_index(line, column)], count, wx, x[column]);
+                let square = &mut squares[square_index(line, column)];
+                let right = &plain[column][..rows.len()];
+                match N + 1 - line * Lanes::COUNT {
+                    0..=2 => add_products::<2>(square, left, right),
+                    3..=4 => add_products::<4>(square, left, right),
+                    _ => add_products::<{ Lanes::COUNT }>(square, left, right),
+                }
             }
         }
     }
-    NormalEquations { squares, right }
+    squares
 }
 
-/// Adds a product to each entry of a square's first lines: lines by columns.
+/// Adds the products of some rows to the first lines of a square, which stay in registers.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
-fn add_products(square: &mut [Lanes; Lanes::COUNT], count: usize, lines: Lanes, columns: Lanes) {
-    for (sum, line) in square.iter_mut().zip(lines.0).take(count) {
-        *sum = sum.plus(Lanes::all(line).times(columns));
+fn add_products<const LINES: usize>(square: &mut Square, left: &[Lanes], right: &[Lanes]) {
+    let mut sums = [Lanes::ZERO; LINES];
+    sums.copy_from_slice(&square[..LINES]);
+    for (left, right) in left.iter().zip(right) {
+        for (sum, weighted) in sums.iter_mut().zip(left.0) {
+            *sum = sum.plus(Lanes::all(weighted).times(*right));
+        }
     }
+    square[..LINES].copy_from_slice(&sums);
 }
 
 fn solve<const N: usize>(
@@ -178,8 +203,7 @@ fn solve<const N: usize>(
     lent: [f64; N],
 ) -> Option<RobustFit<N>> {
     let (normal, right) = normal_equations(rows, &weights);
-    let normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
-    let (beta, factor) = solve_normal(normal, SVector::<f64, N>::from(right), beliefs, &lent)?;
+    let (beta, factor) = solve_normal(normal, right, beliefs, &lent)?;
     Some(RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
 }
 
@@ -227,8 +251,7 @@ impl<const N: usize> RobustFit<N> {
                 let chosen = rows[group.clone()].iter().zip(&self.weights[group.clone()]);
                 let weights: Vec<f64> =
                     chosen.map(|(row, w)| if row.x[by].abs() < least { 0.0 } else { *w }).collect();
-                let (normal, right) = normal_equations(&rows[group.clone()], &weights);
-                (SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]), SVector::<f64, N>::from(right))
+                normal_equations(&rows[group.clone()], &weights)
             })
             .collect();
         let mut total = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());

@@ -12,15 +12,16 @@ use crate::gap::load_band::quantiles;
 pub(crate) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(crate) const LATE_S: f64 = 0.01;
-/// Length of a row, s, at least and at most; long flights need no finer rows.
-const ROW_S: [f64; 2] = [0.1, 0.4];
+/// Length of a row, s, at least; and at most, as in the search, which needs no fine rows.
+const ROW_S: f64 = 0.1;
+pub(crate) const SEARCH_ROW_S: f64 = 0.4;
 /// Blocks of a row, at least.
 const LEAST_BLOCKS: usize = 6;
 /// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
 /// screw within the gap for the whole flight.
 const LEAST_LOAD: f64 = 1.5;
-/// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
-const BLOCKS_PER_ROW_BLOCK: usize = 10_000;
+/// Rows of a flight without a break, so that long flights have no more than they need.
+const MOST_ROWS: f64 = 10_000.0;
 
 /// Wind-ups that the motor must travel: at rest, friction and a gap are not distinguishable.
 const LEAST_TRAVEL: f64 = 3.0;
@@ -42,13 +43,11 @@ pub(crate) struct Scaling {
     pub(crate) per_load: f64,
     pub(crate) per_place: f64,
     pub(crate) per_time: f64,
-    /// What brings a difference over two blocks to the column of the speed, 1/m, and of the load's rate, 1/N.
+    /// What brings a speed to its column, s/m, and the load's rate, s/N.
     pub(crate) per_speed: f64,
     pub(crate) per_load_rate: f64,
-    /// Most blocks of a row.
-    pub(crate) row_blocks: usize,
-    /// The same in the search, which needs no fine rows.
-    pub(crate) search_row_blocks: usize,
+    /// Length of a row, s.
+    pub(crate) row_s: f64,
     /// Sense in which the motor drives the friction model: −1 where the load is the motor's own.
     pub(crate) motor_sense: f64,
     /// 2π over the travel of a period, 1/m; zero where nothing repeats, or too little of it is seen.
@@ -70,9 +69,7 @@ impl Scaling {
         if !prior.output_locked && 2.0 * place_m.1 < LEAST_TRAVEL * load_n / prior.stiffness_n_per_m {
             return Err(Rejection::TravelTooSmall);
         }
-        let [fewest, most] =
-            ROW_S.map(|row_s| ((row_s / blocks.period_s).round() as usize).max(LEAST_BLOCKS));
-        let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
+        let time_s = middle_and_half(&blocks.time_s);
         Ok(Self {
             load_n,
             stiffness_n_per_m: prior.stiffness_n_per_m,
@@ -82,10 +79,9 @@ impl Scaling {
             // A locked screw shows nothing of its transducer.
             per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },
             per_time: time_s.1.recip(),
-            per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
-            per_load_rate: LATE_S / (two_blocks_s * load_n),
-            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
-            search_row_blocks: most,
+            per_speed: SPEED_M_PER_S.recip(),
+            per_load_rate: LATE_S / load_n,
+            row_s: (2.0 * time_s.1 / MOST_ROWS).clamp(ROW_S, SEARCH_ROW_S),
             motor_sense: if prior.output_locked { -1.0 } else { 1.0 },
             per_period: prior.period_m.filter(|m| 2.0 * place_m.1 > PERIODS * m).map_or(0.0, |m| TAU / m),
         })
@@ -94,6 +90,11 @@ impl Scaling {
     /// The wind-up of the part at the 95 % load, m.
     pub(crate) fn windup_m(&self) -> f64 {
         self.load_n / self.stiffness_n_per_m
+    }
+
+    /// Most blocks of a row, for blocks of some length, s.
+    pub(crate) fn row_blocks(&self, period_s: f64) -> usize {
+        ((self.row_s / period_s).round() as usize).max(LEAST_BLOCKS)
     }
 
     /// A time from −1 at the start of the flight to 1 at its end.

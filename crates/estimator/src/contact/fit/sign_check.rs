@@ -3,6 +3,7 @@
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::DesignRow;
+use crate::contact::fit::flank_fit::UNSEEN_GAP;
 use crate::contact::fit::robust_regression::{GaussianPrior, fit};
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 
@@ -21,6 +22,8 @@ const TRANSDUCER_M: f64 = 60e-6;
 
 /// A fault of the mapping is stated beyond this many standard errors.
 const SIGNIFICANT: f64 = 4.0;
+/// A gap is seen beyond this many.
+const SEEN: f64 = 3.0;
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 
@@ -34,20 +37,36 @@ const SPEED: usize = 4;
 const PLACE: usize = 5;
 const COLUMNS: usize = 6;
 
+/// What the check finds in channels that are mapped correctly.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SignCheck {
+    /// A stiffness to start from, N/m, where the slope shows that the part's is off by more than a factor of three.
+    pub(crate) stiffness_n_per_m: Option<f64>,
+    /// Whether δX grows with the load by more than its error: it does not with the load of another actuator.
+    pub(crate) follows_load: bool,
+    /// Whether δX differs between the two sides of the load by more than its error and a tenth of the wind-up.
+    pub(crate) shows_gap: bool,
+}
+
+impl SignCheck {
+    /// Of channels that are not checked: nothing speaks against them.
+    pub(crate) const NONE: Self = Self { stiffness_n_per_m: None, follows_load: true, shows_gap: true };
+}
+
 /// Regresses δX on the load, the side it presses to, the sign of the speed, speed and place.
 ///
 /// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
 /// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case.
 ///
-/// Returns a stiffness to start from, N/m, where the slope shows that the part's is off by more than a factor of three.
-///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
-pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<Option<f64>, Rejection> {
+pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<SignCheck, Rejection> {
     let stride = STRIDE.max(blocks.len() / LOOKS);
     let rows: Vec<DesignRow<COLUMNS>> =
         (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
-    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else { return Ok(None) };
+    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else {
+        return Ok(SignCheck::NONE);
+    };
     let beta = &found.beta;
     let error_m = |column: usize| found.standard_error_m(column, &rows);
     let least_m = (RATIO * frame.place_m.1).max(TRANSDUCER_M);
@@ -57,7 +76,11 @@ pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<Option<f64>,
     let windup_m = beta[SIDE] + beta[LOAD];
     let doubt_m = SIGNIFICANT * error_m(SIDE).hypot(error_m(LOAD));
     if windup_m + doubt_m > -FLIPPED * frame.windup_m() {
-        return Ok(other_stiffness(beta[LOAD], SIGNIFICANT * error_m(LOAD), frame));
+        return Ok(SignCheck {
+            stiffness_n_per_m: other_stiffness(beta[LOAD], SIGNIFICANT * error_m(LOAD), frame),
+            follows_load: windup_m > doubt_m,
+            shows_gap: beta[SIDE] > (UNSEEN_GAP * frame.windup_m()).max(SEEN * error_m(SIDE)),
+        });
     }
     let drag_m = beta[SLIP] + beta[SPEED];
     Err(if drag_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use crate::contact::blocks::block_means::{BlockMeans, is_complete};
+use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::friction::flank::{FIRM_SHARE, Flank};
 use crate::contact::friction::friction_model::{
-    CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
+    Coupling, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
 };
 use crate::simd::Lanes;
 
@@ -25,6 +25,18 @@ impl Touch {
     const UPPER: u8 = 1;
     const LOWER: u8 = 2;
     const FIRM: u8 = 4;
+
+    fn of(force_n: f64, firm_n: f64) -> Self {
+        let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
+        let firm = u8::from(force_n.abs() > firm_n);
+        Self((upper * Self::UPPER) | (lower * Self::LOWER) | (firm * Self::FIRM))
+    }
+
+    /// Whether this block and those around it press one flank, all of them firmly where it does.
+    fn is_kept(self, around: &[Self]) -> bool {
+        let all = around.iter().fold(u8::MAX, |all, touch| all & touch.0);
+        all & (Self::UPPER | Self::LOWER) != 0 && self.0 & !all & Self::FIRM == 0
+    }
 
     pub(crate) fn flank(self) -> Flank {
         if self.0 & Self::UPPER == 0 { Flank::Lower } else { Flank::Upper }
@@ -44,70 +56,43 @@ impl Touch {
 /// The coupling of every block under one set of parameters.
 #[derive(Debug, Default)]
 pub(crate) struct CouplingPath {
-    pub(crate) columns: PathColumns,
+    pub(crate) couplings: Vec<Coupling>,
     touches: Vec<Touch>,
     /// Touches of the complete blocks whose neighbours have the same contact state.
     kept: Vec<Touch>,
 }
 
-/// One value for each block.
-#[derive(Debug, Default)]
-pub(crate) struct PathColumns {
-    /// c, N; NaN where a channel is missing.
-    pub(crate) force_n: Vec<f64>,
-    /// ∂c/∂F_d.
-    pub(crate) dforce_ddry: Vec<f64>,
-    /// ∂c/∂η, N.
-    pub(crate) dforce_dloss_n: Vec<f64>,
-    /// ∂c/∂p, N.
-    pub(crate) dforce_dstribeck_n: Vec<f64>,
-    /// Relative position from the middle of the gap, m.
-    pub(crate) relative_m: Vec<f64>,
-}
-
 impl CouplingPath {
     /// Integrates the coupling over all segments.
     pub(crate) fn integrate(&mut self, blocks: &BlockMeans, state: &FrictionState, motor_sense: f64) {
-        self.columns.resize(blocks.len());
+        self.couplings.clear();
+        self.couplings.resize(blocks.len(), Coupling::UNKNOWN);
         let params = CouplingParams::new(state, motor_sense);
         for segment in blocks.segments() {
-            self.integrate_segment(blocks, params, segment);
+            let channels = Channels {
+                motor_m: &blocks.motor_m[segment.clone()],
+                load_n: &blocks.load_n[segment.clone()],
+                slowness: &blocks.slowness[segment.clone()],
+            };
+            integrate_segment(params, channels, &mut self.couplings[segment]);
         }
     }
 
-    /// Integrates eight parts in parallel lanes, each from an arbitrary state; then from the true start of each part
-    /// until the sequential integration meets what the lane found.
-    fn integrate_segment(&mut self, blocks: &BlockMeans, params: CouplingParams, segment: Range<usize>) {
-        let channels = Channels {
-            motor_m: &blocks.motor_m[segment.clone()],
-            load_n: &blocks.load_n[segment.clone()],
-            slowness: &blocks.slowness[segment.clone()],
-        };
-        let mut found = self.columns.segment(segment.clone());
-        let part = segment.len() / Lanes::COUNT;
-        // No lane covers the rest of the segment; values of an earlier integration are no result.
-        found.force_n[Lanes::COUNT * part..].fill(f64::NAN);
-        let ends = integrate_lanes(params, channels, part, &mut found);
-        let mut integrator = CouplingIntegrator::new(params);
-        for number in 0..Lanes::COUNT {
-            let part = number * part..(number + 1) * part;
-            if found.recompute_until_match(&mut integrator, channels, part) {
-                integrator.set(ends.get(number));
-            }
-        }
-        found.recompute_until_match(&mut integrator, channels, Lanes::COUNT * part..segment.len());
-    }
-
-    /// Marks the blocks that keep flank and contact state, so that no row mixes flank and gap.
+    /// Marks the complete blocks that keep flank and contact state, so that no row mixes flank and gap.
     pub(crate) fn mark_stable(&mut self, blocks: &BlockMeans, load_n: f64) {
-        self.touches.resize(blocks.len(), Touch::NONE);
-        touches(&self.columns.force_n, FIRM_SHARE * load_n, &mut self.touches);
+        let firm_n = FIRM_SHARE * load_n;
+        self.touches.clear();
+        self.touches.extend(self.couplings.iter().map(|coupling| Touch::of(coupling.force_n, firm_n)));
         self.kept.clear();
         self.kept.resize(blocks.len(), Touch::NONE);
         for segment in blocks.segments() {
-            kept(&self.touches[segment.clone()], &mut self.kept[segment]);
+            let around = self.touches[segment.clone()].array_windows::<KEPT>();
+            for (k, around) in (segment.start + BEFORE..).zip(around) {
+                if around[BEFORE].is_kept(around) && blocks.is_complete(k) {
+                    self.kept[k] = around[BEFORE];
+                }
+            }
         }
-        clear_incomplete(blocks, &mut self.kept);
     }
 
     /// The next run of stable blocks with one contact state: no longer than `most`, and within one correlation block.
@@ -129,25 +114,6 @@ impl CouplingPath {
     }
 }
 
-impl PathColumns {
-    fn resize(&mut self, blocks: usize) {
-        let Self { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, relative_m } = self;
-        for column in [force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, relative_m] {
-            column.resize(blocks, f64::NAN);
-        }
-    }
-
-    fn segment(&mut self, segment: Range<usize>) -> SegmentColumns<'_> {
-        SegmentColumns {
-            force_n: &mut self.force_n[segment.clone()],
-            dforce_ddry: &mut self.dforce_ddry[segment.clone()],
-            dforce_dloss_n: &mut self.dforce_dloss_n[segment.clone()],
-            dforce_dstribeck_n: &mut self.dforce_dstribeck_n[segment.clone()],
-            relative_m: &mut self.relative_m[segment],
-        }
-    }
-}
-
 /// The channels of a segment that drive the model.
 #[derive(Debug, Clone, Copy)]
 struct Channels<'a> {
@@ -164,45 +130,40 @@ impl Channels<'_> {
     }
 }
 
-/// The columns of a segment.
-struct SegmentColumns<'a> {
-    force_n: &'a mut [f64],
-    dforce_ddry: &'a mut [f64],
-    dforce_dloss_n: &'a mut [f64],
-    dforce_dstribeck_n: &'a mut [f64],
-    relative_m: &'a mut [f64],
+/// Integrates eight parts in parallel lanes, each from an arbitrary state; then from the true start of each part until the
+/// sequential integration meets what the lane found.
+fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut [Coupling]) {
+    let part = found.len() / Lanes::COUNT;
+    let ends = integrate_lanes(params, channels, part, found);
+    let mut integrator = CouplingIntegrator::new(params);
+    for number in 0..Lanes::COUNT {
+        let part = number * part..(number + 1) * part;
+        if recompute_until_match(&mut integrator, channels, part, found) {
+            integrator.set(ends.get(number));
+        }
+    }
+    // No lane covers the rest of the segment.
+    recompute_until_match(&mut integrator, channels, Lanes::COUNT * part..found.len(), found);
 }
 
-#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
-impl SegmentColumns<'_> {
-    /// Integrates through a part until its values are those found before: once the screw has slipped, its force
-    /// determines all of its state. False where it integrated to the end.
-    fn recompute_until_match(
-        &mut self,
-        integrator: &mut CouplingIntegrator,
-        channels: Channels<'_>,
-        part: Range<usize>,
-    ) -> bool {
-        for k in part {
-            let (here, relative_m) = integrator.step(channels.at(k));
-            let is_same = self.force_n[k].to_bits() == here.force_n.to_bits()
-                && self.dforce_ddry[k].to_bits() == here.dforce_ddry.to_bits();
-            if is_same && here.force_n.is_finite() && integrator.has_slipped() {
-                return true;
-            }
-            self.put(k, &here, relative_m);
+/// Integrates through a part until its values are those found before: once the screw has slipped, its force determines
+/// all of its state. False where it integrated to the end.
+fn recompute_until_match(
+    integrator: &mut CouplingIntegrator,
+    channels: Channels<'_>,
+    part: Range<usize>,
+    found: &mut [Coupling],
+) -> bool {
+    for k in part {
+        let here = integrator.step(channels.at(k));
+        let is_same = found[k].force_n.to_bits() == here.force_n.to_bits()
+            && found[k].dforce_ddry.to_bits() == here.dforce_ddry.to_bits();
+        if is_same && here.force_n.is_finite() && integrator.has_slipped() {
+            return true;
         }
-        false
+        found[k] = here;
     }
-
-    #[inline(always)]
-    fn put(&mut self, k: usize, coupling: &CouplingForce, relative_m: f64) {
-        self.force_n[k] = coupling.force_n;
-        self.dforce_ddry[k] = coupling.dforce_ddry;
-        self.dforce_dloss_n[k] = coupling.dforce_dloss_n;
-        self.dforce_dstribeck_n[k] = coupling.dforce_dstribeck_n;
-        self.relative_m[k] = relative_m;
-    }
+    false
 }
 
 /// Eight screws in parallel lanes.
@@ -227,8 +188,7 @@ impl ScrewStates8 {
             motor_m: self.motor_m[lane],
             anchor_m: self.anchor_m[lane],
             memory: [self.memory[0][lane], self.memory[1][lane], self.memory[2][lane]],
-            coupling: CouplingForce::UNKNOWN,
-            relative_m: f64::NAN,
+            coupling: Coupling::UNKNOWN,
             has_slipped: false,
         }
     }
@@ -249,7 +209,7 @@ fn integrate_lanes(
     params: CouplingParams,
     channels: Channels<'_>,
     part: usize,
-    found: &mut SegmentColumns<'_>,
+    found: &mut [Coupling],
 ) -> ScrewStates8 {
     let mut screws = ScrewStates8::ZERO;
     for k in 0..part {
@@ -257,55 +217,18 @@ fn integrate_lanes(
         for (lane, drive) in drives.iter_mut().enumerate() {
             *drive = channels.at(lane * part + k);
         }
-        let mut is_known = [false; Lanes::COUNT];
-        let mut couplings = [(CouplingForce::UNKNOWN, f64::NAN); Lanes::COUNT];
+        let mut couplings = [Coupling::UNKNOWN; Lanes::COUNT];
         for lane in 0..Lanes::COUNT {
-            is_known[lane] = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
+            let is_known = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
             let screw = params.step(&screws.get(lane), drives[lane]);
-            screws.set(lane, is_known[lane], &screw);
-            couplings[lane] = (screw.coupling, screw.relative_m);
+            screws.set(lane, is_known, &screw);
+            couplings[lane] = if is_known { screw.coupling } else { Coupling::UNKNOWN };
         }
-        for lane in 0..Lanes::COUNT {
-            let (coupling, relative_m) = couplings[lane];
-            let known = if is_known[lane] { coupling } else { CouplingForce::UNKNOWN };
-            found.put(lane * part + k, &known, if is_known[lane] { relative_m } else { f64::NAN });
+        for (lane, coupling) in couplings.into_iter().enumerate() {
+            found[lane * part + k] = coupling;
         }
     }
     screws
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn touches(force_n: &[f64], firm_n: f64, touches: &mut [Touch]) {
-    for (&force_n, touch) in force_n.iter().zip(touches) {
-        let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
-        let firm = u8::from(force_n.abs() > firm_n);
-        *touch = Touch((upper * Touch::UPPER) | (lower * Touch::LOWER) | (firm * Touch::FIRM));
-    }
-}
-
-/// Of the blocks of a segment.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn kept(touches: &[Touch], kept: &mut [Touch]) {
-    for (around, kept) in touches.array_windows::<KEPT>().zip(kept.iter_mut().skip(BEFORE)) {
-        let here = around[BEFORE].0;
-        let all = around[0].0 & around[1].0 & here & around[3].0;
-        let is_kept = all & (Touch::UPPER | Touch::LOWER) != 0 && here & !all & Touch::FIRM == 0;
-        *kept = Touch(here * u8::from(is_kept));
-    }
-}
-
-/// Drops the blocks of which something is missing or whose neighbours do, and those at the very beginning.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
-    let inner = 1..kept.len().max(2) - 1;
-    let (time_s, dx_m) = (&blocks.time_s[inner.clone()], &blocks.dx_m[inner.clone()]);
-    let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
-    for (((motor_m, load_n), (time_s, dx_m)), kept) in
-        rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
-    {
-        let is_kept = is_complete(*time_s, *dx_m, motor_m, load_n) && blocks.in_range_n.contains(&load_n[1]);
-        *kept = Touch(kept.0 * u8::from(is_kept));
-    }
 }
 
 #[cfg(test)]
@@ -349,15 +272,8 @@ mod tests {
                 load_lag_s: 0.0,
                 skew_s: 0.0,
             };
-            // In the memory of an integration with another gap.
             let mut path = CouplingPath::default();
-            path.columns.resize(blocks.len());
-            for gap_m in [gap_m + 1e-5, gap_m] {
-                let params = CouplingParams::new(&FrictionState { gap_m, ..state }, 1.0);
-                for segment in blocks.segments() {
-                    path.integrate_segment(&blocks, params, segment);
-                }
-            }
+            path.integrate(&blocks, &state, 1.0);
             for segment in blocks.segments() {
                 let mut integrator = CouplingIntegrator::new(CouplingParams::new(&state, 1.0));
                 for k in segment {
@@ -366,12 +282,10 @@ mod tests {
                         load_n: blocks.load_n[k],
                         slowness: blocks.slowness[k],
                     };
-                    let (one, relative_m) = integrator.step(drive);
-                    let columns = &path.columns;
-                    let expected = [one.force_n, one.dforce_ddry, one.dforce_dloss_n, relative_m].map(f64::to_bits);
-                    let found =
-                        [columns.force_n[k], columns.dforce_ddry[k], columns.dforce_dloss_n[k], columns.relative_m[k]];
-                    prop_assert_eq!(found.map(f64::to_bits), expected, "block {}", k);
+                    let bits = |c: Coupling| {
+                        [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
+                    };
+                    prop_assert_eq!(bits(path.couplings[k]), bits(integrator.step(drive)), "block {}", k);
                 }
             }
         }

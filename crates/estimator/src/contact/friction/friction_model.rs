@@ -57,9 +57,9 @@ pub(crate) struct FrictionState {
     pub(crate) skew_s: f64,
 }
 
-/// Force in the coupling, and its derivatives by the parameters of friction.
+/// The coupling at one block: its force, the derivatives of the force by the parameters of friction, and its position.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct CouplingForce {
+pub(crate) struct Coupling {
     /// c, N; NaN where a channel is missing.
     pub(crate) force_n: f64,
     /// ∂c/∂F_d.
@@ -68,12 +68,19 @@ pub(crate) struct CouplingForce {
     pub(crate) dforce_dloss_n: f64,
     /// ∂c/∂p, N.
     pub(crate) dforce_dstribeck_n: f64,
+    /// Relative position from the middle of the gap, m; NaN where a channel is missing.
+    pub(crate) relative_m: f64,
 }
 
-impl CouplingForce {
+impl Coupling {
     /// Where a channel is missing.
-    pub(crate) const UNKNOWN: Self =
-        Self { force_n: f64::NAN, dforce_ddry: 0.0, dforce_dloss_n: 0.0, dforce_dstribeck_n: 0.0 };
+    pub(crate) const UNKNOWN: Self = Self {
+        force_n: f64::NAN,
+        dforce_ddry: 0.0,
+        dforce_dloss_n: 0.0,
+        dforce_dstribeck_n: 0.0,
+        relative_m: f64::NAN,
+    };
 }
 
 /// One block of the channels that drive the model.
@@ -107,9 +114,7 @@ pub(crate) struct ScrewState {
     pub(crate) anchor_m: f64,
     /// ∂c/∂F_d, ∂c/∂η and ∂c/∂p once the screw presses a flank, kept since it slipped last.
     pub(crate) memory: [f64; 3],
-    pub(crate) coupling: CouplingForce,
-    /// Relative position from the middle of the gap, m.
-    pub(crate) relative_m: f64,
+    pub(crate) coupling: Coupling,
     /// Whether it slipped last, so that no earlier state matters.
     pub(crate) has_slipped: bool,
 }
@@ -162,13 +167,13 @@ impl CouplingParams {
             motor_m: drive.motor_m,
             anchor_m: if has_slipped { relative_m - bent_m } else { anchor_m },
             memory,
-            coupling: CouplingForce {
+            coupling: Coupling {
                 force_n,
                 dforce_ddry: touch * memory[0],
                 dforce_dloss_n: touch * memory[1],
                 dforce_dstribeck_n: touch * memory[2],
+                relative_m,
             },
-            relative_m,
             has_slipped,
         }
     }
@@ -181,8 +186,7 @@ impl CouplingParams {
             motor_m: drive.motor_m,
             anchor_m: relative_m,
             memory: [0.0; 3],
-            coupling: CouplingForce { force_n, ..CouplingForce::UNKNOWN },
-            relative_m,
+            coupling: Coupling { force_n, relative_m, ..Coupling::UNKNOWN },
             has_slipped: false,
         }
     }
@@ -220,15 +224,15 @@ impl CouplingIntegrator {
         self.screw = Some(screw);
     }
 
-    /// The coupling and the relative position at the next block. A block with a missing channel is skipped.
+    /// The coupling at the next block. A block with a missing channel is skipped.
     #[inline]
-    pub(crate) fn step(&mut self, drive: Drive) -> (CouplingForce, f64) {
+    pub(crate) fn step(&mut self, drive: Drive) -> Coupling {
         if !(drive.motor_m + drive.load_n).is_finite() {
-            return (CouplingForce::UNKNOWN, f64::NAN);
+            return Coupling::UNKNOWN;
         }
         let screw =
             self.screw.map_or_else(|| self.params.rest(drive), |before| self.params.step(&before, drive));
         self.screw = Some(screw);
-        (screw.coupling, screw.relative_m)
+        screw.coupling
     }
 }

@@ -1,0 +1,52 @@
+//! What each method of `[estimate]` puts into a record, on the flights of another engine.
+
+use std::path::Path;
+
+use ingest::LogFiles;
+use ingest::tables::ColumnAliases;
+use job::config::Method;
+use job::{Config, FlightLog};
+use records::{GapEstimate, Status};
+
+fn estimate(config: &Config, log: &str) -> GapEstimate {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
+    let installations =
+        ingest::tables::installations(&folder.join("installations.csv"), &ColumnAliases::new()).unwrap();
+    let file = LogFiles::one(folder.join(format!("{log}.parquet")));
+    let opened = FlightLog::open(&file, log, config, &installations).unwrap();
+    let at = opened.actuators(&installations).next().unwrap();
+    let (_, part) = opened.unit(at, config, &installations).unwrap();
+    opened.estimate(at, part, config).unwrap()
+}
+
+/// Only the published statistic is there; a load that never reverses is refused without the regression, too.
+#[test]
+fn midrange_has_no_column_of_the_regression() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
+    let contact = Config::read(&folder.join("pipeline.toml")).unwrap();
+    let mut midrange = contact.clone();
+    midrange.document.estimate.method = Method::Midrange;
+
+    let (by_contact, found) = (estimate(&contact, "A_nominal"), estimate(&midrange, "A_nominal"));
+    assert!(by_contact.stiffness_n_per_m.is_some() && by_contact.gap_se_m.is_some());
+    assert_eq!(found.gap_m, by_contact.gap_midrange_m);
+    let wanted = GapEstimate {
+        status: Status::Estimated,
+        gap_m: by_contact.gap_midrange_m,
+        gap_midrange_m: by_contact.gap_midrange_m,
+        load_reversals: by_contact.load_reversals,
+        samples: by_contact.samples,
+        samples_upper: by_contact.samples_upper,
+        samples_lower: by_contact.samples_lower,
+        load_p05_n: by_contact.load_p05_n,
+        load_p95_n: by_contact.load_p95_n,
+        nis: by_contact.nis,
+        nis_se: by_contact.nis_se,
+        ..GapEstimate::default()
+    };
+    assert_eq!(found, wanted);
+
+    let refused = estimate(&midrange, "D_no_reversal");
+    assert_eq!((refused.status, refused.reason.as_deref()), (Status::Refused, Some("no_load_reversal")));
+    assert!(refused.gap_m.is_none() && refused.gap_midrange_m.is_some());
+}
