@@ -6,3 +6,4 @@ pub mod noise_floor;
 pub mod quality;
 pub mod si_conversion;
 pub(crate) mod stats;
+pub(crate) mod turns;

@@ -6,8 +6,9 @@
 use std::borrow::Cow;
 
 use crate::channel::buffer_pool;
-use crate::channel::si_conversion::{Geometry, to_si, unwrap_turns};
+use crate::channel::si_conversion::{Geometry, to_si};
 use crate::channel::stats::ChannelStats;
+use crate::channel::turns::unwrap_turns;
 use crate::error::{Error, ErrorKind};
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::ColumnPattern;
@@ -28,16 +29,19 @@ pub(crate) fn lives(values: &[f64], apart: usize) -> bool {
     present().take(needed).count() == needed && present().any(|v| Some(v) != first)
 }
 
-/// A channel in SI, and what was seen of it while it was read, where it is still as it was then.
+/// A channel in SI.
 #[derive(Debug)]
 pub(crate) struct Channel {
     pub(crate) values: Vec<f64>,
+    /// Statistics gathered while the channel was decoded; `None` if the values changed since.
     pub(crate) seen: Option<ChannelStats>,
+    /// One turn of a wrapped sensor, m at the screw.
+    pub(crate) turn_m: Option<f64>,
 }
 
 impl From<Vec<f64>> for Channel {
     fn from(values: Vec<f64>) -> Self {
-        Self { values, seen: None }
+        Self { values, seen: None, turn_m: None }
     }
 }
 
@@ -205,7 +209,7 @@ impl<'s> ChannelSampling<'s> {
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = seen.filter(|_| self.line.kept.is_none());
-            return Ok(Channel { values: kept(values), seen });
+            return Ok(Channel { values: kept(values), seen, turn_m: None });
         }
         let read =
             if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
@@ -229,7 +233,7 @@ impl<'s> ChannelSampling<'s> {
             unwrap_turns(&mut values, turn);
         }
         si.apply_to_all(&mut values);
-        Ok(values.into())
+        Ok(Channel { values, seen: None, turn_m: map.wraps_at.map(|turn| si.length(turn)) })
     }
 
     fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {
@@ -261,12 +265,9 @@ impl<'s> ChannelSampling<'s> {
         let (_, instants) = self.instants(map)?;
         let (at_s, values) = thinned(&instants, &read.values, self.every);
         let step_s = self.line.step_s * self.every as f64;
-        Ok(interpolate_at(
-            TimeSeries { at_s: &at_s, values: &values, step_s },
-            &instants,
-            Interpolation::Line,
-        )
-        .into())
+        let own = TimeSeries { at_s: &at_s, values: &values, step_s };
+        let values = interpolate_at(own, &instants, Interpolation::Line);
+        Ok(Channel { values, seen: None, ..read })
     }
 }
 
@@ -308,7 +309,7 @@ pub(crate) fn follow(
     if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
         return own.readings(map, geometry, wanted);
     }
-    let Channel { values, .. } = own.readings(map, geometry, RowSelection::ALL)?;
+    let Channel { values, turn_m, .. } = own.readings(map, geometry, RowSelection::ALL)?;
     let (stamps, at_s) = own.instants(map)?;
     let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
     let (lead, mut instants) = master.instants(motor)?;
@@ -319,7 +320,8 @@ pub(crate) fn follow(
     let step_s = own.line.step_s * own.every as f64;
     let is_slow = step_s > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
-    Ok(interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between).into())
+    let values = interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between);
+    Ok(Channel { values, seen: None, turn_m })
 }
 
 /// A nanosecond is no shift.
