@@ -120,6 +120,9 @@ pub enum ErrorKind {
     /// Stamps fall further than allowed.
     #[error("time runs backwards")]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
+    /// The clock pauses for longer than within one flight.
+    #[error("the log seems to hold two flights")]
+    SeveralFlights { column: String, row: u64, before_s: f64, after_s: f64, end_s: f64, max_gap_s: f64 },
     /// The timestamps give another rate than the declared one.
     #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
@@ -183,6 +186,7 @@ impl ErrorKind {
             Self::TimeUnit { .. } => "time_unit_unknown",
             Self::NoClock => "no_clock",
             Self::TimeGoesBack { .. } => "time_goes_back",
+            Self::SeveralFlights { .. } => "several_flights",
             Self::RateContradicts { .. } => "rate_contradicts",
             Self::TimeImplausible { .. } => "time_implausible",
             Self::TimeStandsStill { .. } => "time_stands_still",
@@ -223,7 +227,9 @@ impl ErrorKind {
             | Self::ListLengths { column, .. }
             | Self::ClocksDiffer { column, .. }
             | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
-            Self::TimeGoesBack { column, row, .. } | Self::IdentityChanges { column, row, .. } => {
+            Self::TimeGoesBack { column, row, .. }
+            | Self::SeveralFlights { column, row, .. }
+            | Self::IdentityChanges { column, row, .. } => {
                 c.column = Some(column.clone());
                 c.row = Some(*row);
             }
@@ -242,6 +248,9 @@ impl ErrorKind {
             Self::TimeGoesBack { before_s, after_s, times, .. } => {
                 Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"))
             }
+            Self::SeveralFlights { before_s, after_s, end_s, .. } => Some(format!(
+                "samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"
+            )),
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
             Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", join_places(looked))),
@@ -254,6 +263,9 @@ impl ErrorKind {
         match self {
             Self::TimeGoesBack { max_back_s, .. } => {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
+            }
+            Self::SeveralFlights { max_gap_s, .. } => {
+                Some(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)"))
             }
             Self::TimeImplausible { least_s, most_s, .. } => Some(format!("{least_s:e} to {most_s:e} s")),
             Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
@@ -338,6 +350,9 @@ impl ErrorKind {
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
                 "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
+            }
+            Self::SeveralFlights { .. } => {
+                "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`"
             }
             Self::RateContradicts { .. } => {
                 "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"

@@ -516,7 +516,19 @@ impl Log {
         }
         let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
         self.not_empty(&lead.channel.values, lead.master.0.column(), &lead.selection)?;
+        self.check_one_flight(&lead.master)?;
         Ok(lead)
+    }
+
+    /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
+    fn check_one_flight(&self, (sampling, map): &ReferenceClock<'_, '_>) -> Result<(), Error> {
+        let by_row = [IdentityField::FlightId, IdentityField::DepartureUtc];
+        if by_row.iter().any(|field| self.mapping.identity.columns.contains_key(field)) {
+            return Ok(());
+        }
+        let sheet = self.sheet_of(map)?;
+        let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
+        sampling.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
     }
 
     /// A channel on the motor's clock.

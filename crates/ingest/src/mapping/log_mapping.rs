@@ -163,6 +163,9 @@ pub struct ClockMapping {
     /// How far stamps may fall back and still be put in order, s. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_back_s: Option<f64>,
+    /// The longest pause of one flight, s; a longer one separates two flights, and the log is refused. Default 3600.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_gap_s: Option<f64>,
     /// Whether a log whose clock falls further is taken as several recordings, one after the other.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub split_at_jumps: bool,

@@ -28,6 +28,12 @@ const MAX_FIRST_STAMP_S: f64 = 1e11;
 /// How far stamps may fall back by default, s.
 const MAX_BACK_S: f64 = 1.0;
 
+/// The longest pause within one flight by default, s: recorders pause for minutes, and a turnaround lasts longer.
+const MAX_GAP_S: f64 = 3600.0;
+
+/// The shortest recording on both sides of a pause that two flights have, s: a few wrong stamps are none.
+const SHORTEST_FLIGHT_S: f64 = 60.0;
+
 /// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
 const TICK_FOLLOW_S: f64 = 10.0;
 
@@ -65,6 +71,31 @@ impl TimestampRepairs {
     /// Whether no repair was needed.
     pub fn none(&self) -> bool {
         *self == Self::default()
+    }
+}
+
+impl TimeBase {
+    /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::SeveralFlights`] where the clock pauses for more than `clock.max_gap_s` between two recordings of a
+    /// minute or more.
+    pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), ErrorKind> {
+        let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
+        let rows = self.segments.last().map_or(0, |last| last.end);
+        let length_s = |rows: usize| rows as f64 * self.step_s;
+        let mut start = (0, 0.0);
+        for &(row, after_s) in &self.breaks {
+            let before_s = start.1 + length_s(row - start.0 - 1);
+            let shortest_s = length_s(row.min(rows - row));
+            if after_s - before_s > max_gap_s && shortest_s >= SHORTEST_FLIGHT_S {
+                let end_s = self.breaks.last().map_or(0.0, |last| last.1 + length_s(rows - last.0));
+                let (column, row) = (column.to_owned(), row as u64);
+                return Err(ErrorKind::SeveralFlights { column, row, before_s, after_s, end_s, max_gap_s });
+            }
+            start = (row, after_s);
+        }
+        Ok(())
     }
 }
 

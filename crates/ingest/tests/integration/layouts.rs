@@ -345,3 +345,34 @@ fn a_local_clock_takes_the_mapped_zone_or_gives_no_departure() {
     m.identity.time_zone = None;
     assert_eq!(start(&m), None);
 }
+
+/// Two flights of a minute and more, five hours apart, in a file that names no flight: their mean would be no gap of
+/// either. A pause of 50 minutes, and a few rows whose clock was wrong, are of one flight.
+#[test]
+fn two_flights_in_one_log_are_refused_with_both_spans() {
+    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let read = |m: &Mapping, first: usize, pause_s: f64| {
+        let t: Vec<f64> = (0..3000).map(|k| 0.1 * k as f64 + if k < first { 0.0 } else { pause_s }).collect();
+        let x: ArrayRef =
+            Arc::new((0..3000).map(|k| Some((f64::from(k) * 0.01).sin())).collect::<Float64Array>());
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("N1_20261119T041300Z.parquet");
+        write(&file, &[("t", reals(&t)), ("m", x.clone()), ("s", x.clone()), ("f", x.clone()), ("leg", x)]);
+        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let at = log.actuators(&m.channels, Some(&Position::new("aileron").unwrap())).unwrap();
+        log.read_actuator(&at[0], &m.channels, LINEAR).map_err(|e| e.diagnostic())
+    };
+    let refused = read(&m, 1000, 18_000.0).unwrap_err();
+    assert_eq!((refused.code.as_str(), refused.row), ("several_flights", Some(1000)));
+    let found = refused.found.unwrap();
+    assert_eq!(found, "samples from 0 to 100 s and from 18100 to 18300 s after the first one");
+    assert!(refused.hint.unwrap().contains("`clock.max_gap_s`"));
+    assert_eq!(read(&m, 1000, 3000.0).unwrap().segments.len(), 2);
+    assert_eq!(read(&m, 2990, 18_000.0).unwrap().segments.len(), 2);
+    let mut longer = m.clone();
+    longer.clock.max_gap_s = Some(20_000.0);
+    assert_eq!(read(&longer, 1000, 18_000.0).unwrap().segments.len(), 2);
+    let mut named = m;
+    named.identity.columns.insert(IdentityField::FlightId, "leg".into());
+    assert_eq!(read(&named, 1000, 18_000.0).unwrap().segments.len(), 2);
+}
