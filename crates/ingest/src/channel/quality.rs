@@ -331,23 +331,6 @@ pub(crate) fn load_frozen(
     runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
 }
 
-/// Least-squares slope of one position on the other about their means (ordinary least squares, 1 + Σxy/Σx²), m per m:
-/// 1 when both are mapped correctly, −1 when a sign is wrong, another number when a ratio is.
-///
-/// Nothing when the motor does not move.
-pub fn regression_slope(motor_m: &[f64], dx_m: &[f64]) -> Option<f64> {
-    let pairs = || motor_m.iter().zip(dx_m).filter(|(m, d)| !m.is_nan() && !d.is_nan());
-    let count = pairs().count() as f64;
-    let (motor_sum, dx_sum) = pairs().fold((0.0, 0.0), |(a, b), (m, d)| (a + m, b + d));
-    let (motor_mean, dx_mean) = (motor_sum / count, dx_sum / count);
-    let (mut mm, mut md) = (0.0, 0.0);
-    for (m, d) in pairs() {
-        mm += (m - motor_mean) * (m - motor_mean);
-        md += (m - motor_mean) * (d - dx_mean);
-    }
-    (mm > 0.0).then(|| 1.0 + md / mm)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -372,16 +355,6 @@ mod tests {
         assert_eq!((q.min, q.max, q.resolution), (1.0, 3.0, Some(0.25)));
         assert!((q.frozen_share - 3.0 / 8.0).abs() < 1e-15);
         assert!(described(&[2.0; 9], 0.01, 0).is_constant());
-    }
-
-    #[test]
-    fn a_flipped_sign_and_a_wrong_ratio_show_in_the_slope() {
-        let motor: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.1).sin()).collect();
-        for ratio in [1.0, -1.0, 25.4] {
-            let dx: Vec<f64> = motor.iter().map(|m| (ratio - 1.0) * m + 0.01).collect();
-            assert!((regression_slope(&motor, &dx).unwrap() - ratio).abs() < 1e-12);
-        }
-        assert_eq!(regression_slope(&[0.0; 5], &[1.0; 5]), None);
     }
 
     /// Steps of 20 µm under a relative motion of 100 µm.
