@@ -105,6 +105,9 @@ pub enum ErrorKind {
     /// A log that Freeplay normalized does not fit the settings any more.
     #[error("normalized log was written with other settings: {detail}")]
     Normalized { detail: String },
+    /// The Arrow metadata of a column notes another scale, offset or unit than the mapping.
+    #[error("the file notes {key} {noted} for column `{column}`, and the mapping has {known}")]
+    MetadataContradicts { column: String, key: &'static str, noted: String, known: String },
     /// A column is there, but its type holds no numbers.
     #[error("column `{column}` holds {found}, not {wanted}")]
     ColumnType { column: String, found: String, wanted: &'static str },
@@ -177,6 +180,7 @@ impl ErrorKind {
             Self::Decode { .. } => "decode_failed",
             Self::RowCount { .. } => "row_count_differs",
             Self::ColumnMissing { .. } => "column_missing",
+            Self::MetadataContradicts { .. } => "metadata_contradicts",
             Self::ColumnType { .. } => "column_type",
             Self::GroupMissing { .. } => "group_missing",
             Self::ListLengths { .. } => "list_lengths",
@@ -219,6 +223,7 @@ impl ErrorKind {
             | Self::ColumnMissing { column, .. }
             | Self::TableColumn { column, .. }
             | Self::ColumnType { column, .. }
+            | Self::MetadataContradicts { column, .. }
             | Self::TimeUnit { column, .. }
             | Self::RateContradicts { column, .. }
             | Self::TimeImplausible { column, .. }
@@ -253,6 +258,9 @@ impl ErrorKind {
             )),
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
+            Self::MetadataContradicts { key, noted, .. } => {
+                Some(format!("`{key}` = {noted} in the Arrow metadata"))
+            }
             Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", join_places(looked))),
             Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
             _ => None,
@@ -272,24 +280,61 @@ impl ErrorKind {
             Self::TimeUnit { .. } => {
                 Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`".into())
             }
+            Self::MetadataContradicts { key, known, .. } => Some(format!("`{key}` = {known}")),
             Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
             _ => None,
         }
     }
 
     fn remedy(&self) -> String {
-        let text = match self {
-            Self::Unreadable { source } => return missing_remedy(source),
-            Self::Object(source) => return source.remedy().into(),
+        self.named_remedy().unwrap_or_else(|| self.usual_remedy().into())
+    }
+
+    /// A remedy that names a key, a column or a value of this log.
+    fn named_remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Unreadable { source } => missing_remedy(source),
+            Self::Object(source) => source.remedy().into(),
+            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
+                format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits")
+            }
+            Self::ColumnMissing { column, nearest: Some(near) } => match hidden_difference(column, near) {
+                Some(characters) => format!("`{near}`? {characters}"),
+                None => format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`"),
+            },
+            Self::TableColumn { nearest: Some(near), .. } => {
+                format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
+            }
+            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
+                format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
+            }
+            Self::MetadataContradicts { key, noted, .. } => format!(
+                "set `{key}` of the channel to {noted}; if the file is wrong, set its `ignore_metadata = true`"
+            ),
+            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
+                format!("the placeholder of the position is {PLACEHOLDER}")
+            }
+            Self::NoPosition { pattern, columns } => {
+                let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
+                let (_, near) = meant.max_by(|a, b| a.0.total_cmp(&b.0))?;
+                format!(
+                    "closest column: `{near}`. Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
+                )
+            }
+            _ => return None,
+        })
+    }
+
+    fn usual_remedy(&self) -> &'static str {
+        match self {
+            // Each of these names its own remedy.
+            Self::Unreadable { .. } | Self::Object(_) | Self::MetadataContradicts { .. } => "",
             Self::Empty => "file is empty; delete it or ignore it. It is skipped until it changes",
             Self::NotParquet { .. } => {
                 "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`"
             }
             Self::ForeignFormat { .. } => {
                 "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
-            }
-            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
-                return format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits");
             }
             Self::BeyondLimit(_) => {
                 "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
@@ -306,22 +351,12 @@ impl ErrorKind {
             Self::Decode { .. } | Self::RowCount { .. } => {
                 "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`"
             }
-            Self::ColumnMissing { column, nearest: Some(near) } => {
-                if let Some(characters) = hidden_difference(column, near) {
-                    return format!("`{near}`? {characters}");
-                }
-                return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
-            }
-            Self::TableColumn { nearest: Some(near), .. } => {
-                return format!("`{near}`? A table may call its columns otherwise: see `[columns]`");
-            }
             Self::TableColumn { has_semicolons: true, .. } => {
                 "the fields are separated by `;`: save the table with commas, and numbers with a point"
             }
             Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
-            Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
-            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
-                return format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)");
+            Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
+                "names are mapped under `[channel]`, `[clock]` and `[identity]`"
             }
             Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
             Self::GroupMissing { .. } => {
@@ -334,18 +369,6 @@ impl ErrorKind {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
             Self::Normalized { .. } => "write it again from the recorded log: `freeplay normalize`",
-            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
-                return format!("the placeholder of the position is {PLACEHOLDER}");
-            }
-            Self::NoPosition { pattern, columns } => {
-                let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
-                return match meant.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                    Some((_, near)) => format!(
-                        "closest column: `{near}`. Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
-                    ),
-                    None => "names are mapped under `[channel]`".into(),
-                };
-            }
             Self::TimeUnit { .. } => "set `clock.unit` to s, ms, us or ns",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
@@ -377,8 +400,7 @@ impl ErrorKind {
                 "write decimals with a point, such as 1168.5"
             }
             Self::Table { .. } => "columns and formats are in docs/configuration.md",
-        };
-        text.into()
+        }
     }
 }
 

@@ -55,6 +55,11 @@ impl SiConversion {
         if value.is_finite() { value } else { f64::NAN }
     }
 
+    /// The same, of raw readings on another line: `unit = raw · scale + offset`.
+    pub(crate) fn with_line(self, scale: f64, offset: f64) -> Self {
+        Self { scale, offset, ..self }
+    }
+
     /// Length of a stretch of raw readings, m.
     pub(crate) fn length(self, raw: f64) -> f64 {
         (raw * self.scale * self.factor).abs()

@@ -196,7 +196,11 @@ impl<'s> ChannelSampling<'s> {
         geometry: Geometry,
         wanted: RowSelection<'_>,
     ) -> Result<Channel, Error> {
-        let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        let mut si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        if !map.ignore_metadata && self.sheet.layout.name_column.is_none() {
+            let (scale, offset) = self.sheet.scale_and_offset(&self.samples.leaf, map)?;
+            si = si.with_line(scale, offset);
+        }
         let kept = |values: Vec<f64>| match &self.line.kept {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
             None => values,
@@ -219,21 +223,31 @@ impl<'s> ChannelSampling<'s> {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let texts = RawValue::texts(&map.valid_values);
-            let marks =
-                if texts.is_empty() { self.raw(valid)? } else { self.sheet.matches(valid, &texts)? };
+            let marks = self.valid_marks(valid, map)?;
             self.same_count(marks.len(), &valid.leaf)?;
-            let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
-            let bad = |mark: &f64| {
-                if texts.is_empty() { !is_valid(*mark) } else { !RawValue::Truth(true).is(*mark) }
-            };
-            values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
+            let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
+            values.iter_mut().zip(kept(marks)).filter(|(_, m)| is_bad(*m)).for_each(|(v, _)| *v = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);
         }
         si.apply_to_all(&mut values);
         Ok(Channel { values, seen: None, turn_m: map.wraps_at.map(|turn| si.length(turn)) })
+    }
+
+    /// 1 where a sample is valid, any other number or NaN where it is not.
+    fn valid_marks(&self, valid: &SampleSelector, map: &ChannelMapping) -> Result<Vec<f64>, Error> {
+        if let Some((set, clear)) = map.status_bits() {
+            return self.sheet.bit_marks(valid, set, clear);
+        }
+        let texts = RawValue::texts(&map.valid_values);
+        if !texts.is_empty() {
+            return self.sheet.matches(valid, &texts);
+        }
+        let mut marks = self.raw(valid)?;
+        let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
+        marks.iter_mut().for_each(|mark| *mark = f64::from(u8::from(is_valid(*mark))));
+        Ok(marks)
     }
 
     fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {

@@ -322,6 +322,15 @@ pub struct ChannelMapping {
     /// The values of `valid_column` that mean yes: numbers, texts, true or false. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub valid_values: Vec<RawValue>,
+    /// Bits of a status word in `valid_column` that are all set in a valid sample, e.g. `0x60`; instead of `valid_values`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid_bits: Option<u64>,
+    /// Bits of a status word in `valid_column` that are all clear in a valid sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub invalid_bits: Option<u64>,
+    /// Whether scale, offset and unit in the Arrow metadata of the column are ignored.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ignore_metadata: bool,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
@@ -351,6 +360,13 @@ impl ChannelMapping {
         std::iter::once(self).chain(&self.alternatives)
     }
 
+    /// Bits of the status word that are set and clear in a valid sample, where it has such bits.
+    pub(crate) fn status_bits(&self) -> Option<(u64, u64)> {
+        let bits = |bits: Option<u64>| bits.unwrap_or(0);
+        let has_bits = self.valid_bits.or(self.invalid_bits).is_some();
+        has_bits.then(|| (bits(self.valid_bits), bits(self.invalid_bits)))
+    }
+
     /// How far the samples lie from the stamps of their rows, s.
     pub(crate) fn shift_s(&self) -> f64 {
         self.instant_s - self.latency_s
@@ -367,6 +383,7 @@ impl From<&SampleFilter> for ChannelMapping {
             time_column: filter.time_column.clone(),
             rate_hz: filter.rate_hz,
             texts: RawValue::texts(&filter.equals),
+            ignore_metadata: true,
             ..Self::default()
         }
     }
@@ -385,6 +402,9 @@ impl Default for ChannelMapping {
             gear_ratio: 1.0,
             valid_column: None,
             valid_values: yes(),
+            valid_bits: None,
+            invalid_bits: None,
+            ignore_metadata: false,
             group: None,
             time_column: None,
             rate_hz: None,

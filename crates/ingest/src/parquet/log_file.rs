@@ -25,6 +25,7 @@ use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
+use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
@@ -73,6 +74,8 @@ pub(crate) struct LogFile {
     footer: ArrowReaderMetadata,
     /// The same footer, by which text columns are read as the codes of their dictionary.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
+    /// The schema of Arrow's writers, once it was asked for.
+    noted: OnceLock<Option<Schema>>,
     leaves: Vec<LeafColumn>,
     /// Places of the leaves of each name.
     by_name: HashMap<String, Vec<usize>>,
@@ -128,7 +131,8 @@ impl LogFile {
         for (place, leaf) in leaves.iter().enumerate() {
             by_name.entry(leaf.name.clone()).or_default().push(place);
         }
-        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves, by_name };
+        let (coded, noted) = (OnceLock::new(), OnceLock::new());
+        let opened = Self { path: path.to_owned(), source, footer, coded, noted, leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -192,13 +196,29 @@ impl LogFile {
 
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
-        let file = self.footer.metadata().file_metadata();
-        // The decoder of that note panics on some damage.
-        let noted = catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()));
-        match noted.ok()?.ok()?.field_with_name(name).ok()?.data_type() {
+        match self.arrow_schema()?.field_with_name(name).ok()?.data_type() {
             DataType::Duration(unit) => Some(*unit),
             _ => None,
         }
+    }
+
+    /// Scale, offset and unit in the metadata of a column.
+    pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
+        let field = self.arrow_schema().and_then(|schema| schema.field_with_name(name).ok());
+        field.map_or(FieldMetadata::NONE, FieldMetadata::of)
+    }
+
+    /// The schema that Arrow's writers note in the footer; none where it is missing or damaged.
+    fn arrow_schema(&self) -> Option<&Schema> {
+        let noted = || {
+            self.metadata("ARROW:schema")?;
+            let file = self.footer.metadata().file_metadata();
+            // The decoder of that note panics on some damage.
+            catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()))
+                .ok()?
+                .ok()
+        };
+        self.noted.get_or_init(noted).as_ref()
     }
 
     /// A value of the footer's key-value metadata.

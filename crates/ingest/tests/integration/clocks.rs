@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int64Array, StringArray,
-    Time32MillisecondArray, UInt16Array,
+    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int16Array, Int64Array, StringArray,
+    Time32MillisecondArray, UInt16Array, UInt64Array,
 };
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
@@ -171,6 +171,37 @@ fn a_sample_that_is_not_valid_is_missing() {
         let missing: Vec<usize> = (0..ROWS).filter(|&k| a.dx_m[k].is_nan()).collect();
         assert_eq!(missing, (200..240).collect::<Vec<_>>());
     }
+}
+
+/// A status word of 16 or 64 bits: bit 2 says powered, bit 5 says failed, and others are in use.
+#[test]
+fn bits_of_a_status_word_mark_valid_samples() {
+    let bad = |k: usize| (200..240).contains(&k);
+    let word = |k: usize| {
+        if !bad(k) {
+            0b0100
+        } else if k < 220 {
+            0b10_0100
+        } else {
+            0
+        }
+    };
+    let short = (0..ROWS).map(|k| (word(k) | 0b1000) as i16 | i16::MIN).collect::<Int16Array>();
+    let long = (0..ROWS).map(|k| (word(k) | (k as u64) << 40) | 1 << 63).collect::<UInt64Array>();
+    let mut m = plain();
+    m.channels.motor_position = ChannelMapping {
+        valid_column: Some("ok".into()),
+        valid_bits: Some(0b0100),
+        invalid_bits: Some(0b10_0000),
+        ..channel("m", Unit::Metre)
+    };
+    for words in [Arc::new(short) as ArrayRef, Arc::new(long)] {
+        let a = read(&m, &with(columns(), "ok", words)).unwrap();
+        let missing: Vec<usize> = (0..ROWS).filter(|&k| a.dx_m[k].is_nan()).collect();
+        assert_eq!(missing, (200..240).collect::<Vec<_>>());
+    }
+    let real = read(&m, &with(columns(), "ok", reals(|_| 4.0))).unwrap_err().diagnostic();
+    assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use arrow::array::{
     ArrayRef, Decimal128Array, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array,
     Int32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray, TimestampNanosecondArray,
 };
-use arrow::datatypes::{Int32Type, Schema};
+use arrow::datatypes::{DataType, Field, Int32Type, Schema};
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::units::{TimeUnit, Unit};
 use ingest::mapping::{IdentityField, IdentityMapping};
@@ -18,10 +18,8 @@ use records::Position;
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
-    let fields: Vec<_> = columns
-        .iter()
-        .map(|(name, array)| arrow::datatypes::Field::new(*name, array.data_type().clone(), true))
-        .collect();
+    let fields: Vec<_> =
+        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(Arc::clone(&schema), columns.iter().map(|c| Arc::clone(&c.1)).collect())
         .unwrap();
@@ -375,4 +373,45 @@ fn two_flights_in_one_log_are_refused_with_both_spans() {
     let mut named = m;
     named.identity.columns.insert(IdentityField::FlightId, "leg".into());
     assert_eq!(read(&named, 1000, 18_000.0).unwrap().segments.len(), 2);
+}
+
+/// As pyarrow writes `pa.field("m", pa.int32(), metadata={"unit": "mm", "scale": "0.01", "offset": "-5"})`: 700 counts are
+/// 2 mm.
+#[test]
+fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_others() {
+    let noted =
+        [("unit", "mm"), ("scale", "0.01"), ("offset", "-5")].map(|(k, v)| (k.to_owned(), v.to_owned()));
+    let counts: ArrayRef = Arc::new(Int32Array::from(vec![700, 800]));
+    let fields = [
+        Field::new("t", DataType::Float64, true),
+        Field::new("m", DataType::Int32, true).with_metadata(noted.into()),
+        Field::new("s", DataType::Float64, true),
+    ];
+    let schema = Arc::new(Schema::new(fields.to_vec()));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let columns = vec![reals(&[0.0, 0.1]), counts, reals(&[1.0, 2.0])];
+    let mut writer =
+        ArrowWriter::try_new(std::fs::File::create(&file).unwrap(), Arc::clone(&schema), None).unwrap();
+    writer.write(&RecordBatch::try_new(schema, columns).unwrap()).unwrap();
+    writer.close().unwrap();
+    let read = |motor: ChannelMapping| {
+        let m = mapping(motor, channel("s", Unit::Metre), channel("s", Unit::Newton));
+        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let at = log.actuators(&m.channels, Some(&Position::new("aileron").unwrap())).unwrap();
+        log.read_actuator(&at[0], &m.channels, LINEAR).map_err(|e| e.diagnostic())
+    };
+    near(&read(channel("m", Unit::Millimetre)).unwrap().motor_m, &[2e-3, 3e-3]);
+    let same = ChannelMapping { scale: 0.01, offset: -5.0, ..channel("m", Unit::Millimetre) };
+    near(&read(same).unwrap().motor_m, &[2e-3, 3e-3]);
+    let own = ChannelMapping { ignore_metadata: true, scale: 0.1, ..channel("m", Unit::Micrometre) };
+    near(&read(own).unwrap().motor_m, &[70e-6, 80e-6]);
+    for (other, key) in [
+        (channel("m", Unit::Micrometre), "`unit` = mm"),
+        (ChannelMapping { scale: 0.1, ..channel("m", Unit::Millimetre) }, "`scale` = 0.01"),
+    ] {
+        let refused = read(other).unwrap_err();
+        assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("metadata_contradicts", Some("m")));
+        assert!(refused.found.unwrap().starts_with(key) && refused.hint.unwrap().contains("ignore_metadata"));
+    }
 }
