@@ -315,10 +315,11 @@ impl ErrorKind {
                 format!("the placeholder of the position is {PLACEHOLDER}")
             }
             Self::NoPosition { pattern, columns } => {
-                let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
-                let (_, near) = meant.max_by(|a, b| a.0.total_cmp(&b.0))?;
+                let near = closest_to_pattern(pattern, columns)?;
+                let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
+                let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
                 format!(
-                    "closest column: `{near}`. Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
+                    "closest column: `{near}`.{hidden} Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
                 )
             }
             _ => return None,
@@ -404,6 +405,22 @@ impl ErrorKind {
     }
 }
 
+/// The column that shares the longest beginning and end with a pattern, and of those the most similar one.
+fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c String> {
+    let (before, after) = pattern.split_once(PLACEHOLDER).unwrap_or((pattern, ""));
+    let common = |(a, b): &(char, char)| a == b;
+    let shared = |column: &str| {
+        let start = before.chars().zip(column.chars()).take_while(common).count();
+        start + after.chars().rev().zip(column.chars().rev()).take_while(common).count()
+    };
+    let score = |column: &str| (shared(column), strsim::jaro_winkler(pattern, column));
+    let by_score = |a: &&String, b: &&String| {
+        let (a, b) = (score(a), score(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    columns.iter().max_by(by_score)
+}
+
 /// Message of the operating system, reworded for the two most common cases.
 fn unreadable(source: &io::Error) -> String {
     match source.kind() {
@@ -443,7 +460,7 @@ fn hidden_difference(wanted: &str, found: &str) -> Option<String> {
         name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect()
     };
     let (a, b) = (looks(wanted), looks(found));
-    let is_alike = a == b || strsim::levenshtein(&a, &b) <= 2;
+    let is_alike = b.contains(&a) || strsim::levenshtein(&a, &b) <= 2;
     let has_hidden = [wanted, found].iter().any(|name| !name.is_ascii() || name.contains(char::is_control));
     (is_alike && has_hidden && points(wanted) != points(found)).then(|| {
         format!(

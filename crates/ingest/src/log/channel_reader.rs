@@ -128,6 +128,23 @@ impl<'s> ChannelSampling<'s> {
             && self.time_column == other.time_column
     }
 
+    /// Whether its rows hold lists of another length than those of another channel, which `error` found: its samples have
+    /// instants of their own, which begin with the stamp of the row.
+    ///
+    /// # Errors
+    /// [`ErrorKind::ListLengths`] where only the rate of the rows is declared, which is that of one of them.
+    fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
+        let own = &self.samples.leaf;
+        if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.sheet.is_listed(own) {
+            return Ok(false);
+        }
+        if self.time_column.is_some() || self.sheet.clock.column.is_some() {
+            return Ok(true);
+        }
+        let (column, other) = (own.clone(), other.samples.leaf.clone());
+        Err(self.sheet.error(ErrorKind::ListLengths { column, other }))
+    }
+
     fn is_apart(&self) -> bool {
         self.time_column.is_some() || self.sheet.layout.name_column.is_some()
     }
@@ -320,10 +337,16 @@ pub(crate) fn follow(
     own.line = if shared { master.line.clone() } else { own.line_of(map)? };
     own.every = own.rows_between(map);
     let is_slow_load = role == Role::Load && own.every > 1;
-    if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
-        return own.readings(map, geometry, wanted);
-    }
-    let Channel { values, turn_m, .. } = own.readings(map, geometry, RowSelection::ALL)?;
+    let is_direct = shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load);
+    let read = own.readings(map, geometry, if is_direct { wanted } else { RowSelection::ALL });
+    let Channel { values, turn_m, .. } = match read {
+        Ok(read) if is_direct => return Ok(read),
+        Err(error) if shared && own.has_own_list(master, &error)? => {
+            own.line = own.line_of(map)?;
+            own.readings(map, geometry, RowSelection::ALL)?
+        }
+        read => read?,
+    };
     let (stamps, at_s) = own.instants(map)?;
     let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
     let (lead, mut instants) = master.instants(motor)?;
@@ -341,8 +364,4 @@ pub(crate) fn follow(
 /// A nanosecond is no shift.
 fn same_instants(a_s: f64, b_s: f64) -> bool {
     (a_s - b_s).abs() < 1e-9
-}
-
-pub(crate) fn duration(seconds: f64) -> jiff::SignedDuration {
-    jiff::SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
 }

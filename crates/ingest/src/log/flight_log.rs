@@ -12,7 +12,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
-use crate::log::identity::{self, Identity, IdentityFields};
+use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized::Normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
@@ -148,12 +148,32 @@ impl Log {
             let own = crate::mapping::IdentityMapping::default();
             return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
         }
-        let mut facts = facts(&self.main, &self.mapping.identity)?;
-        for (fact, text) in known(&facts) {
+        let mapping = &self.mapping.identity;
+        let fail = |fault| self.main.error(fault);
+        let mut facts = facts(&self.main, mapping)?;
+        let date =
+            facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
+        let known = known(&facts);
+        if date.is_some() {
+            // A day has several flights: the time comes from the flights table, or from the clock.
+            facts.remove(&IdentityField::DepartureUtc);
+        }
+        for (fact, text) in known {
             facts.entry(fact).or_insert(text);
         }
-        let start = if facts.contains_key(&IdentityField::DepartureUtc) { None } else { self.start_utc()? };
-        identity::read(&facts, &self.mapping.identity, start).map_err(|f| self.main.error(f))
+        if facts.contains_key(&IdentityField::DepartureUtc) {
+            return identity::read(&facts, mapping, None).map_err(fail);
+        }
+        let clock = self.clock_span()?;
+        let absolute = clock.and_then(|clock| clock.start(mapping)).transpose().map_err(fail)?;
+        let start = match (date, facts.get(&IdentityField::LandingUtc)) {
+            (Some(date), _) => Some(identity::departure_on(date, absolute, clock, mapping).map_err(fail)?),
+            (None, Some(landing)) if absolute.is_none() => {
+                Some(identity::departure_before(landing, &facts, clock, mapping).map_err(fail)?)
+            }
+            _ => absolute,
+        };
+        identity::read(&facts, mapping, start).map_err(fail)
     }
 
     /// The first instant of an absolute clock.
@@ -161,23 +181,23 @@ impl Log {
     /// # Errors
     /// When the time column cannot be read.
     pub fn start_utc(&self) -> Result<Option<Timestamp>, Error> {
-        let Some(column) = &self.main.clock.column else { return Ok(None) };
-        if !self.main.files[0].has(column) {
+        let start = self.clock_span()?.and_then(|clock| clock.start(&self.mapping.identity));
+        start.transpose().map_err(|fault| self.main.error(fault))
+    }
+
+    /// The earliest and the latest stamp of the log, if it has a time column.
+    fn clock_span(&self) -> Result<Option<ClockSpan>, Error> {
+        let Some(column) = self.main.clock.column.as_ref().filter(|column| self.main.files[0].has(column))
+        else {
             return Ok(None);
-        }
+        };
         let every_row = SampleSelector { leaf: column.clone(), rows: Vec::new() };
         let stamps = self.main.stamps(&every_row, None)?;
-        let earliest = stamps.seconds.iter().copied().filter(|s| !s.is_nan()).fold(f64::INFINITY, f64::min);
-        let later = |start: Timestamp| start.checked_add(channel_reader::duration(earliest)).ok();
-        Ok(match stamps.origin {
-            TimeOrigin::Utc(start) => later(start),
-            TimeOrigin::Local(start) => match later(start) {
-                Some(local) => identity::local_to_utc(local, &self.mapping.identity)
-                    .map_err(|fault| self.main.error(fault))?,
-                None => None,
-            },
-            TimeOrigin::Counted(_) | TimeOrigin::Start => None,
-        })
+        let (mut earliest_s, mut latest_s) = (f64::INFINITY, f64::NEG_INFINITY);
+        for s in stamps.seconds.iter().filter(|s| !s.is_nan()) {
+            (earliest_s, latest_s) = (earliest_s.min(*s), latest_s.max(*s));
+        }
+        Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 
     /// The sheet that holds a channel.

@@ -26,7 +26,10 @@ use crate::mapping::{ChannelMapping, ClockMapping, Epoch, Layout};
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::parquet::row_selection::RowSelection;
-use crate::time::clock::{TimeBase, Timestamps};
+use crate::time::clock::{DAY_S, TimeBase, Timestamps};
+
+/// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
+const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
 
 /// The files of one kind that belong to one flight.
 #[derive(Debug)]
@@ -418,8 +421,15 @@ impl RowTable {
             other => other.per_second().unwrap_or(1.0),
         };
         let is_whole = kind.is_integer();
-        let origin = if self.clock.epoch == Epoch::Unix { TickEpoch::Utc } else { TickEpoch::Own };
-        Ok(TickFormat { per_second, is_whole, is_text: false, origin, wraps_at: self.clock.wraps_at })
+        let (origin, zero_s) = match self.clock.epoch {
+            Epoch::None => (TickEpoch::Own, 0),
+            Epoch::Unix => (TickEpoch::Utc, 0),
+            Epoch::Midnight => (TickEpoch::Midnight, 0),
+            Epoch::Excel => (TickEpoch::Local, EXCEL_ZERO_S),
+        };
+        let day = (origin == TickEpoch::Midnight).then_some(DAY_S * per_second);
+        let wraps_at = self.clock.wraps_at.or(day);
+        Ok(TickFormat { per_second, is_whole, is_text: false, origin, zero_s, wraps_at })
     }
 
     /// The known name nearest to a channel that is not here.

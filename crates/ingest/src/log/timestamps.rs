@@ -8,15 +8,13 @@ use jiff::Timestamp;
 use crate::channel::buffer_pool;
 use crate::error::ErrorKind;
 use crate::parquet::numeric::{append, as_text, wrong_type};
-use crate::time::clock::{TimeOrigin, Timestamps};
-
-/// Seconds of a day.
-const DAY_S: f64 = 86_400.0;
+use crate::time::clock::{DAY_S, TimeOrigin, Timestamps};
 
 /// What zero means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TickEpoch {
     Own,
+    Midnight,
     Utc,
     Local,
 }
@@ -28,6 +26,8 @@ pub(crate) struct TickFormat {
     pub(crate) is_whole: bool,
     pub(crate) is_text: bool,
     pub(crate) origin: TickEpoch,
+    /// Zero of an instant, s since 1970.
+    pub(crate) zero_s: i64,
     pub(crate) wraps_at: Option<f64>,
 }
 
@@ -40,7 +40,7 @@ impl TickFormat {
     /// A time of the day, which starts again at midnight.
     pub(crate) fn of_day(unit: ArrowTimeUnit) -> Self {
         let ticks = Self::of_duration(unit);
-        Self { wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
+        Self { origin: TickEpoch::Midnight, wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
     }
 
     /// A time since an unknown zero.
@@ -51,7 +51,7 @@ impl TickFormat {
             ArrowTimeUnit::Microsecond => 1e6,
             ArrowTimeUnit::Nanosecond => 1e9,
         };
-        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, wraps_at: None }
+        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, zero_s: 0, wraps_at: None }
     }
 
     /// Whether they are numbers with a fraction.
@@ -61,7 +61,7 @@ impl TickFormat {
 
     /// ISO 8601 text; an offset in it is taken, and without one the time is local.
     pub(crate) fn text() -> Self {
-        Self { per_second: 1e9, is_whole: true, is_text: true, origin: TickEpoch::Local, wraps_at: None }
+        Self { is_text: true, origin: TickEpoch::Local, ..Self::of_duration(ArrowTimeUnit::Nanosecond) }
     }
 }
 
@@ -180,28 +180,26 @@ impl<'a> TimestampParser<'a> {
     }
 
     pub(crate) fn stamps(self) -> Timestamps {
-        let instant = |whole: i64| {
-            let nanoseconds = i128::from(whole) * (1e9 / self.ticks.per_second) as i128;
-            Timestamp::from_nanosecond(nanoseconds).ok()
+        let per_second = self.ticks.per_second;
+        let (first_s, first_ns) = match self.first {
+            Some(FirstTick::Whole(first)) => {
+                (first as f64 / per_second, i128::from(first) * (1e9 / per_second) as i128)
+            }
+            Some(FirstTick::Real(first)) => (first / per_second, (first / per_second * 1e9) as i128),
+            None => (0.0, 0),
         };
-        let real =
-            |ticks: f64| Timestamp::from_nanosecond((ticks / self.ticks.per_second * 1e9) as i128).ok();
-        let counted = match self.first {
-            Some(FirstTick::Whole(first)) => first as f64 / self.ticks.per_second,
-            Some(FirstTick::Real(first)) => first / self.ticks.per_second,
-            None => 0.0,
-        };
-        let start = match self.first {
-            Some(FirstTick::Whole(first)) => instant(first),
-            Some(FirstTick::Real(first)) => real(first),
-            None => None,
+        let instant = || {
+            self.first?;
+            Timestamp::from_nanosecond(first_ns + 1_000_000_000 * i128::from(self.ticks.zero_s)).ok()
         };
         let zero = if self.is_zoned { TickEpoch::Utc } else { self.ticks.origin };
-        let origin = match (zero, start) {
-            (TickEpoch::Utc, Some(start)) => TimeOrigin::Utc(start),
-            (TickEpoch::Local, Some(start)) => TimeOrigin::Local(start),
-            _ => TimeOrigin::Counted(counted),
+        let origin = match zero {
+            TickEpoch::Utc => instant().map(TimeOrigin::Utc),
+            TickEpoch::Local => instant().map(TimeOrigin::Local),
+            TickEpoch::Midnight => Some(TimeOrigin::OfDay(first_s)),
+            TickEpoch::Own => None,
         };
+        let origin = origin.unwrap_or(TimeOrigin::Counted(first_s));
         Timestamps { column: self.column.to_owned(), seconds: self.seconds, origin }
     }
 }

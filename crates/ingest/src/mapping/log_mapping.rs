@@ -71,7 +71,7 @@ pub struct GroupMapping {
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
     /// Key-value metadata of the Parquet footer: fact → key. Fields: `tail_number`, `flight_id`,
-    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`.
+    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
     /// Columns that hold one value throughout: fact → column.
@@ -112,17 +112,20 @@ pub enum IdentityField {
     FlightHours,
     /// The tail's total hours after the flight.
     TailHoursEnd,
+    /// Landing, where the departure is not named: the departure lies the length of the flight before it.
+    LandingUtc,
 }
 
 impl IdentityField {
     /// All fields, in the order in which they are read.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::TailNumber,
         Self::FlightId,
         Self::DepartureUtc,
         Self::Position,
         Self::FlightHours,
         Self::TailHoursEnd,
+        Self::LandingUtc,
     ];
 
     /// The key as configuration spells it.
@@ -134,6 +137,7 @@ impl IdentityField {
             Self::Position => "position",
             Self::FlightHours => "flight_hours",
             Self::TailHoursEnd => "tail_hours_end",
+            Self::LandingUtc => "landing_utc",
         }
     }
 }
@@ -148,7 +152,8 @@ pub struct ClockMapping {
     /// Its unit; not needed for Arrow timestamps and text. `count` is a counter of samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<TimeUnit>,
-    /// What a column of numbers counts from: nothing that is known, or 1970 UTC.
+    /// What a column of numbers counts from: nothing that is known, 1970 UTC, midnight of the day of departure, or the
+    /// beginning of 1900 as spreadsheets have it (1899-12-30, local time).
     #[serde(default, skip_serializing_if = "Epoch::is_none")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero, e.g. 65536.
@@ -180,6 +185,10 @@ pub enum Epoch {
     None,
     /// From 1970-01-01T00:00:00Z.
     Unix,
+    /// From midnight: the clock starts again after a day.
+    Midnight,
+    /// From 1899-12-30T00:00:00 in local time, mostly in days.
+    Excel,
 }
 
 impl Epoch {

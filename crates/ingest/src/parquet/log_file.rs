@@ -1,5 +1,6 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
@@ -24,7 +25,7 @@ use crate::io::digest::Digest;
 use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
-use crate::mapping::column_pattern::nearest;
+use crate::mapping::column_pattern::{composed, nearest};
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
@@ -166,7 +167,8 @@ impl LogFile {
     }
 
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        let mut named = self.named(name);
+        let name = composed(name);
+        let mut named = self.named(&name);
         let first = named.next()?;
         // A column called `a.b` comes before field `b` of struct `a`.
         if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
@@ -510,7 +512,7 @@ impl LogFile {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
         let length = read_at::file_length(file).map_err(unreadable)?;
-        let names: HashSet<&str> = names.iter().copied().collect();
+        let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted)?;

@@ -13,6 +13,9 @@ use multiversion::multiversion;
 use crate::error::ErrorKind;
 use crate::mapping::ClockMapping;
 
+/// Seconds of a day.
+pub(crate) const DAY_S: f64 = 86_400.0;
+
 /// A step longer than this many usual steps is a break: the filter cannot predict across it.
 pub(crate) const BREAK_STEPS: f64 = 1.5;
 
@@ -106,6 +109,8 @@ pub enum TimeOrigin {
     Start,
     /// Seconds on a zero of the clock's own, which all clocks of a log share.
     Counted(f64),
+    /// Seconds since midnight.
+    OfDay(f64),
     /// An instant.
     Utc(Timestamp),
     /// A local time, read as if it were UTC, whose zone the log does not name.
@@ -118,6 +123,8 @@ impl TimeOrigin {
         match (self, other) {
             (Self::Start, _) | (_, Self::Start) => Some(0.0),
             (Self::Counted(a), Self::Counted(b)) => Some(a - b),
+            // A channel may begin before midnight, and another one after it.
+            (Self::OfDay(a), Self::OfDay(b)) => Some((a - b + 0.5 * DAY_S).rem_euclid(DAY_S) - 0.5 * DAY_S),
             (Self::Utc(a), Self::Utc(b)) | (Self::Local(a), Self::Local(b)) => {
                 Some(a.duration_since(b).as_secs_f64())
             }

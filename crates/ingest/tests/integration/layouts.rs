@@ -5,13 +5,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, Decimal128Array, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array,
-    Int32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray, TimestampNanosecondArray,
+    ArrayRef, Decimal128Array, DictionaryArray, DurationMillisecondArray, Float16Array, Float32Array,
+    Float64Array, Int16Array, Int32Array, Int64Array, ListArray, RecordBatch, StringArray,
+    Time32MillisecondArray, TimestampMillisecondArray, TimestampNanosecondArray,
 };
-use arrow::datatypes::{DataType, Field, Int32Type, Schema};
+use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema};
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::mapping::{IdentityField, IdentityMapping};
+use ingest::mapping::{Epoch, IdentityField, IdentityMapping};
 use ingest::{ActuatorChannels, ChannelMapping, Channels, ClockMapping, Geometry, Log, LogFiles, Mapping};
 use parquet::arrow::ArrowWriter;
 use records::Position;
@@ -414,4 +415,168 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
         assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("metadata_contradicts", Some("m")));
         assert!(refused.found.unwrap().starts_with(key) && refused.hint.unwrap().contains("ignore_metadata"));
     }
+}
+
+/// The identity of a log whose motor, screw and load are one column.
+fn identity(name: &str, m: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<String, records::Diagnostic> {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join(name);
+    write(&file, columns);
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let identity = log.identity(|_| IdentityFields::new()).map_err(|e| e.diagnostic())?;
+    Ok(identity.departure_utc.to_string())
+}
+
+/// Istanbul is three hours ahead of UTC. The log begins at 23:59:50, and goes on after midnight.
+#[test]
+fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    m.identity.path = Some(r"(?<tail_number>N\w+)_(?<departure_date>\d{8})".into());
+    m.identity.departure_format = Some("%Y%m%d".into());
+    m.identity.time_zone = Some("Europe/Istanbul".into());
+    let seconds: Vec<f64> = (0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0)).collect();
+    let columns = [("t", reals(&seconds))];
+    let of = |m: &Mapping| identity("N1_20261119.parquet", m, &columns);
+    let refused = of(&m).unwrap_err();
+    assert!(refused.code == "identity_invalid" && refused.message.contains("clock.epoch"), "{refused}");
+    m.clock.epoch = Epoch::Midnight;
+    assert_eq!(of(&m).unwrap(), "2026-11-19T20:59:50Z");
+    m.clock.unit = None;
+    let of_day = (0..200).map(|k| Some(86_390_000 + 50 * k)).collect::<Time32MillisecondArray>();
+    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(of_day))];
+    assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
+    // An absolute clock gives the time, unless it is of another day.
+    let instant = |day: i64| -> ArrayRef {
+        let first = 1_794_000_000_000 + 86_400_000 * day;
+        Arc::new(
+            (0..200)
+                .map(|k| Some(first + 50 * k))
+                .collect::<TimestampMillisecondArray>()
+                .with_timezone("UTC"),
+        )
+    };
+    assert_eq!(identity("N1_20261106.parquet", &m, &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
+    let other = identity("N1_20261106.parquet", &m, &[("t", instant(3))]).unwrap_err();
+    assert!(other.message.contains("another day"), "{other}");
+}
+
+/// Two hours before the landing by the hours that the log states, or 20 s before it by its clock.
+#[test]
+fn a_landing_stands_for_the_departure() {
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    m.identity.path = Some(r"(?<tail_number>N\w+)_(?<landing_utc>\d{8}T\d{6}Z)".into());
+    let seconds: Vec<f64> = (0..201).map(|k| 50.0 + 0.1 * f64::from(k)).collect();
+    let of = |m: &Mapping| identity("N1_20261119T041300Z.parquet", m, &[("t", reals(&seconds))]).unwrap();
+    assert_eq!(of(&m), "2026-11-19T04:12:40Z");
+    m.identity.values.insert(IdentityField::FlightHours, "2.0".into());
+    assert_eq!(of(&m), "2026-11-19T02:13:00Z");
+}
+
+/// 2026-11-19 is day 46345 of spreadsheets (as LibreOffice has it): 6:00 in UTC is a quarter of a day more.
+#[test]
+fn days_since_1899_are_instants() {
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
+    (m.clock.epoch, m.clock.unit) = (Epoch::Excel, Some(TimeUnit::Day));
+    let days: Vec<f64> = (0..100).map(|k| 46_345.25 + f64::from(k) * 0.1 / 86_400.0).collect();
+    let start = identity("N1_x.parquet", &m, &[("t", reals(&days))]).unwrap();
+    let start: jiff::Timestamp = start.parse().unwrap();
+    let wanted: jiff::Timestamp = "2026-11-19T06:00:00Z".parse().unwrap();
+    assert!(start.duration_since(wanted).as_secs_f64().abs() < 1e-5, "{start}");
+}
+
+/// A duration column has a unit of its own, whatever the configuration says.
+#[test]
+fn the_type_of_a_duration_wins_over_the_mapped_unit() {
+    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let t: ArrayRef = Arc::new(DurationMillisecondArray::from_iter_values((0..100).map(|k| 20 * k)));
+    let x = reals(&(0..100).map(|k| f64::from(k % 7)).collect::<Vec<_>>());
+    let a = only(&m, &[("t", t), ("m", x.clone()), ("s", x.clone()), ("f", x)], LINEAR);
+    assert!((a.step_s - 0.02).abs() < 1e-12, "{} s", a.step_s);
+}
+
+/// `höhe` with a composed and a decomposed ö: a file of one system, and a configuration of another.
+#[test]
+fn accents_of_names_are_composed_and_blanks_are_told_apart() {
+    let composed = "{position}_h\u{f6}he";
+    let m = mapping(
+        channel(composed, Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let x = || reals(&[1.0, 2.0]);
+    write(
+        &file,
+        &[
+            ("t", reals(&[0.0, 0.1])),
+            ("au\u{df}eno\u{308}_ho\u{308}he", x()),
+            ("au\u{df}en\u{f6}_s", x()),
+            ("f", x()),
+        ],
+    );
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let found = log.actuators(&m.channels, None).unwrap();
+    assert_eq!((found.len(), found[0].position.as_str()), (1, "au\u{df}en\u{f6}"));
+    let a = log.read_actuator(&found[0], &m.channels, LINEAR).unwrap();
+    assert_eq!(a.motor_m, [1.0, 2.0]);
+    let m = mapping(
+        channel("{position} motor", Unit::Metre),
+        channel("s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    write(&file, &[("t", x()), ("left\u{a0}motor", x()), ("s", x()), ("f", x())]);
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
+    assert!(hint.contains("left\u{a0}motor") && hint.contains("U+00A0"), "{hint}");
+}
+
+/// `FLT_NO` begins as `{position}_FORCE_LBF` does, and is not meant.
+#[test]
+fn the_closest_column_shares_the_end_of_the_pattern() {
+    let m = mapping(
+        channel("{position}_FORCE_LBF", Unit::Metre),
+        channel("s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    write(&file, &["t", "FLT_NO", "AIL_L_LOAD_LBF", "s", "f"].map(|name| (name, reals(&[0.0, 1.0]))));
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
+    assert!(hint.contains("`AIL_L_LOAD_LBF`"), "{hint}");
+}
+
+/// Rows of 0.1 s with ten positions and five loads each: both begin at the stamp of their row.
+#[test]
+fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
+    let lists = |each: usize, of: &dyn Fn(f64) -> f64| -> ArrayRef {
+        let row = |row: usize| {
+            Some((0..each).map(|k| Some(of(0.1 * (row as f64 + k as f64 / each as f64)))).collect::<Vec<_>>())
+        };
+        Arc::new(ListArray::from_iter_primitive::<Float64Type, _, _>((0..50).map(row)))
+    };
+    let t = reals(&(0..50).map(|row| 0.1 * f64::from(row)).collect::<Vec<_>>());
+    let columns: [(&str, ArrayRef); 4] = [
+        ("t", t.clone()),
+        ("m", lists(10, &|t| t)),
+        ("s", lists(10, &|t| t + 1e-3)),
+        ("f", lists(5, &|t| 100.0 * t)),
+    ];
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let a = only(&m, &columns, LINEAR);
+    assert_eq!((a.dx_m.len(), a.segments.len()), (500, 1));
+    // The load of 50 Hz is held over the next sample of 100 Hz.
+    let held = |k: usize| 100.0 * 0.02 * (k / 2) as f64;
+    let worst = (0..500).map(|k| (a.load_n[k] - held(k)).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-9, "{worst} N");
+    (m.clock.column, m.clock.rate_hz) = (None, Some(100.0));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    write(&file, &columns);
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let at = log.actuators(&m.channels, Some(&Position::new("aileron").unwrap())).unwrap();
+    let refused = log.read_actuator(&at[0], &m.channels, LINEAR).unwrap_err().diagnostic();
+    assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
 }
