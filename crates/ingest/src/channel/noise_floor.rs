@@ -83,15 +83,18 @@ struct Level {
 fn own_samples(values: &[f64]) -> Option<Vec<f64>> {
     const MAX_INTERVAL: usize = 20;
     const MOST: f64 = 0.95;
+    /// Changes that show the interval: the first ones.
+    const MAX_CHANGES: usize = 4096;
     let missing = values.iter().filter(|v| v.is_nan()).count();
     if 5 * missing >= 2 * values.len() {
         return Some(values.iter().copied().filter(|v| !v.is_nan()).collect());
     }
-    let changes: Vec<usize> =
-        (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits()).collect();
-    if 3 * changes.len() > 2 * values.len() || changes.len() < MIN_BLOCKS {
+    let changes = || (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits());
+    let count = changes().count();
+    if 3 * count > 2 * values.len() || count < MIN_BLOCKS {
         return None;
     }
+    let changes: Vec<usize> = changes().take(MAX_CHANGES).collect();
     let at_one_phase = |every: usize| {
         let mut counts = vec![0_usize; every];
         changes.iter().for_each(|i| counts[i % every] += 1);

@@ -513,31 +513,23 @@ impl Log {
     /// The motor position, whose clock all other channels follow.
     fn motor<'c>(&self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'_, 'c>, Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let mut found: Option<ReferenceChannel<'_, 'c>> = None;
         let choices = self.present_or_lacking(Role::Motor, at, channels)?;
-        let is_only = choices.len() == 1;
-        for (k, (map, name)) in choices.into_iter().enumerate() {
-            let sampling = ChannelSampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
-            let master = (sampling, map);
+        let read = |map: &'c ChannelMapping, name: &str| {
+            let master = (ChannelSampling::new(self.sheet_of(map)?, map, name, at.position.as_str())?, map);
             if !channels.when.is_empty() {
                 // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
                 master.0.check_rows()?;
             }
             let selection = self.selected(sought, &master)?;
             let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
-            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
-            if lives || found.is_none() {
-                let flags = alternative(Role::Motor, k);
-                found = Some(ReferenceChannel { channel: read, master, selection, flags });
-            }
-            if lives {
-                break;
-            }
-        }
-        let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&lead.channel.values, lead.master.0.column(), &lead.selection)?;
-        self.check_one_flight(&lead.master)?;
-        Ok(lead)
+            Ok((read, selection.apart, (master, selection)))
+        };
+        let found = first_alive(choices, read)?;
+        let (channel, (master, selection), k) =
+            found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
+        self.not_empty(&channel.values, master.0.column(), &selection)?;
+        self.check_one_flight(&master)?;
+        Ok(ReferenceChannel { channel, master, selection, flags: alternative(Role::Motor, k) })
     }
 
     /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
@@ -560,25 +552,14 @@ impl Log {
         selection: &SampleSelection,
     ) -> Result<(Channel, Vec<String>), Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let mut found: Option<(Channel, usize)> = None;
-        let mut column = String::new();
-        let choices = self.present_or_lacking(role, at, channels)?;
-        let is_only = choices.len() == 1;
-        for (k, (map, name)) in choices.into_iter().enumerate() {
+        let read = |map: &ChannelMapping, name: &str| {
             let sheet = self.sheet_of(map)?;
-            let one = FollowerChannel { sheet, map, name: &name, position: at.position.as_str(), role };
+            let one = FollowerChannel { sheet, map, name, position: at.position.as_str(), role };
             let read = channel_reader::follow(&master.0, master.1, &one, geometry, selection.wanted())?;
-            let read = selection.cut(read);
-            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
-            if lives || found.is_none() {
-                column = name;
-                found = Some((read, k));
-            }
-            if lives {
-                break;
-            }
-        }
-        let (read, k) = found.unwrap_or_else(|| (Vec::new().into(), 0));
+            Ok((selection.cut(read), selection.apart, name.to_owned()))
+        };
+        let found = first_alive(self.present_or_lacking(role, at, channels)?, read)?;
+        let (read, column, k) = found.unwrap_or_else(|| (Vec::new().into(), String::new(), 0));
         self.not_empty(&read.values, &column, selection)?;
         Ok((read, alternative(role, k)))
     }
@@ -667,6 +648,27 @@ pub fn companion_identity(
     let layout = settings.map(|g| g.layout.clone()).unwrap_or_default();
     let alone = Mapping { identity, clock, layout, ..Mapping::default() };
     Log::open(&LogFiles::one(path), &Arc::new(alone))?.identity(known)
+}
+
+/// The first of redundant channels that is alive, or the first one; with what was read beside it, and its number. `read`
+/// gives a channel, how many of its samples no filter left, and the rest.
+fn first_alive<'c, T>(
+    choices: Vec<(&'c ChannelMapping, String)>,
+    read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, usize, T), Error>,
+) -> Result<Option<(Channel, T, usize)>, Error> {
+    let is_only = choices.len() == 1;
+    let mut found = None;
+    for (k, (map, name)) in choices.into_iter().enumerate() {
+        let (channel, apart, rest) = read(map, &name)?;
+        let is_alive = is_only || channel_reader::lives(&channel.values, apart);
+        if is_alive || found.is_none() {
+            found = Some((channel, rest, k));
+        }
+        if is_alive {
+            break;
+        }
+    }
+    Ok(found)
 }
 
 fn alternative(role: Role, choice: usize) -> Vec<String> {

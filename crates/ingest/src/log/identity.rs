@@ -170,17 +170,18 @@ pub(crate) fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// The facts that folders called `name=value` hold, as Hive partitions are; the innermost wins.
+/// Names and values of folders called `name=value`, as Hive partitions are, the outermost first.
+pub(crate) fn hive_folders(path: &Path) -> impl Iterator<Item = (&str, String)> {
+    let folders = path.parent().into_iter().flat_map(Path::components);
+    let named = folders.filter_map(|part| part.as_os_str().to_str()?.split_once('='));
+    named.map(|(name, value)| (name, percent_decode_str(value).decode_utf8_lossy().into_owned()))
+}
+
+/// The facts that those folders hold; the innermost wins.
 pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, String>) -> IdentityFields {
     let whole = absolute(path);
-    let named: BTreeMap<String, String> = whole
-        .parent()
-        .into_iter()
-        .flat_map(Path::components)
-        .filter_map(|part| part.as_os_str().to_str()?.split_once('='))
-        .map(|(name, value)| (name.to_owned(), percent_decode_str(value).decode_utf8_lossy().into_owned()))
-        .collect();
-    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name)?.clone()));
+    let named: BTreeMap<&str, String> = hive_folders(&whole).collect();
+    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name.as_str())?.clone()));
     // Hive's own word for a null.
     let is_value = |(_, value): &(IdentityField, String)| value != "__HIVE_DEFAULT_PARTITION__";
     folders.iter().filter_map(stated).filter(is_value).collect()
