@@ -1,6 +1,8 @@
 //! What a channel looks like before anything is estimated: so that a mapping error is seen in seconds, and
 //! a sensor that lies is not believed.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::ops::Range;
 
 use crate::channel::noise_floor::white_noise_of;
@@ -118,11 +120,12 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     if longest_run < LEAST_RUN {
         return 0;
     }
-    let is_at_rail = |run: &Range<usize>| values[run.start] == min || values[run.start] == max;
-    let at_rails: Vec<Range<usize>> = runs(values, LEAST_RUN).filter(is_at_rail).collect();
-    if at_rails.is_empty() {
+    let count_at_rails = values.iter().filter(|v| **v == min || **v == max).count();
+    if count_at_rails < LEAST_RUN {
         return 0;
     }
+    let is_at_rail = |run: &Range<usize>| values[run.start] == min || values[run.start] == max;
+    let at_rails: Vec<Range<usize>> = runs(values, LEAST_RUN).filter(is_at_rail).collect();
     let speed = 0.5 * mean_step(values);
     let mut count = [0, 0];
     let mut samples = 0;
@@ -164,6 +167,11 @@ fn spikes(
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
+    /// Impacts recur at least so often, s; so many are looked at in a short flight.
+    const IMPACT_EVERY_S: f64 = 6.0;
+    const LEAST_IMPACTS: usize = 20;
+    /// For the uncertainty of the noise itself.
+    const MARGIN: f64 = 1.05;
     /// Enough for a threshold: the noise is known to about 3 %.
     const NOISE_BLOCKS: usize = 1000;
     let step = resolution.unwrap_or(0.0);
@@ -183,11 +191,19 @@ fn spikes(
     };
     // A window across a break in time shows the break.
     let inner = || segments.iter().flat_map(|s| s.start + 3..s.end.saturating_sub(3));
-    if !inner().any(|i| height(i).abs() > far) {
+    let heights = inner().map(|i| (height(i).abs(), i)).filter(|(height, _)| !height.is_nan());
+    let rank = |count: usize| ((count as f64 * step_s / IMPACT_EVERY_S) as usize).max(LEAST_IMPACTS);
+    let (largest, count) = largest_heights(heights, rank(inner().count()) + 1);
+    if largest.first().is_none_or(|(highest, _)| *highest <= far) {
         return 0;
     }
-    let heights: Vec<f64> = inner().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
-    let far = far.max(IMPACTS * recurring_impact(heights, noise, step_s));
+    let recurring = largest.get(rank(count)).map_or(0.0, |(level, _)| {
+        // Two-sided tail of the normal distribution, to within 3 % for these ranks.
+        let deviate = (2.0 * (count as f64 / rank(count) as f64).ln()).sqrt() - 0.35;
+        let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
+        (level * level - explained * explained).max(0.0).sqrt()
+    });
+    let far = far.max(IMPACTS * recurring);
     let is_outlier = |i: usize| {
         let at = height(i);
         let (before, after) = (height(i - 1) / at, height(i + 1) / at);
@@ -200,25 +216,31 @@ fn spikes(
             && (before - after).abs() < SHAPE_TOLERANCE
             && !around.any(|other| other >= LOCAL_SHARE * at.abs())
     };
-    inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count()
+    if largest.last().is_some_and(|(least, _)| *least > far) {
+        return inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count();
+    }
+    largest.iter().filter(|(height, i)| *height > far && is_outlier(*i)).count()
 }
 
 /// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
 const DIFFERENCE_NOISE: f64 = 1.394;
 
-/// Height that fourth differences exceed every six seconds, less what white noise explains of it.
-fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
-    const EVERY_S: f64 = 6.0;
-    const LEAST: usize = 20;
-    /// For the uncertainty of the noise itself.
-    const MARGIN: f64 = 1.05;
-    let rank = ((heights.len() as f64 * step_s / EVERY_S) as usize).max(LEAST);
-    let Some(at) = heights.len().checked_sub(rank + 1) else { return 0.0 };
-    let level = *heights.select_nth_unstable_by(at, f64::total_cmp).1;
-    // Two-sided tail of the normal distribution, to within 3 % for these ranks.
-    let deviate = (2.0 * (heights.len() as f64 / rank as f64).ln()).sqrt() - 0.35;
-    let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
-    (level * level - explained * explained).max(0.0).sqrt()
+/// The largest heights with their places, at most so many, the largest first; and how many heights there are.
+fn largest_heights(heights: impl Iterator<Item = (f64, usize)>, most: usize) -> (Vec<(f64, usize)>, usize) {
+    // The least of them first; bits of positive numbers rise as the numbers do.
+    let (mut largest, mut count, mut least) = (BinaryHeap::new(), 0, 0);
+    for (height, at) in heights {
+        count += 1;
+        if largest.len() < most || height.to_bits() > least {
+            largest.push(Reverse((height.to_bits(), at)));
+            if largest.len() > most {
+                largest.pop();
+            }
+            least = largest.peek().map_or(0, |Reverse((least, _))| *least);
+        }
+    }
+    let sorted = largest.into_sorted_vec().into_iter();
+    (sorted.map(|Reverse((bits, at))| (f64::from_bits(bits), at)).collect(), count)
 }
 
 /// Quality flags of the motor, screw and load channels: stable codes.

@@ -52,10 +52,12 @@ pub(crate) fn restore_turns(position_m: &mut [f64], evidence: TurnEvidence<'_>) 
         return 0;
     }
     let load_n = held(evidence.load_n);
-    let wind_up = wind_up_m_per_n(position_m, evidence.other_m, &load_n, &runs).unwrap_or(0.0);
+    let speed_m = speeds(evidence.other_m, evidence.segments);
+    let [wind_up, delay] = lag_of_load_and_speed(position_m, evidence.other_m, [&load_n, &speed_m], &runs);
     let ahead = |position_m: &[f64], i: usize| {
         let load_n = if load_n[i].is_nan() { 0.0 } else { load_n[i] };
-        Some(position_m[i] - evidence.other_m[i] - wind_up * load_n).filter(|ahead| !ahead.is_nan())
+        let explained_m = wind_up * load_n + delay * speed_m[i];
+        Some(position_m[i] - evidence.other_m[i] - explained_m).filter(|ahead| !ahead.is_nan())
     };
     let (mut recent, mut excluded) = (Vec::with_capacity(2 * COMPARED), 0);
     for run in runs {
@@ -116,28 +118,47 @@ fn held(load_n: &[f64]) -> Vec<f64> {
     load_n.iter().scan(f64::NAN, hold).collect()
 }
 
-/// How far the position runs ahead of the other one for a newton of load: the least-squares slope within the runs, each of
-/// which has an offset of its own (as its turns are not known yet).
-fn wind_up_m_per_n(
-    position_m: &[f64],
-    other_m: &[f64],
-    load_n: &[f64],
-    runs: &[Range<usize>],
-) -> Option<f64> {
-    let (mut of_load, mut of_both) = (0.0, 0.0);
-    for run in runs {
-        let pairs = || {
-            let pair = |i: usize| (load_n[i], position_m[i] - other_m[i]);
-            run.clone().map(pair).filter(|(load_n, ahead_m)| !load_n.is_nan() && !ahead_m.is_nan())
-        };
-        let (loads, aheads, count) =
-            pairs().fold((0.0, 0.0, 0.0), |(loads, aheads, n), (l, a)| (loads + l, aheads + a, n + 1.0));
-        for (l, a) in pairs() {
-            of_load += (l - loads / count) * (l - loads / count);
-            of_both += (l - loads / count) * (a - aheads / count);
+/// Motion of a position at each sample, m to the next one; 0 where it is not known.
+fn speeds(position_m: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+    let mut speed_m = vec![0.0; position_m.len()];
+    for segment in segments {
+        let at = |i: usize| if segment.contains(&i) { position_m[i] } else { f64::NAN };
+        for i in segment.clone() {
+            let (before, here, after) = (at(i.wrapping_sub(1)), at(i), at(i + 1));
+            let steps = [0.5 * (after - before), after - here, here - before];
+            speed_m[i] = steps.into_iter().find(|step| !step.is_nan()).unwrap_or(0.0);
         }
     }
-    (of_load > 0.0).then(|| of_both / of_load)
+    speed_m
+}
+
+/// How far the position runs ahead of the other one for a newton of load (wind-up) and for a sample of delay of the other
+/// one: the least-squares slopes within the runs, each of which has an offset of its own (as its turns are not known yet).
+fn lag_of_load_and_speed(
+    position_m: &[f64],
+    other_m: &[f64],
+    [load_n, speed_m]: [&[f64]; 2],
+    runs: &[Range<usize>],
+) -> [f64; 2] {
+    // Sums of products within the runs, of load and speed with each other and with the lead.
+    let (mut ff, mut fv, mut vv, mut fa, mut va) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for run in runs.iter().filter(|run| run.len() > 2) {
+        let rows = || {
+            let row = |i: usize| [load_n[i], speed_m[i], position_m[i] - other_m[i]];
+            (run.start + 1..run.end - 1).map(row).filter(|row| row.iter().all(|v| !v.is_nan()))
+        };
+        let count = rows().count() as f64;
+        let means: [f64; 3] = std::array::from_fn(|k| rows().map(|row| row[k]).sum::<f64>() / count);
+        for row in rows() {
+            let [f, v, a] = std::array::from_fn(|k| row[k] - means[k]);
+            (ff, fv, vv, fa, va) = (ff + f * f, fv + f * v, vv + v * v, fa + f * a, va + v * a);
+        }
+    }
+    let determinant = ff * vv - fv * fv;
+    if determinant > 1e-3 * ff * vv {
+        return [(vv * fa - fv * va) / determinant, (ff * va - fv * fa) / determinant];
+    }
+    [if ff > 0.0 { fa / ff } else { 0.0 }, 0.0]
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -176,7 +197,10 @@ mod tests {
         ) {
             let truth: Vec<f64> = (0..1000).map(|k| 0.05 * (speed * f64::from(k) * 0.004).sin()).collect();
             let load: Vec<f64> = (0..1000).map(|k| 8e3 * (f64::from(k) * 0.07).sin()).collect();
-            let other: Vec<f64> = truth.iter().zip(&load).map(|(x, f)| x + 2e-4 * f.signum() + f / 1e7).collect();
+            // A sample and a half late, apart by a gap, and wound up by the load.
+            let late = |k: u32| 0.05 * (speed * (f64::from(k) - 1.5) * 0.004).sin();
+            let other: Vec<f64> =
+                (0..).zip(&load).map(|(k, f)| late(k) + 2e-4 * f.signum() + f / 1e7).collect();
             let mut found: Vec<f64> = truth.iter().map(|x| x.rem_euclid(0.005)).collect();
             for (start, length) in holes {
                 found[start..(start + length).min(1000)].fill(f64::NAN);

@@ -218,7 +218,7 @@ impl Slots {
 
     /// Sorts the rows of a batch by slot.
     fn assign(&mut self, columns: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        let mut combined = vec![0_u32; arrays.first().map_or(0, |array| array.len())];
+        let mut combined = vec![0_u32; arrays.first().map_or(0, Array::len)];
         for (k, (column, array)) in columns.iter().zip(arrays).enumerate() {
             let of_column = self.texts[k].len() as u32;
             let enter = |(at, number): (&mut u32, u32)| {

@@ -1,9 +1,6 @@
 //! Scale, offset and unit of a column in the metadata of its Arrow field, as pyarrow and others write them.
 
 use arrow::datatypes::Field;
-use serde::Deserialize;
-use serde::de::IntoDeserializer;
-use serde::de::value::{Error, StrDeserializer};
 
 use crate::error::ErrorKind;
 use crate::mapping::ChannelMapping;
@@ -29,14 +26,10 @@ impl FieldMetadata {
             |keys: [&str; 2]| keys.iter().find_map(|key| field.metadata().get(*key)).map(|text| text.trim());
         let number =
             |keys| text(keys).and_then(|text| text.parse().ok()).filter(|number: &f64| number.is_finite());
-        let unit = |text: &str| {
-            let text: StrDeserializer<'_, Error> = text.into_deserializer();
-            Unit::deserialize(text).ok()
-        };
         Self {
             scale: number(["scale", "scale_factor"]).filter(|scale| *scale != 0.0).unwrap_or(1.0),
             offset: number(["offset", "add_offset"]).unwrap_or(0.0),
-            unit: text(["unit", "units"]).and_then(unit),
+            unit: text(["unit", "units"]).and_then(Unit::from_symbol),
         }
     }
 

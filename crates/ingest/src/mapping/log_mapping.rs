@@ -18,7 +18,7 @@ pub struct Mapping {
     /// Its channels.
     pub channels: Channels,
     /// How its rows are laid out.
-    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
     /// Files of other kinds that belong to the same flight, by the name that channels call them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -41,12 +41,6 @@ pub struct Layout {
     pub position_column: Option<String>,
 }
 
-impl Layout {
-    fn is_wide(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 /// Another kind of file. Identity that it does not hold is shared with the main logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -57,7 +51,7 @@ pub struct GroupMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockMapping>,
     /// Its layout; a row for each sample of every channel when not given.
-    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
     /// How its flight is identified; as for the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -154,7 +148,7 @@ pub struct ClockMapping {
     pub unit: Option<TimeUnit>,
     /// What a column of numbers counts from: nothing that is known, 1970 UTC, midnight of the day of departure, or the
     /// beginning of 1900 as spreadsheets have it (1899-12-30, local time).
-    #[serde(default, skip_serializing_if = "Epoch::is_none")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero, e.g. 65536.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -172,7 +166,7 @@ pub struct ClockMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_gap_s: Option<f64>,
     /// Whether a log whose clock falls further is taken as several recordings, one after the other.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub split_at_jumps: bool,
 }
 
@@ -191,13 +185,6 @@ pub enum Epoch {
     Excel,
 }
 
-impl Epoch {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-    fn is_none(&self) -> bool {
-        *self == Self::None
-    }
-}
-
 /// The channels of an actuator.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -214,7 +201,7 @@ pub struct Channels {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_position: Option<ChannelMapping>,
     /// Whether the output moves: `moving` (default), or `locked` where it is fixed and the screw position is constant.
-    #[serde(default, skip_serializing_if = "Output::is_moving")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub output: Output,
     /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
     pub load: ChannelMapping,
@@ -314,7 +301,7 @@ pub struct ChannelMapping {
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f64,
     /// See `scale`.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub offset: f64,
     /// The raw value at which a turning sensor starts again, e.g. 360 in degrees: it is unwrapped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -338,7 +325,7 @@ pub struct ChannelMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid_bits: Option<u64>,
     /// Whether scale, offset and unit in the Arrow metadata of the column are ignored.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub ignore_metadata: bool,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -350,10 +337,10 @@ pub struct ChannelMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// How long after the stamp of its row the channel is sampled, s.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub instant_s: f64,
     /// How late the channel is recorded, s: logged(t) = true(t − latency).
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub latency_s: f64,
     /// Redundant channels to be taken, in this order, where this one does not live.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -450,9 +437,8 @@ fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]

@@ -6,6 +6,8 @@
 use std::f64::consts::{PI, TAU};
 
 use schemars::JsonSchema;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error, StrDeserializer};
 use serde::{Deserialize, Serialize};
 
 /// One pound-force, N.
@@ -98,6 +100,12 @@ pub enum Unit {
 }
 
 impl Unit {
+    /// The unit of a symbol, as configuration spells it.
+    pub(crate) fn from_symbol(symbol: &str) -> Option<Self> {
+        let symbol: StrDeserializer<'_, Error> = symbol.into_deserializer();
+        Self::deserialize(symbol).ok()
+    }
+
     /// Name in the configuration, what it measures, and factor and offset of `SI = value · factor + offset`.
     const fn entry(self) -> (&'static str, Dimension, f64, f64) {
         use Dimension::{Angle, Force, Length, Temperature, Torque};

@@ -8,10 +8,9 @@ use arrow::array::{
 };
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Log, LogFiles, Mapping, RawValue};
-use records::Position;
+use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Mapping, RawValue};
 
-use crate::layouts::{channel, mapping, write};
+use crate::layouts::{self, channel, opened, place, plain, write};
 
 const STEP_S: f64 = 0.01;
 const ROWS: usize = 1000;
@@ -33,21 +32,14 @@ fn screw(t: f64) -> f64 {
     motor(t) + 5e-5 * (1.3 * t).cos()
 }
 
-fn plain() -> Mapping {
-    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
-}
-
 fn columns() -> Vec<(&'static str, ArrayRef)> {
     vec![("t", reals(|t| t)), ("m", reals(motor)), ("s", reals(screw)), ("f", reals(|t| 1e3 * t.cos()))]
 }
 
 fn read(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<ActuatorChannels, Error> {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     write(&file, columns);
-    let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone()))?;
-    let at = log.actuators(&mapping.channels, Some(&Position::new("a").unwrap()))?;
-    log.read_actuator(&at[0], &mapping.channels, Geometry::Linear { lead_m_per_rev: None })
+    layouts::read(&file, mapping, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn with(
@@ -246,11 +238,10 @@ fn numbers_since_1970_and_text_are_instants() {
     {
         let mut m = plain();
         (m.clock.unit, m.clock.epoch) = (unit, epoch);
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("x.parquet");
+        let (_dir, file) = place("x.parquet");
         let columns = with(columns(), "t", clock);
         write(&file, &columns);
-        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let log = opened(&file, &m);
         assert_eq!(log.start_utc().unwrap().unwrap().to_string(), "2025-11-19T04:13:00.25Z");
         assert!((read(&m, &columns).unwrap().step_s - 0.01).abs() < 1e-9);
     }
