@@ -198,7 +198,7 @@ impl LogFile {
 
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
-        match self.arrow_schema()?.field_with_name(name).ok()?.data_type() {
+        match self.noted_field(name)?.data_type() {
             DataType::Duration(unit) => Some(*unit),
             _ => None,
         }
@@ -206,8 +206,13 @@ impl LogFile {
 
     /// Scale, offset and unit in the metadata of a column.
     pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
-        let field = self.arrow_schema().and_then(|schema| schema.field_with_name(name).ok());
-        field.map_or(FieldMetadata::NONE, FieldMetadata::of)
+        self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
+    }
+
+    /// A column as Arrow's writers note it; found by its place, as a log may have ten thousand columns.
+    fn noted_field(&self, name: &str) -> Option<&Field> {
+        let leaf = self.find(name).filter(|leaf| !leaf.is_field)?;
+        self.arrow_schema()?.fields().get(leaf.root).map(Arc::as_ref)
     }
 
     /// The schema that Arrow's writers note in the footer; none where it is missing or damaged.
