@@ -105,6 +105,9 @@ pub enum ErrorKind {
     /// A log that Freeplay normalized does not fit the settings any more.
     #[error("normalized log was written with other settings: {detail}")]
     Normalized { detail: String },
+    /// The Arrow metadata of a column notes another scale, offset or unit than the mapping.
+    #[error("the file notes {key} {noted} for column `{column}`, and the mapping has {known}")]
+    MetadataContradicts { column: String, key: &'static str, noted: String, known: String },
     /// A column is there, but its type holds no numbers.
     #[error("column `{column}` holds {found}, not {wanted}")]
     ColumnType { column: String, found: String, wanted: &'static str },
@@ -120,6 +123,9 @@ pub enum ErrorKind {
     /// Stamps fall further than allowed.
     #[error("time runs backwards")]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
+    /// The clock pauses for longer than within one flight.
+    #[error("the log seems to hold two flights")]
+    SeveralFlights { column: String, row: u64, before_s: f64, after_s: f64, end_s: f64, max_gap_s: f64 },
     /// The timestamps give another rate than the declared one.
     #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
@@ -174,6 +180,7 @@ impl ErrorKind {
             Self::Decode { .. } => "decode_failed",
             Self::RowCount { .. } => "row_count_differs",
             Self::ColumnMissing { .. } => "column_missing",
+            Self::MetadataContradicts { .. } => "metadata_contradicts",
             Self::ColumnType { .. } => "column_type",
             Self::GroupMissing { .. } => "group_missing",
             Self::ListLengths { .. } => "list_lengths",
@@ -183,6 +190,7 @@ impl ErrorKind {
             Self::TimeUnit { .. } => "time_unit_unknown",
             Self::NoClock => "no_clock",
             Self::TimeGoesBack { .. } => "time_goes_back",
+            Self::SeveralFlights { .. } => "several_flights",
             Self::RateContradicts { .. } => "rate_contradicts",
             Self::TimeImplausible { .. } => "time_implausible",
             Self::TimeStandsStill { .. } => "time_stands_still",
@@ -215,6 +223,7 @@ impl ErrorKind {
             | Self::ColumnMissing { column, .. }
             | Self::TableColumn { column, .. }
             | Self::ColumnType { column, .. }
+            | Self::MetadataContradicts { column, .. }
             | Self::TimeUnit { column, .. }
             | Self::RateContradicts { column, .. }
             | Self::TimeImplausible { column, .. }
@@ -223,7 +232,9 @@ impl ErrorKind {
             | Self::ListLengths { column, .. }
             | Self::ClocksDiffer { column, .. }
             | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
-            Self::TimeGoesBack { column, row, .. } | Self::IdentityChanges { column, row, .. } => {
+            Self::TimeGoesBack { column, row, .. }
+            | Self::SeveralFlights { column, row, .. }
+            | Self::IdentityChanges { column, row, .. } => {
                 c.column = Some(column.clone());
                 c.row = Some(*row);
             }
@@ -242,8 +253,14 @@ impl ErrorKind {
             Self::TimeGoesBack { before_s, after_s, times, .. } => {
                 Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"))
             }
+            Self::SeveralFlights { before_s, after_s, end_s, .. } => Some(format!(
+                "samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"
+            )),
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
+            Self::MetadataContradicts { key, noted, .. } => {
+                Some(format!("`{key}` = {noted} in the Arrow metadata"))
+            }
             Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", join_places(looked))),
             Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
             _ => None,
@@ -255,29 +272,70 @@ impl ErrorKind {
             Self::TimeGoesBack { max_back_s, .. } => {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
             }
+            Self::SeveralFlights { max_gap_s, .. } => {
+                Some(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)"))
+            }
             Self::TimeImplausible { least_s, most_s, .. } => Some(format!("{least_s:e} to {most_s:e} s")),
             Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
             Self::TimeUnit { .. } => {
                 Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`".into())
             }
+            Self::MetadataContradicts { key, known, .. } => Some(format!("`{key}` = {known}")),
             Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
             _ => None,
         }
     }
 
     fn remedy(&self) -> String {
-        let text = match self {
-            Self::Unreadable { source } => return missing_remedy(source),
-            Self::Object(source) => return source.remedy().into(),
+        self.named_remedy().unwrap_or_else(|| self.usual_remedy().into())
+    }
+
+    /// A remedy that names a key, a column or a value of this log.
+    fn named_remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Unreadable { source } => missing_remedy(source),
+            Self::Object(source) => source.remedy().into(),
+            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
+                format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits")
+            }
+            Self::ColumnMissing { column, nearest: Some(near) } => match hidden_difference(column, near) {
+                Some(characters) => format!("`{near}`? {characters}"),
+                None => format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`"),
+            },
+            Self::TableColumn { nearest: Some(near), .. } => {
+                format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
+            }
+            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
+                format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
+            }
+            Self::MetadataContradicts { key, noted, .. } => format!(
+                "set `{key}` of the channel to {noted}; if the file is wrong, set its `ignore_metadata = true`"
+            ),
+            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
+                format!("the placeholder of the position is {PLACEHOLDER}")
+            }
+            Self::NoPosition { pattern, columns } => {
+                let near = closest_to_pattern(pattern, columns)?;
+                let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
+                let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
+                format!(
+                    "closest column: `{near}`.{hidden} Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
+                )
+            }
+            _ => return None,
+        })
+    }
+
+    fn usual_remedy(&self) -> &'static str {
+        match self {
+            // Each of these names its own remedy.
+            Self::Unreadable { .. } | Self::Object(_) | Self::MetadataContradicts { .. } => "",
             Self::Empty => "file is empty; delete it or ignore it. It is skipped until it changes",
             Self::NotParquet { .. } => {
                 "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`"
             }
             Self::ForeignFormat { .. } => {
                 "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
-            }
-            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
-                return format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits");
             }
             Self::BeyondLimit(_) => {
                 "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
@@ -294,22 +352,12 @@ impl ErrorKind {
             Self::Decode { .. } | Self::RowCount { .. } => {
                 "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`"
             }
-            Self::ColumnMissing { column, nearest: Some(near) } => {
-                if let Some(characters) = hidden_difference(column, near) {
-                    return format!("`{near}`? {characters}");
-                }
-                return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
-            }
-            Self::TableColumn { nearest: Some(near), .. } => {
-                return format!("`{near}`? A table may call its columns otherwise: see `[columns]`");
-            }
             Self::TableColumn { has_semicolons: true, .. } => {
                 "the fields are separated by `;`: save the table with commas, and numbers with a point"
             }
             Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
-            Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
-            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
-                return format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)");
+            Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
+                "names are mapped under `[channel]`, `[clock]` and `[identity]`"
             }
             Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
             Self::GroupMissing { .. } => {
@@ -322,22 +370,13 @@ impl ErrorKind {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
             Self::Normalized { .. } => "write it again from the recorded log: `freeplay normalize`",
-            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
-                return format!("the placeholder of the position is {PLACEHOLDER}");
-            }
-            Self::NoPosition { pattern, columns } => {
-                let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
-                return match meant.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                    Some((_, near)) => format!(
-                        "closest column: `{near}`. Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
-                    ),
-                    None => "names are mapped under `[channel]`".into(),
-                };
-            }
             Self::TimeUnit { .. } => "set `clock.unit` to s, ms, us or ns",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
                 "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
+            }
+            Self::SeveralFlights { .. } => {
+                "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`"
             }
             Self::RateContradicts { .. } => {
                 "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"
@@ -362,9 +401,24 @@ impl ErrorKind {
                 "write decimals with a point, such as 1168.5"
             }
             Self::Table { .. } => "columns and formats are in docs/configuration.md",
-        };
-        text.into()
+        }
     }
+}
+
+/// The column that shares the longest beginning and end with a pattern, and of those the most similar one.
+fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c String> {
+    let (before, after) = pattern.split_once(PLACEHOLDER).unwrap_or((pattern, ""));
+    let common = |(a, b): &(char, char)| a == b;
+    let shared = |column: &str| {
+        let start = before.chars().zip(column.chars()).take_while(common).count();
+        start + after.chars().rev().zip(column.chars().rev()).take_while(common).count()
+    };
+    let score = |column: &str| (shared(column), strsim::jaro_winkler(pattern, column));
+    let by_score = |a: &&String, b: &&String| {
+        let (a, b) = (score(a), score(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    columns.iter().max_by(by_score)
 }
 
 /// Message of the operating system, reworded for the two most common cases.
@@ -406,7 +460,7 @@ fn hidden_difference(wanted: &str, found: &str) -> Option<String> {
         name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect()
     };
     let (a, b) = (looks(wanted), looks(found));
-    let is_alike = a == b || strsim::levenshtein(&a, &b) <= 2;
+    let is_alike = b.contains(&a) || strsim::levenshtein(&a, &b) <= 2;
     let has_hidden = [wanted, found].iter().any(|name| !name.is_ascii() || name.contains(char::is_control));
     (is_alike && has_hidden && points(wanted) != points(found)).then(|| {
         format!(

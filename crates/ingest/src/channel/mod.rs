@@ -3,6 +3,8 @@
 pub(crate) mod buffer_pool;
 pub(crate) mod column_builder;
 pub mod noise_floor;
+pub mod position_ratio;
 pub mod quality;
 pub mod si_conversion;
 pub(crate) mod stats;
+pub(crate) mod turns;

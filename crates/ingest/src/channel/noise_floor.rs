@@ -6,6 +6,8 @@
 //! blocks below two of its χ² quantiles have the ratio that white noise gives (Wilson and Hilferty 1931,
 //! <https://doi.org/10.1073/pnas.17.12.684>), whatever the share of quiet blocks.
 
+use crate::channel::stats::range;
+
 /// White noise of a channel and its uncertainty, in the channel's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WhiteNoise {
@@ -83,15 +85,18 @@ struct Level {
 fn own_samples(values: &[f64]) -> Option<Vec<f64>> {
     const MAX_INTERVAL: usize = 20;
     const MOST: f64 = 0.95;
+    /// Changes that show the interval: the first ones.
+    const MAX_CHANGES: usize = 4096;
     let missing = values.iter().filter(|v| v.is_nan()).count();
     if 5 * missing >= 2 * values.len() {
         return Some(values.iter().copied().filter(|v| !v.is_nan()).collect());
     }
-    let changes: Vec<usize> =
-        (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits()).collect();
-    if 3 * changes.len() > 2 * values.len() || changes.len() < MIN_BLOCKS {
+    let changes = || (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits());
+    let count = changes().count();
+    if 3 * count > 2 * values.len() || count < MIN_BLOCKS {
         return None;
     }
+    let changes: Vec<usize> = changes().take(MAX_CHANGES).collect();
     let at_one_phase = |every: usize| {
         let mut counts = vec![0_usize; every];
         changes.iter().for_each(|i| counts[i % every] += 1);
@@ -109,7 +114,7 @@ fn block_variances(values: &[f64], step: f64, most_blocks: usize) -> [Vec<f64>; 
     let stride = (BLOCK / 2) * count.div_ceil(most_blocks);
     for start in (0..(values.len() + 1).saturating_sub(BLOCK)).step_by(stride) {
         let about = &values[start.saturating_sub(MARGIN)..values.len().min(start + BLOCK + MARGIN)];
-        if step > 0.0 && span(about) < MIN_STEPS * step {
+        if step > 0.0 && range(about) < MIN_STEPS * step {
             continue;
         }
         let mut differences: [f64; BLOCK] = std::array::from_fn(|k| values[start + k]);
@@ -128,14 +133,6 @@ fn block_variances(values: &[f64], step: f64, most_blocks: usize) -> [Vec<f64>; 
         }
     }
     found
-}
-
-fn span(values: &[f64]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .filter(|v| !v.is_nan())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-    high - low
 }
 
 /// The smallest σ at which the counts of blocks below its two quantiles have the ratio that noise gives.

@@ -1,4 +1,4 @@
-//! Conversion of raw readings to SI at the screw axis: a linear map, and unwrapping of resolver angles.
+//! Conversion of raw readings to SI at the screw axis: a linear map.
 
 use multiversion::multiversion;
 
@@ -53,6 +53,16 @@ impl SiConversion {
     pub(crate) fn apply(self, raw: f64) -> f64 {
         let value = (raw * self.scale + self.offset) * self.factor + self.shift;
         if value.is_finite() { value } else { f64::NAN }
+    }
+
+    /// The same, of raw readings on another line: `unit = raw · scale + offset`.
+    pub(crate) fn with_line(self, scale: f64, offset: f64) -> Self {
+        Self { scale, offset, ..self }
+    }
+
+    /// Length of a stretch of raw readings, m.
+    pub(crate) fn length(self, raw: f64) -> f64 {
+        (raw * self.scale * self.factor).abs()
     }
 
     /// As [`SiConversion::apply`], in place.
@@ -111,23 +121,8 @@ fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
     }
 }
 
-/// Adds or takes turns so that no step exceeds half a turn; missing and infinite samples are passed over.
-pub(crate) fn unwrap_turns(values: &mut [f64], turn: f64) {
-    let (mut turns, mut before) = (0.0, f64::NAN);
-    for value in values.iter_mut().filter(|v| v.is_finite()) {
-        let raw = *value;
-        if !f64::is_nan(before) {
-            turns -= ((raw - before) / turn).round();
-        }
-        before = raw;
-        *value = raw + turns * turn;
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     /// By hand: a 5 mm lead turns 0.1 N·m into 0.1·2π/0.005 = 125.66 N, and 90° into 1.25 mm.
@@ -145,22 +140,5 @@ mod tests {
         let fault =
             to_si("x", &ChannelMapping::default(), Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
         assert!(matches!(fault, ErrorKind::UnitForPart { unit: "m", .. }));
-    }
-
-    proptest! {
-        /// Wrapping loses only whole turns, and a resolver never moves half a turn in a sample.
-        #[test]
-        fn an_unwrapped_resolver_differs_from_the_truth_by_whole_turns(
-            steps in proptest::collection::vec(-170.0_f64..170.0, 1..200), start in 0.0_f64..360.0,
-        ) {
-            let truth: Vec<f64> = steps.iter().scan(start, |x, s| { *x += s; Some(*x) }).collect();
-            let mut values: Vec<f64> = truth.iter().map(|x| x.rem_euclid(360.0)).collect();
-            unwrap_turns(&mut values, 360.0);
-            let offset = values[0] - truth[0];
-            prop_assert!((offset / 360.0 - (offset / 360.0).round()).abs() < 1e-9);
-            for (v, t) in values.iter().zip(&truth) {
-                prop_assert!((v - t - offset).abs() < 1e-7);
-            }
-        }
     }
 }

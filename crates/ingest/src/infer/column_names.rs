@@ -56,27 +56,18 @@ const ROLES: [(Role, &[&str]); 4] = [
 /// Words without information.
 const FILLERS: [&str; 8] = ["position", "pos", "angle", "displacement", "cell", "sensor", "meas", "value"];
 
+/// The unit that a word in small letters is.
 fn unit_of(word: &str) -> Option<Unit> {
-    let known = [
-        ("mm", Unit::Millimetre),
-        ("um", Unit::Micrometre),
-        ("m", Unit::Metre),
-        ("in", Unit::Inch),
-        ("inch", Unit::Inch),
-        ("deg", Unit::Degree),
-        ("rad", Unit::Radian),
-        ("rev", Unit::Revolution),
-        ("n", Unit::Newton),
-        ("kn", Unit::Kilonewton),
-        ("dan", Unit::Decanewton),
-        ("lbf", Unit::PoundForce),
-        ("nm", Unit::NewtonMetre),
-        ("degc", Unit::Celsius),
-        ("degf", Unit::Fahrenheit),
-        ("c", Unit::Celsius),
-        ("k", Unit::Kelvin),
-    ];
-    known.iter().find(|(said, _)| *said == word).map(|(_, unit)| *unit)
+    Unit::from_symbol(match word {
+        "n" => "N",
+        "kn" => "kN",
+        "dan" => "daN",
+        "nm" => "N.m",
+        "degc" | "c" => "degC",
+        "degf" => "degF",
+        "k" => "K",
+        other => other,
+    })
 }
 
 /// Whether a text is the symbol of a unit.

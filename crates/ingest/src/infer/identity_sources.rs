@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use percent_encoding::percent_decode_str;
-
+use crate::log::identity::hive_folders;
 use crate::mapping::IdentityField;
 
 /// Names by which a fact goes, in small letters.
@@ -68,24 +67,18 @@ pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str
 
 /// Folders called `name=value` whose names sound like facts.
 pub(super) fn folders(path: &Path) -> BTreeMap<IdentityField, String> {
-    let parts = path.parent().into_iter().flat_map(Path::components);
-    let named = parts.filter_map(|part| part.as_os_str().to_str()?.split_once('='));
-    let mut found = BTreeMap::new();
-    for (name, value) in named {
-        let value = percent_decode_str(value).decode_utf8_lossy();
-        let is_instant =
-            value.parse::<jiff::Timestamp>().is_ok() || value.parse::<jiff::civil::DateTime>().is_ok();
-        let fact = if is_instant { Some(IdentityField::DepartureUtc) } else { fact_of(name) };
-        found.extend(fact.map(|fact| (fact, name.to_owned())));
-    }
-    found
+    let is_instant = |value: &str| {
+        value.parse::<jiff::Timestamp>().is_ok() || value.parse::<jiff::civil::DateTime>().is_ok()
+    };
+    let fact = |name: &str, value: &str| {
+        if is_instant(value) { Some(IdentityField::DepartureUtc) } else { fact_of(name) }
+    };
+    hive_folders(path).filter_map(|(name, value)| Some((fact(name, &value)?, name.to_owned()))).collect()
 }
 
-/// The value of a folder called `name=value`.
+/// The value of the innermost folder called `name=value`.
 pub fn folder_value(path: &Path, name: &str) -> Option<String> {
-    let parts = path.parent()?.components().filter_map(|part| part.as_os_str().to_str()?.split_once('='));
-    let (_, value) = parts.rev().find(|(own, _)| *own == name)?;
-    Some(percent_decode_str(value).decode_utf8_lossy().into_owned())
+    hive_folders(path).filter(|(own, _)| *own == name).last().map(|(_, value)| value)
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.

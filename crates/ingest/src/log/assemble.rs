@@ -1,12 +1,16 @@
 //! An actuator's channels from the raw ones: quality, frozen samples, relative position, held load.
 
+use std::ops::Range;
+
 use records::Position;
 
 use crate::channel::quality::{self, Quality};
 use crate::channel::stats::{ChannelStats, MinMax};
+use crate::channel::turns::{TurnEvidence, restore_turns};
 use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
+use crate::mapping::Role;
 use crate::time::clock::TimeBase;
 use crate::time::slow_channel::join_samples;
 use crate::time::zero_order_hold::{non_empty_segments, zero_order_hold};
@@ -30,8 +34,12 @@ pub(crate) fn assemble(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> ActuatorChannels {
-    let RawChannels { motor, screw, load, is_relative, output_locked, selection } = read;
+    let RawChannels { mut motor, mut screw, load, is_relative, output_locked, selection } = read;
     let SampleSelection { segments, apart, .. } = selection;
+    if !is_relative {
+        flags.extend(restored(Role::Motor, &mut motor, &screw, &load, &segments));
+        flags.extend(restored(Role::Screw, &mut screw, &motor, &load, &segments));
+    }
     let quality = [&motor, &screw, &load].map(|read| {
         let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
         Quality::seen((&read.values, &segments), &seen, line.step_s, apart)
@@ -72,6 +80,22 @@ pub(crate) fn assemble(
         flags,
         repairs: line.repairs,
     }
+}
+
+/// Restores the turns of a wrapped position by the other one; returns a flag where some samples stay unclear.
+fn restored(
+    role: Role,
+    own: &mut Channel,
+    other: &Channel,
+    load: &Channel,
+    segments: &[Range<usize>],
+) -> Option<String> {
+    let turn_m = own.turn_m?;
+    let mut other_m = other.values.clone();
+    join_samples(&mut other_m, segments);
+    let evidence = TurnEvidence { turn_m, other_m: &other_m, load_n: &load.values, segments };
+    let unclear = restore_turns(&mut own.values, evidence);
+    (unclear > 0).then(|| format!("{}_turns_unclear", role.as_str()))
 }
 
 /// Makes δX of the screw's position, or leaves it where it is one already; NaN where the motor's is missing. Returns its

@@ -6,8 +6,9 @@
 use std::borrow::Cow;
 
 use crate::channel::buffer_pool;
-use crate::channel::si_conversion::{Geometry, to_si, unwrap_turns};
+use crate::channel::si_conversion::{Geometry, to_si};
 use crate::channel::stats::ChannelStats;
+use crate::channel::turns::unwrap_turns;
 use crate::error::{Error, ErrorKind};
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::ColumnPattern;
@@ -28,16 +29,19 @@ pub(crate) fn lives(values: &[f64], apart: usize) -> bool {
     present().take(needed).count() == needed && present().any(|v| Some(v) != first)
 }
 
-/// A channel in SI, and what was seen of it while it was read, where it is still as it was then.
+/// A channel in SI.
 #[derive(Debug)]
 pub(crate) struct Channel {
     pub(crate) values: Vec<f64>,
+    /// Statistics gathered while the channel was decoded; `None` if the values changed since.
     pub(crate) seen: Option<ChannelStats>,
+    /// One turn of a wrapped sensor, m at the screw.
+    pub(crate) turn_m: Option<f64>,
 }
 
 impl From<Vec<f64>> for Channel {
     fn from(values: Vec<f64>) -> Self {
-        Self { values, seen: None }
+        Self { values, seen: None, turn_m: None }
     }
 }
 
@@ -124,6 +128,23 @@ impl<'s> ChannelSampling<'s> {
             && self.time_column == other.time_column
     }
 
+    /// Whether its rows hold lists of another length than those of another channel, which `error` found: its samples have
+    /// instants of their own, which begin with the stamp of the row.
+    ///
+    /// # Errors
+    /// [`ErrorKind::ListLengths`] where only the rate of the rows is declared, which is that of one of them.
+    fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
+        let own = &self.samples.leaf;
+        if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.sheet.is_listed(own) {
+            return Ok(false);
+        }
+        if self.time_column.is_some() || self.sheet.clock.column.is_some() {
+            return Ok(true);
+        }
+        let (column, other) = (own.clone(), other.samples.leaf.clone());
+        Err(self.sheet.error(ErrorKind::ListLengths { column, other }))
+    }
+
     fn is_apart(&self) -> bool {
         self.time_column.is_some() || self.sheet.layout.name_column.is_some()
     }
@@ -192,7 +213,11 @@ impl<'s> ChannelSampling<'s> {
         geometry: Geometry,
         wanted: RowSelection<'_>,
     ) -> Result<Channel, Error> {
-        let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        let mut si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        if !map.ignore_metadata && self.sheet.layout.name_column.is_none() {
+            let (scale, offset) = self.sheet.scale_and_offset(&self.samples.leaf, map)?;
+            si = si.with_line(scale, offset);
+        }
         let kept = |values: Vec<f64>| match &self.line.kept {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
             None => values,
@@ -205,7 +230,7 @@ impl<'s> ChannelSampling<'s> {
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = seen.filter(|_| self.line.kept.is_none());
-            return Ok(Channel { values: kept(values), seen });
+            return Ok(Channel { values: kept(values), seen, turn_m: None });
         }
         let read =
             if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
@@ -215,21 +240,31 @@ impl<'s> ChannelSampling<'s> {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let texts = RawValue::texts(&map.valid_values);
-            let marks =
-                if texts.is_empty() { self.raw(valid)? } else { self.sheet.matches(valid, &texts)? };
+            let marks = self.valid_marks(valid, map)?;
             self.same_count(marks.len(), &valid.leaf)?;
-            let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
-            let bad = |mark: &f64| {
-                if texts.is_empty() { !is_valid(*mark) } else { !RawValue::Truth(true).is(*mark) }
-            };
-            values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
+            let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
+            values.iter_mut().zip(kept(marks)).filter(|(_, m)| is_bad(*m)).for_each(|(v, _)| *v = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);
         }
         si.apply_to_all(&mut values);
-        Ok(values.into())
+        Ok(Channel { values, seen: None, turn_m: map.wraps_at.map(|turn| si.length(turn)) })
+    }
+
+    /// 1 where a sample is valid, any other number or NaN where it is not.
+    fn valid_marks(&self, valid: &SampleSelector, map: &ChannelMapping) -> Result<Vec<f64>, Error> {
+        if let Some((set, clear)) = map.status_bits() {
+            return self.sheet.bit_marks(valid, set, clear);
+        }
+        let texts = RawValue::texts(&map.valid_values);
+        if !texts.is_empty() {
+            return self.sheet.matches(valid, &texts);
+        }
+        let mut marks = self.raw(valid)?;
+        let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
+        marks.iter_mut().for_each(|mark| *mark = f64::from(u8::from(is_valid(*mark))));
+        Ok(marks)
     }
 
     fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {
@@ -261,12 +296,9 @@ impl<'s> ChannelSampling<'s> {
         let (_, instants) = self.instants(map)?;
         let (at_s, values) = thinned(&instants, &read.values, self.every);
         let step_s = self.line.step_s * self.every as f64;
-        Ok(interpolate_at(
-            TimeSeries { at_s: &at_s, values: &values, step_s },
-            &instants,
-            Interpolation::Line,
-        )
-        .into())
+        let own = TimeSeries { at_s: &at_s, values: &values, step_s };
+        let values = interpolate_at(own, &instants, Interpolation::Line);
+        Ok(Channel { values, seen: None, ..read })
     }
 }
 
@@ -305,10 +337,16 @@ pub(crate) fn follow(
     own.line = if shared { master.line.clone() } else { own.line_of(map)? };
     own.every = own.rows_between(map);
     let is_slow_load = role == Role::Load && own.every > 1;
-    if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
-        return own.readings(map, geometry, wanted);
-    }
-    let Channel { values, .. } = own.readings(map, geometry, RowSelection::ALL)?;
+    let is_direct = shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load);
+    let read = own.readings(map, geometry, if is_direct { wanted } else { RowSelection::ALL });
+    let Channel { values, turn_m, .. } = match read {
+        Ok(read) if is_direct => return Ok(read),
+        Err(error) if shared && own.has_own_list(master, &error)? => {
+            own.line = own.line_of(map)?;
+            own.readings(map, geometry, RowSelection::ALL)?
+        }
+        read => read?,
+    };
     let (stamps, at_s) = own.instants(map)?;
     let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
     let (lead, mut instants) = master.instants(motor)?;
@@ -319,14 +357,11 @@ pub(crate) fn follow(
     let step_s = own.line.step_s * own.every as f64;
     let is_slow = step_s > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
-    Ok(interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between).into())
+    let values = interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between);
+    Ok(Channel { values, seen: None, turn_m })
 }
 
 /// A nanosecond is no shift.
 fn same_instants(a_s: f64, b_s: f64) -> bool {
     (a_s - b_s).abs() < 1e-9
-}
-
-pub(crate) fn duration(seconds: f64) -> jiff::SignedDuration {
-    jiff::SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use jiff::Timestamp;
+use jiff::tz::TimeZone;
 use records::Position;
 
 use crate::channel::si_conversion::Geometry;
@@ -12,7 +13,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
-use crate::log::identity::{self, Identity, IdentityFields};
+use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized::Normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
@@ -152,17 +153,41 @@ impl Log {
             let own = crate::mapping::IdentityMapping::default();
             return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
         }
-        let mut facts = facts(&self.main, &self.mapping.identity)?;
-        let mut found = known(&facts, None);
-        let is_dated = |fields: &IdentityFields| fields.contains_key(&IdentityField::DepartureUtc);
-        let start = if is_dated(&facts) || is_dated(&found) { None } else { self.start_utc()? };
+        let mapping = &self.mapping.identity;
+        let fail = |fault| self.main.error(fault);
+        let mut facts = facts(&self.main, mapping)?;
+        let date =
+            facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
+        if date.is_some() {
+            // A day has several flights: the time comes from the flights table, or from the clock.
+            facts.remove(&IdentityField::DepartureUtc);
+        }
+        let fill = |facts: &mut IdentityFields, found: IdentityFields| {
+            for (fact, text) in found {
+                facts.entry(fact).or_insert(text);
+            }
+        };
+        // Of several flights of one id, the one near noon of the date is that of the date.
+        let noon = date.and_then(|date| date.at(12, 0, 0, 0).to_zoned(TimeZone::UTC).ok());
+        let found = known(&facts, noon.map(|noon| noon.timestamp()));
+        fill(&mut facts, found);
+        if facts.contains_key(&IdentityField::DepartureUtc) {
+            return identity::read(&facts, mapping, None).map_err(fail);
+        }
+        let clock = self.clock_span()?;
+        let absolute = clock.and_then(|clock| clock.start(mapping)).transpose().map_err(fail)?;
+        let start = match (date, facts.get(&IdentityField::LandingUtc)) {
+            (Some(date), _) => Some(identity::departure_on(date, absolute, clock, mapping).map_err(fail)?),
+            (None, Some(landing)) if absolute.is_none() => {
+                Some(identity::departure_before(landing, &facts, clock, mapping).map_err(fail)?)
+            }
+            _ => absolute,
+        };
         if start.is_some() {
-            found = known(&facts, start);
+            let found = known(&facts, start);
+            fill(&mut facts, found);
         }
-        for (fact, text) in found {
-            facts.entry(fact).or_insert(text);
-        }
-        identity::read(&facts, &self.mapping.identity, start).map_err(|f| self.main.error(f))
+        identity::read(&facts, mapping, start).map_err(fail)
     }
 
     /// The first instant of an absolute clock.
@@ -170,23 +195,23 @@ impl Log {
     /// # Errors
     /// When the time column cannot be read.
     pub fn start_utc(&self) -> Result<Option<Timestamp>, Error> {
-        let Some(column) = &self.main.clock.column else { return Ok(None) };
-        if !self.main.files[0].has(column) {
+        let start = self.clock_span()?.and_then(|clock| clock.start(&self.mapping.identity));
+        start.transpose().map_err(|fault| self.main.error(fault))
+    }
+
+    /// The earliest and the latest stamp of the log, if it has a time column.
+    fn clock_span(&self) -> Result<Option<ClockSpan>, Error> {
+        let Some(column) = self.main.clock.column.as_ref().filter(|column| self.main.files[0].has(column))
+        else {
             return Ok(None);
-        }
+        };
         let every_row = SampleSelector { leaf: column.clone(), rows: Vec::new() };
         let stamps = self.main.stamps(&every_row, None)?;
-        let earliest = stamps.seconds.iter().copied().filter(|s| !s.is_nan()).fold(f64::INFINITY, f64::min);
-        let later = |start: Timestamp| start.checked_add(channel_reader::duration(earliest)).ok();
-        Ok(match stamps.origin {
-            TimeOrigin::Utc(start) => later(start),
-            TimeOrigin::Local(start) => match later(start) {
-                Some(local) => identity::local_to_utc(local, &self.mapping.identity)
-                    .map_err(|fault| self.main.error(fault))?,
-                None => None,
-            },
-            TimeOrigin::Counted(_) | TimeOrigin::Start => None,
-        })
+        let (mut earliest_s, mut latest_s) = (f64::INFINITY, f64::NEG_INFINITY);
+        for s in stamps.seconds.iter().filter(|s| !s.is_nan()) {
+            (earliest_s, latest_s) = (earliest_s.min(*s), latest_s.max(*s));
+        }
+        Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 
     /// The sheet that holds a channel.
@@ -502,30 +527,34 @@ impl Log {
     /// The motor position, whose clock all other channels follow.
     fn motor<'c>(&self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'_, 'c>, Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let mut found: Option<ReferenceChannel<'_, 'c>> = None;
         let choices = self.present_or_lacking(Role::Motor, at, channels)?;
-        let is_only = choices.len() == 1;
-        for (k, (map, name)) in choices.into_iter().enumerate() {
-            let sampling = ChannelSampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
-            let master = (sampling, map);
+        let read = |map: &'c ChannelMapping, name: &str| {
+            let master = (ChannelSampling::new(self.sheet_of(map)?, map, name, at.position.as_str())?, map);
             if !channels.when.is_empty() {
                 // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
                 master.0.check_rows()?;
             }
             let selection = self.selected(sought, &master)?;
             let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
-            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
-            if lives || found.is_none() {
-                let flags = alternative(Role::Motor, k);
-                found = Some(ReferenceChannel { channel: read, master, selection, flags });
-            }
-            if lives {
-                break;
-            }
+            Ok((read, selection.apart, (master, selection)))
+        };
+        let found = first_alive(choices, read)?;
+        let (channel, (master, selection), k) =
+            found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
+        self.not_empty(&channel.values, master.0.column(), &selection)?;
+        self.check_one_flight(&master)?;
+        Ok(ReferenceChannel { channel, master, selection, flags: alternative(Role::Motor, k) })
+    }
+
+    /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
+    fn check_one_flight(&self, (sampling, map): &ReferenceClock<'_, '_>) -> Result<(), Error> {
+        let by_row = [IdentityField::FlightId, IdentityField::DepartureUtc];
+        if by_row.iter().any(|field| self.mapping.identity.columns.contains_key(field)) {
+            return Ok(());
         }
-        let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&lead.channel.values, lead.master.0.column(), &lead.selection)?;
-        Ok(lead)
+        let sheet = self.sheet_of(map)?;
+        let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
+        sampling.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
     }
 
     /// A channel on the motor's clock.
@@ -537,25 +566,14 @@ impl Log {
         selection: &SampleSelection,
     ) -> Result<(Channel, Vec<String>), Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let mut found: Option<(Channel, usize)> = None;
-        let mut column = String::new();
-        let choices = self.present_or_lacking(role, at, channels)?;
-        let is_only = choices.len() == 1;
-        for (k, (map, name)) in choices.into_iter().enumerate() {
+        let read = |map: &ChannelMapping, name: &str| {
             let sheet = self.sheet_of(map)?;
-            let one = FollowerChannel { sheet, map, name: &name, position: at.position.as_str(), role };
+            let one = FollowerChannel { sheet, map, name, position: at.position.as_str(), role };
             let read = channel_reader::follow(&master.0, master.1, &one, geometry, selection.wanted())?;
-            let read = selection.cut(read);
-            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
-            if lives || found.is_none() {
-                column = name;
-                found = Some((read, k));
-            }
-            if lives {
-                break;
-            }
-        }
-        let (read, k) = found.unwrap_or_else(|| (Vec::new().into(), 0));
+            Ok((selection.cut(read), selection.apart, name.to_owned()))
+        };
+        let found = first_alive(self.present_or_lacking(role, at, channels)?, read)?;
+        let (read, column, k) = found.unwrap_or_else(|| (Vec::new().into(), String::new(), 0));
         self.not_empty(&read.values, &column, selection)?;
         Ok((read, alternative(role, k)))
     }
@@ -644,6 +662,27 @@ pub fn companion_identity(
     let layout = settings.map(|g| g.layout.clone()).unwrap_or_default();
     let alone = Mapping { identity, clock, layout, ..Mapping::default() };
     Log::open(&LogFiles::one(path), &Arc::new(alone))?.identity(known)
+}
+
+/// The first of redundant channels that is alive, or the first one; with what was read beside it, and its number. `read`
+/// gives a channel, how many of its samples no filter left, and the rest.
+fn first_alive<'c, T>(
+    choices: Vec<(&'c ChannelMapping, String)>,
+    read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, usize, T), Error>,
+) -> Result<Option<(Channel, T, usize)>, Error> {
+    let is_only = choices.len() == 1;
+    let mut found = None;
+    for (k, (map, name)) in choices.into_iter().enumerate() {
+        let (channel, apart, rest) = read(map, &name)?;
+        let is_alive = is_only || channel_reader::lives(&channel.values, apart);
+        if is_alive || found.is_none() {
+            found = Some((channel, rest, k));
+        }
+        if is_alive {
+            break;
+        }
+    }
+    Ok(found)
 }
 
 fn alternative(role: Role, choice: usize) -> Vec<String> {

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use jiff::tz::{AmbiguousOffset, TimeZone};
-use jiff::{Timestamp, civil};
+use jiff::{SignedDuration, Timestamp, civil};
 use percent_encoding::percent_decode_str;
 use records::{FlightId, Position, TailNumber};
 
 use crate::error::ErrorKind;
 use crate::mapping::{IdentityField, IdentityMapping};
+use crate::time::clock::{DAY_S, TimeOrigin};
 
 /// Identity of the flight of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +27,111 @@ pub struct Identity {
     pub flight_hours: Option<f64>,
     /// The tail's total hours after the flight.
     pub tail_hours_end: Option<f64>,
+}
+
+/// The stamps of a log, from the earliest to the latest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClockSpan {
+    /// What the first stamp means.
+    pub(crate) origin: TimeOrigin,
+    /// Earliest and latest stamp since the first one, s.
+    pub(crate) earliest_s: f64,
+    pub(crate) latest_s: f64,
+}
+
+impl ClockSpan {
+    /// The earliest instant; `None` where the clock has none, or a local one without a mapped zone.
+    ///
+    /// # Errors
+    /// [`ErrorKind::IdentityInvalid`] for a local time that the zone skips or repeats.
+    pub(crate) fn start(&self, mapping: &IdentityMapping) -> Option<Result<Timestamp, ErrorKind>> {
+        match self.origin {
+            TimeOrigin::Utc(first) => Some(Ok(first.checked_add(duration(self.earliest_s)).ok()?)),
+            TimeOrigin::Local(first) => {
+                local_to_utc(first.checked_add(duration(self.earliest_s)).ok()?, mapping).transpose()
+            }
+            TimeOrigin::Counted(_) | TimeOrigin::OfDay(_) | TimeOrigin::Start => None,
+        }
+    }
+}
+
+fn duration(seconds: f64) -> SignedDuration {
+    SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
+}
+
+/// The date of a departure that is written without a time of the day.
+pub(crate) fn date_alone(text: &str, mapping: &IdentityMapping) -> Option<civil::Date> {
+    let text = text.trim();
+    match &mapping.departure_format {
+        Some(format) => {
+            let parsed = jiff::fmt::strtime::parse(format, text).ok()?;
+            let has_time = parsed.hour().is_some() || parsed.to_timestamp().is_ok();
+            if has_time { None } else { parsed.to_date().ok() }
+        }
+        None if text.contains([':', 'T', 't', ' ']) => None,
+        None => text.parse().ok(),
+    }
+}
+
+/// A departure of which the log names the date: by its absolute clock, or by one that counts from midnight.
+///
+/// # Errors
+/// [`ErrorKind::IdentityInvalid`] where the clock lies on another day, or has no time of the day.
+pub(crate) fn departure_on(
+    date: civil::Date,
+    absolute: Option<Timestamp>,
+    clock: Option<ClockSpan>,
+    mapping: &IdentityMapping,
+) -> Result<Timestamp, ErrorKind> {
+    let invalid = |detail: String| ErrorKind::IdentityInvalid {
+        fact: "departure_utc",
+        found: date.to_string(),
+        detail,
+    };
+    if let Some(start) = absolute {
+        // The zone of the date may not be known: 14 h to either side of UTC at most.
+        let after_h =
+            start.duration_since(TimeZone::UTC.to_timestamp(date.into()).unwrap_or(start)).as_hours();
+        if (-14..24 + 14).contains(&after_h) {
+            return Ok(start);
+        }
+        return Err(invalid(format!("the log begins on another day, at {start:.0}: see `clock.epoch`")));
+    }
+    let Some(ClockSpan { origin: TimeOrigin::OfDay(first_s), earliest_s, .. }) = clock else {
+        let detail = "a date without a time of the day: several flights of a day would be one. Add the time, or the flights table, or set `clock.epoch = \"midnight\"` if the clock counts the seconds of the day";
+        return Err(invalid(detail.into()));
+    };
+    let local =
+        date.to_datetime(civil::Time::midnight()) + duration((first_s + earliest_s).rem_euclid(DAY_S));
+    let name = mapping.time_zone.as_deref();
+    let name = name.ok_or_else(|| invalid("its time zone is not given: set `identity.time_zone`".into()))?;
+    unambiguous(local, name).map_err(invalid)
+}
+
+/// The departure that lies the flight hours, or else the length of the log, before the landing.
+///
+/// # Errors
+/// [`ErrorKind::IdentityInvalid`] for a landing that cannot be read, or that nothing leads back from.
+pub(crate) fn departure_before(
+    landing: &str,
+    facts: &IdentityFields,
+    clock: Option<ClockSpan>,
+    mapping: &IdentityMapping,
+) -> Result<Timestamp, ErrorKind> {
+    let invalid = |detail: &str| ErrorKind::IdentityInvalid {
+        fact: "landing_utc",
+        found: landing.to_owned(),
+        detail: detail.to_owned(),
+    };
+    if date_alone(landing, mapping).is_some() {
+        return Err(invalid("a date without a time of the day"));
+    }
+    let stated_h =
+        hours(IdentityField::FlightHours, facts.get(&IdentityField::FlightHours).map(|h| h.trim()))?;
+    let length_s = stated_h.map(|h| 3600.0 * h).or(clock.map(|clock| clock.latest_s - clock.earliest_s));
+    let length_s = length_s.ok_or_else(|| invalid("the log has neither `flight_hours` nor a clock"))?;
+    let landed = instant(landing.trim(), mapping)?;
+    landed.checked_sub(duration(length_s)).map_err(|e| invalid(&e.to_string()))
 }
 
 /// Facts as text, before they are read.
@@ -50,6 +156,8 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields,
     if let (Some(date), Some(time)) = (groups.name("departure_date"), groups.name("departure_time")) {
         let departure = format!("{}T{}", date.as_str(), time.as_str());
         facts.entry(IdentityField::DepartureUtc).or_insert(departure);
+    } else if let Some(date) = groups.name("departure_date") {
+        facts.entry(IdentityField::DepartureUtc).or_insert_with(|| date.as_str().to_owned());
     }
     Ok(facts)
 }
@@ -62,17 +170,18 @@ pub(crate) fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// The facts that folders called `name=value` hold, as Hive partitions are; the innermost wins.
+/// Names and values of folders called `name=value`, as Hive partitions are, the outermost first.
+pub(crate) fn hive_folders(path: &Path) -> impl Iterator<Item = (&str, String)> {
+    let folders = path.parent().into_iter().flat_map(Path::components);
+    let named = folders.filter_map(|part| part.as_os_str().to_str()?.split_once('='));
+    named.map(|(name, value)| (name, percent_decode_str(value).decode_utf8_lossy().into_owned()))
+}
+
+/// The facts that those folders hold; the innermost wins.
 pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, String>) -> IdentityFields {
     let whole = absolute(path);
-    let named: BTreeMap<String, String> = whole
-        .parent()
-        .into_iter()
-        .flat_map(Path::components)
-        .filter_map(|part| part.as_os_str().to_str()?.split_once('='))
-        .map(|(name, value)| (name.to_owned(), percent_decode_str(value).decode_utf8_lossy().into_owned()))
-        .collect();
-    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name)?.clone()));
+    let named: BTreeMap<&str, String> = hive_folders(&whole).collect();
+    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name.as_str())?.clone()));
     // Hive's own word for a null.
     let is_value = |(_, value): &(IdentityField, String)| value != "__HIVE_DEFAULT_PARTITION__";
     folders.iter().filter_map(stated).filter(is_value).collect()

@@ -178,7 +178,7 @@ fn gather(
             }
             while gathered.len() > 1 && bytes[..gathered.len()].iter().sum::<usize>() > MAX_GATHERED_BYTES {
                 gathered.pop();
-                slots.drop_last(gathered.len());
+                slots.rows.pop();
             }
             Ok(())
         })?;
@@ -190,16 +190,12 @@ fn gather(
 struct Slots {
     /// For each column the number of each requested text.
     texts: Vec<BTreeMap<String, u32>>,
-    /// The slot of every combination of these numbers.
+    /// The slot of every combination of these numbers, the last column's counting fastest.
     slots: Vec<u32>,
     /// The number of each text of a dictionary, and that dictionary, as batch after batch shares one.
     coded: Vec<Option<(ArrayRef, Vec<u32>)>>,
-    /// The slot of every row of a batch.
-    of_row: Vec<u32>,
-    /// Rows in the order of their slots, and where each slot ends.
-    sorted: Vec<u32>,
-    ends: Vec<usize>,
-    count: usize,
+    /// The rows of each slot.
+    rows: Vec<Vec<u32>>,
 }
 
 impl Slots {
@@ -217,118 +213,54 @@ impl Slots {
             let at = numbers.fold(0, |at, (text, known)| at * known.len() + known[text] as usize);
             slots[at] = slot;
         }
-        Self {
-            coded: vec![None; columns],
-            texts,
-            slots,
-            of_row: Vec::new(),
-            sorted: Vec::new(),
-            ends: Vec::new(),
-            count: keys.len(),
-        }
+        Self { coded: vec![None; columns], texts, slots, rows: vec![Vec::new(); keys.len()] }
     }
 
     /// Sorts the rows of a batch by slot.
     fn assign(&mut self, columns: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        self.of_row.clear();
+        let mut combined = vec![0_u32; arrays.first().map_or(0, Array::len)];
         for (k, (column, array)) in columns.iter().zip(arrays).enumerate() {
-            let is_last = k + 1 == columns.len();
-            let slots = is_last.then_some(&self.slots);
+            let of_column = self.texts[k].len() as u32;
+            let enter = |(at, number): (&mut u32, u32)| {
+                *at = if *at == NONE || number == NONE { NONE } else { *at * of_column + number };
+            };
             if let Some(codes) = array.as_dictionary_opt::<Int32Type>() {
-                let is_known = |(known, _): &(ArrayRef, Vec<u32>)| Arc::ptr_eq(known, codes.values());
-                if !self.coded[k].as_ref().is_some_and(is_known) {
-                    let texts = codes.values().as_string::<i32>();
-                    let number = |text: Option<&str>| text.and_then(|text| self.texts[k].get(text));
-                    let numbers = texts.iter().map(|text| number(text).copied().unwrap_or(NONE)).collect();
-                    self.coded[k] = Some((Arc::clone(codes.values()), numbers));
-                }
-                let Some((_, numbers)) = &self.coded[k] else { continue };
-                let keys = codes.keys();
-                let number = |row: usize| {
-                    if keys.is_null(row) { NONE } else { numbers[keys.value(row) as usize] }
-                };
-                enter(&mut self.of_row, k, array.len(), self.texts[k].len(), slots, number);
+                let numbers = self.numbers_of_codes(k, codes.values());
+                let number = |code: Option<i32>| code.map_or(NONE, |code| numbers[code as usize]);
+                combined.iter_mut().zip(codes.keys().iter().map(number)).for_each(enter);
             } else {
                 let text = as_text(column, array)?;
-                let text = text.as_string::<i32>();
-                let number = |row: usize| {
-                    if text.is_null(row) {
-                        NONE
-                    } else {
-                        self.texts[k].get(text.value(row)).copied().unwrap_or(NONE)
-                    }
-                };
-                enter(&mut self.of_row, k, array.len(), self.texts[k].len(), slots, number);
+                let numbers = text.as_string::<i32>().iter().map(|text| number_of(&self.texts[k], text));
+                combined.iter_mut().zip(numbers).for_each(enter);
             }
         }
-        self.sort();
+        self.rows.iter_mut().for_each(Vec::clear);
+        for (row, at) in (0..).zip(combined) {
+            let slot = self.slots.get(at as usize).copied().unwrap_or(NONE);
+            self.rows.get_mut(slot as usize).into_iter().for_each(|rows| rows.push(row));
+        }
         Ok(())
     }
 
-    fn sort(&mut self) {
-        let mut counts = vec![0_usize; self.count];
-        let asked = |slot: u32| (slot as usize) < counts.len();
-        let wanted = self.of_row.iter().copied().filter(|slot| asked(*slot)).count();
-        for slot in &self.of_row {
-            if let Some(count) = counts.get_mut(*slot as usize) {
-                *count += 1;
-            }
-        }
-        let mut next = 0;
-        let mut starts: Vec<usize> = Vec::with_capacity(self.count);
-        for count in &counts {
-            starts.push(next);
-            next += count;
-        }
-        self.sorted.clear();
-        self.sorted.resize(wanted, 0);
-        for (row, slot) in (0..).zip(&self.of_row) {
-            if let Some(start) = starts.get_mut(*slot as usize) {
-                self.sorted[*start] = row;
-                *start += 1;
-            }
-        }
-        self.ends = starts;
+    /// The number of each code of a dictionary of column `k`.
+    fn numbers_of_codes(&mut self, k: usize, dictionary: &ArrayRef) -> &[u32] {
+        let known = self.coded[k].take().filter(|(known, _)| Arc::ptr_eq(known, dictionary));
+        let (_, numbers) = self.coded[k].insert(known.unwrap_or_else(|| {
+            let texts = dictionary.as_string::<i32>().iter();
+            (Arc::clone(dictionary), texts.map(|text| number_of(&self.texts[k], text)).collect())
+        }));
+        numbers
     }
 
     /// The rows of a slot in the batch.
     fn rows_of(&self, slot: usize) -> UInt32Array {
-        let start = slot.checked_sub(1).map_or(0, |before| self.ends[before]);
-        UInt32Array::from(self.sorted[start..self.ends[slot]].to_vec())
-    }
-
-    /// Gathers no more rows of the last slot; `count` slots are left.
-    fn drop_last(&mut self, count: usize) {
-        self.count = count;
+        UInt32Array::from(self.rows[slot].clone())
     }
 }
 
-/// Enters the numbers of one column's texts into those of the columns before it; after the last column they become slots.
-fn enter(
-    of_row: &mut Vec<u32>,
-    column: usize,
-    rows: usize,
-    texts: usize,
-    slots: Option<&Vec<u32>>,
-    number: impl Fn(usize) -> u32,
-) {
-    let finish = |at: u32| match slots {
-        Some(slots) => slots.get(at as usize).copied().unwrap_or(NONE),
-        None => at,
-    };
-    if column == 0 {
-        of_row.extend((0..rows).map(|row| match number(row) {
-            NONE => NONE,
-            at => finish(at),
-        }));
-        return;
-    }
-    for (row, at) in of_row.iter_mut().enumerate().filter(|(_, at)| **at != NONE) {
-        *at = match number(row) {
-            NONE => NONE,
-            number => finish(*at * texts as u32 + number),
-        };
-    }
+/// The number of a requested text.
+fn number_of(texts: &BTreeMap<String, u32>, text: Option<&str>) -> u32 {
+    text.and_then(|text| texts.get(text)).copied().unwrap_or(NONE)
 }
 
 #[cfg(test)]

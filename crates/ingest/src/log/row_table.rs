@@ -8,8 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use arrow::array::{Array, ArrayRef, AsArray, Scalar};
+use arrow::compute::cast;
 use arrow::compute::kernels::cmp;
-use arrow::datatypes::{DataType, Int32Type};
+use arrow::datatypes::{DataType, Int32Type, Int64Type, UInt64Type};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
@@ -19,12 +20,16 @@ pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
 use crate::log::timestamps::{TickEpoch, TickFormat, TimestampParser};
 use crate::mapping::column_pattern::nearest;
+use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::units::TimeUnit;
-use crate::mapping::{ClockMapping, Epoch, Layout};
+use crate::mapping::{ChannelMapping, ClockMapping, Epoch, Layout};
 use crate::parquet::log_file::{LogFile, Scan};
-use crate::parquet::numeric::{append, as_text};
+use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::parquet::row_selection::RowSelection;
-use crate::time::clock::{TimeBase, Timestamps};
+use crate::time::clock::{DAY_S, TimeBase, Timestamps};
+
+/// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
+const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
 
 /// The files of one kind that belong to one flight.
 #[derive(Debug)]
@@ -147,6 +152,55 @@ impl RowTable {
             Ok(())
         })?;
         Ok(marks)
+    }
+
+    /// 1 where all bits of `set` are set and all of `clear` are clear in the word of a sample, 0 elsewhere, NaN where it is
+    /// missing.
+    ///
+    /// # Errors
+    /// When a leaf is missing, holds no whole numbers, or cannot be decoded.
+    pub(crate) fn bit_marks(
+        &self,
+        samples: &SampleSelector,
+        set: u64,
+        clear: u64,
+    ) -> Result<Vec<f64>, Error> {
+        let mut marks = Vec::new();
+        self.each(samples, &samples.leaf, |array| {
+            let wrong =
+                || wrong_type(&samples.leaf, array, "whole numbers, of which `valid_bits` names bits");
+            let wide =
+                if array.data_type() == &DataType::UInt64 { DataType::UInt64 } else { DataType::Int64 };
+            if !array.data_type().is_integer() {
+                return Err(wrong());
+            }
+            let words = cast(array, &wide).map_err(|_| wrong())?;
+            let mark = |word: Option<u64>| {
+                word.map_or(f64::NAN, |word| f64::from(u8::from(word & set == set && word & clear == 0)))
+            };
+            match words.as_primitive_opt::<UInt64Type>() {
+                Some(words) => marks.extend(words.iter().map(mark)),
+                None => {
+                    let words = words.as_primitive::<Int64Type>();
+                    marks.extend(words.iter().map(|word| mark(word.map(i64::cast_unsigned))));
+                }
+            }
+            Ok(())
+        })?;
+        Ok(marks)
+    }
+
+    /// Scale and offset of a channel: those of its mapping, or those in the Arrow metadata of its column.
+    ///
+    /// # Errors
+    /// [`ErrorKind::MetadataContradicts`] where the mapping, or another file, has another scale, offset or unit.
+    pub(crate) fn scale_and_offset(&self, leaf: &str, map: &ChannelMapping) -> Result<(f64, f64), Error> {
+        let mut noted = None;
+        for file in self.files.iter().filter(|file| file.has(leaf)) {
+            let own = file.field_metadata(leaf);
+            own.check(leaf, noted.get_or_insert(own)).map_err(|fault| file.error(fault))?;
+        }
+        noted.unwrap_or(FieldMetadata::NONE).line(leaf, map).map_err(|fault| self.error(fault))
     }
 
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
@@ -350,7 +404,7 @@ impl RowTable {
             }
             (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, _) => return Ok(TickFormat::text()),
             (DataType::Time32(unit) | DataType::Time64(unit), _) => return Ok(TickFormat::of_day(*unit)),
-            (DataType::Int64, None) if let Some(unit) = self.files[0].duration_unit(column) => {
+            (DataType::Int64, _) if let Some(unit) = self.files[0].duration_unit(column) => {
                 return Ok(TickFormat::of_duration(unit));
             }
             (kind, None) => {
@@ -367,8 +421,15 @@ impl RowTable {
             other => other.per_second().unwrap_or(1.0),
         };
         let is_whole = kind.is_integer();
-        let origin = if self.clock.epoch == Epoch::Unix { TickEpoch::Utc } else { TickEpoch::Own };
-        Ok(TickFormat { per_second, is_whole, is_text: false, origin, wraps_at: self.clock.wraps_at })
+        let (origin, zero_s) = match self.clock.epoch {
+            Epoch::None => (TickEpoch::Own, 0),
+            Epoch::Unix => (TickEpoch::Utc, 0),
+            Epoch::Midnight => (TickEpoch::Midnight, 0),
+            Epoch::Excel => (TickEpoch::Local, EXCEL_ZERO_S),
+        };
+        let day = (origin == TickEpoch::Midnight).then_some(DAY_S * per_second);
+        let wraps_at = self.clock.wraps_at.or(day);
+        Ok(TickFormat { per_second, is_whole, is_text: false, origin, zero_s, wraps_at })
     }
 
     /// The known name nearest to a channel that is not here.

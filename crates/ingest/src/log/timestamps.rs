@@ -8,15 +8,13 @@ use jiff::Timestamp;
 use crate::channel::buffer_pool;
 use crate::error::ErrorKind;
 use crate::parquet::numeric::{append, as_text, wrong_type};
-use crate::time::clock::{TimeOrigin, Timestamps};
-
-/// Seconds of a day.
-const DAY_S: f64 = 86_400.0;
+use crate::time::clock::{DAY_S, TimeOrigin, Timestamps};
 
 /// What zero means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TickEpoch {
     Own,
+    Midnight,
     Utc,
     Local,
 }
@@ -28,6 +26,8 @@ pub(crate) struct TickFormat {
     pub(crate) is_whole: bool,
     pub(crate) is_text: bool,
     pub(crate) origin: TickEpoch,
+    /// Zero of an instant, s since 1970.
+    pub(crate) zero_s: i64,
     pub(crate) wraps_at: Option<f64>,
 }
 
@@ -40,7 +40,7 @@ impl TickFormat {
     /// A time of the day, which starts again at midnight.
     pub(crate) fn of_day(unit: ArrowTimeUnit) -> Self {
         let ticks = Self::of_duration(unit);
-        Self { wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
+        Self { origin: TickEpoch::Midnight, wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
     }
 
     /// A time since an unknown zero.
@@ -51,7 +51,7 @@ impl TickFormat {
             ArrowTimeUnit::Microsecond => 1e6,
             ArrowTimeUnit::Nanosecond => 1e9,
         };
-        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, wraps_at: None }
+        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, zero_s: 0, wraps_at: None }
     }
 
     /// Whether they are numbers with a fraction.
@@ -61,7 +61,7 @@ impl TickFormat {
 
     /// ISO 8601 text; an offset in it is taken, and without one the time is local.
     pub(crate) fn text() -> Self {
-        Self { per_second: 1e9, is_whole: true, is_text: true, origin: TickEpoch::Local, wraps_at: None }
+        Self { is_text: true, origin: TickEpoch::Local, ..Self::of_duration(ArrowTimeUnit::Nanosecond) }
     }
 }
 
@@ -70,23 +70,28 @@ impl TickFormat {
 pub(crate) struct TimestampParser<'a> {
     column: &'a str,
     ticks: TickFormat,
-    first: Option<FirstTick>,
+    /// The first tick of all: a whole number, or a real one.
+    first_whole: Option<i64>,
+    first_real: Option<f64>,
     turns: f64,
     before: f64,
     seconds: Vec<f64>,
     is_zoned: bool,
 }
 
-#[derive(Clone, Copy)]
-enum FirstTick {
-    Whole(i64),
-    Real(f64),
-}
-
 impl<'a> TimestampParser<'a> {
     pub(crate) fn new(column: &'a str, ticks: TickFormat, rows: usize) -> Self {
         let seconds = Vec::with_capacity(rows.min(1 << 26));
-        Self { column, ticks, first: None, turns: 0.0, before: f64::NAN, seconds, is_zoned: false }
+        Self {
+            column,
+            ticks,
+            first_whole: None,
+            first_real: None,
+            turns: 0.0,
+            before: f64::NAN,
+            seconds,
+            is_zoned: false,
+        }
     }
 
     pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), ErrorKind> {
@@ -121,20 +126,12 @@ impl<'a> TimestampParser<'a> {
             reals.iter().for_each(|&tick| self.push_real(tick));
             return buffer_pool::release(reals);
         }
-        let (begun, per_second) = (reals.iter().find(|tick| tick.is_finite()), self.ticks.per_second);
-        let first = begun.map_or(f64::NAN, |&begun| self.first_real(begun));
+        self.first_real = reals.iter().copied().find(|tick| tick.is_finite());
+        let (first, per_second) = (self.first_real.unwrap_or(f64::NAN), self.ticks.per_second);
         for tick in &mut reals {
             *tick = if tick.is_finite() { (*tick - first) / per_second } else { f64::NAN };
         }
         self.seconds = reals;
-    }
-
-    /// The first tick of all, which is this one if none came before.
-    fn first_real(&mut self, tick: f64) -> f64 {
-        match *self.first.get_or_insert(FirstTick::Real(tick)) {
-            FirstTick::Real(first) => first,
-            FirstTick::Whole(first) => first as f64,
-        }
     }
 
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
@@ -151,10 +148,7 @@ impl<'a> TimestampParser<'a> {
 
     fn push_whole(&mut self, tick: Option<i64>) {
         let Some(tick) = tick else { return self.seconds.push(f64::NAN) };
-        let first = match *self.first.get_or_insert(FirstTick::Whole(tick)) {
-            FirstTick::Whole(first) => first,
-            FirstTick::Real(first) => first as i64,
-        };
+        let first = *self.first_whole.get_or_insert(tick);
         self.push(tick.wrapping_sub(first) as f64);
     }
 
@@ -162,7 +156,7 @@ impl<'a> TimestampParser<'a> {
         if !tick.is_finite() {
             return self.seconds.push(f64::NAN);
         }
-        let first = self.first_real(tick);
+        let first = *self.first_real.get_or_insert(tick);
         self.push(tick - first);
     }
 
@@ -180,28 +174,23 @@ impl<'a> TimestampParser<'a> {
     }
 
     pub(crate) fn stamps(self) -> Timestamps {
-        let instant = |whole: i64| {
-            let nanoseconds = i128::from(whole) * (1e9 / self.ticks.per_second) as i128;
-            Timestamp::from_nanosecond(nanoseconds).ok()
-        };
-        let real =
-            |ticks: f64| Timestamp::from_nanosecond((ticks / self.ticks.per_second * 1e9) as i128).ok();
-        let counted = match self.first {
-            Some(FirstTick::Whole(first)) => first as f64 / self.ticks.per_second,
-            Some(FirstTick::Real(first)) => first / self.ticks.per_second,
-            None => 0.0,
-        };
-        let start = match self.first {
-            Some(FirstTick::Whole(first)) => instant(first),
-            Some(FirstTick::Real(first)) => real(first),
-            None => None,
-        };
+        let per_second = self.ticks.per_second;
+        let whole = self
+            .first_whole
+            .map(|first| (first as f64 / per_second, i128::from(first) * (1e9 / per_second) as i128));
+        let real = self.first_real.map(|first| (first / per_second, (first / per_second * 1e9) as i128));
+        let first = whole.or(real);
+        let first_s = first.map_or(0.0, |(first_s, _)| first_s);
+        let instant =
+            || Timestamp::from_nanosecond(first?.1 + 1_000_000_000 * i128::from(self.ticks.zero_s)).ok();
         let zero = if self.is_zoned { TickEpoch::Utc } else { self.ticks.origin };
-        let origin = match (zero, start) {
-            (TickEpoch::Utc, Some(start)) => TimeOrigin::Utc(start),
-            (TickEpoch::Local, Some(start)) => TimeOrigin::Local(start),
-            _ => TimeOrigin::Counted(counted),
+        let origin = match zero {
+            TickEpoch::Utc => instant().map(TimeOrigin::Utc),
+            TickEpoch::Local => instant().map(TimeOrigin::Local),
+            TickEpoch::Midnight => Some(TimeOrigin::OfDay(first_s)),
+            TickEpoch::Own => None,
         };
+        let origin = origin.unwrap_or(TimeOrigin::Counted(first_s));
         Timestamps { column: self.column.to_owned(), seconds: self.seconds, origin }
     }
 }

@@ -1,21 +1,30 @@
 //! Column names in which `{position}` stands for the actuator's place.
 
+use std::borrow::Cow;
+
+use icu_normalizer::ComposingNormalizerBorrowed;
+
 /// The word that stands for a position.
 pub const PLACEHOLDER: &str = "{position}";
 
 /// A column name, with at most one `{position}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnPattern<'a> {
-    before: &'a str,
-    after: Option<&'a str>,
+    before: Cow<'a, str>,
+    after: Option<Cow<'a, str>>,
+}
+
+/// A name with its accents composed (Unicode's NFC): files of some systems write them as characters of their own.
+pub(crate) fn composed(name: &str) -> Cow<'_, str> {
+    if name.is_ascii() { Cow::Borrowed(name) } else { ComposingNormalizerBorrowed::new_nfc().normalize(name) }
 }
 
 impl<'a> ColumnPattern<'a> {
     /// Splits the name at its first placeholder.
     pub fn new(column: &'a str) -> Self {
         match column.split_once(PLACEHOLDER) {
-            Some((before, after)) => Self { before, after: Some(after) },
-            None => Self { before: column, after: None },
+            Some((before, after)) => Self { before: composed(before), after: Some(composed(after)) },
+            None => Self { before: composed(column), after: None },
         }
     }
 
@@ -26,15 +35,15 @@ impl<'a> ColumnPattern<'a> {
 
     /// The position a column's name speaks of, if it fits.
     pub fn position_in<'c>(&self, column: &'c str) -> Option<&'c str> {
-        let middle = column.strip_prefix(self.before)?.strip_suffix(self.after?)?;
+        let middle = column.strip_prefix(&*self.before)?.strip_suffix(self.after.as_deref()?)?;
         (!middle.is_empty()).then_some(middle)
     }
 
     /// The column that holds this channel of that position.
     pub fn column_for(&self, position: &str) -> String {
-        match self.after {
-            Some(after) => [self.before, position, after].concat(),
-            None => self.before.to_owned(),
+        match &self.after {
+            Some(after) => [&self.before, position, after].concat(),
+            None => self.before.clone().into_owned(),
         }
     }
 }

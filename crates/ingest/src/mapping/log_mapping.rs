@@ -18,7 +18,7 @@ pub struct Mapping {
     /// Its channels.
     pub channels: Channels,
     /// How its rows are laid out.
-    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
     /// Files of other kinds that belong to the same flight, by the name that channels call them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -41,12 +41,6 @@ pub struct Layout {
     pub position_column: Option<String>,
 }
 
-impl Layout {
-    fn is_wide(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 /// Another kind of file. Identity that it does not hold is shared with the main logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -57,7 +51,7 @@ pub struct GroupMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockMapping>,
     /// Its layout; a row for each sample of every channel when not given.
-    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
     /// How its flight is identified; as for the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -71,7 +65,7 @@ pub struct GroupMapping {
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
     /// Key-value metadata of the Parquet footer: fact → key. Fields: `tail_number`, `flight_id`,
-    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`.
+    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
     /// Columns that hold one value throughout: fact → column.
@@ -112,17 +106,20 @@ pub enum IdentityField {
     FlightHours,
     /// The tail's total hours after the flight.
     TailHoursEnd,
+    /// Landing, where the departure is not named: the departure lies the length of the flight before it.
+    LandingUtc,
 }
 
 impl IdentityField {
     /// All fields, in the order in which they are read.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::TailNumber,
         Self::FlightId,
         Self::DepartureUtc,
         Self::Position,
         Self::FlightHours,
         Self::TailHoursEnd,
+        Self::LandingUtc,
     ];
 
     /// The key as configuration spells it.
@@ -134,6 +131,7 @@ impl IdentityField {
             Self::Position => "position",
             Self::FlightHours => "flight_hours",
             Self::TailHoursEnd => "tail_hours_end",
+            Self::LandingUtc => "landing_utc",
         }
     }
 }
@@ -148,8 +146,9 @@ pub struct ClockMapping {
     /// Its unit; not needed for Arrow timestamps and text. `count` is a counter of samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<TimeUnit>,
-    /// What a column of numbers counts from: nothing that is known, or 1970 UTC.
-    #[serde(default, skip_serializing_if = "Epoch::is_none")]
+    /// What a column of numbers counts from: nothing that is known, 1970 UTC, midnight of the day of departure, or the
+    /// beginning of 1900 as spreadsheets have it (1899-12-30, local time).
+    #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero, e.g. 65536.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -163,8 +162,11 @@ pub struct ClockMapping {
     /// How far stamps may fall back and still be put in order, s. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_back_s: Option<f64>,
+    /// The longest pause of one flight, s; a longer one separates two flights, and the log is refused. Default 3600.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_gap_s: Option<f64>,
     /// Whether a log whose clock falls further is taken as several recordings, one after the other.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub split_at_jumps: bool,
 }
 
@@ -177,13 +179,10 @@ pub enum Epoch {
     None,
     /// From 1970-01-01T00:00:00Z.
     Unix,
-}
-
-impl Epoch {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-    fn is_none(&self) -> bool {
-        *self == Self::None
-    }
+    /// From midnight: the clock starts again after a day.
+    Midnight,
+    /// From 1899-12-30T00:00:00 in local time, mostly in days.
+    Excel,
 }
 
 /// The channels of an actuator.
@@ -202,7 +201,7 @@ pub struct Channels {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_position: Option<ChannelMapping>,
     /// Whether the output moves: `moving` (default), or `locked` where it is fixed and the screw position is constant.
-    #[serde(default, skip_serializing_if = "Output::is_moving")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub output: Output,
     /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
     pub load: ChannelMapping,
@@ -302,7 +301,7 @@ pub struct ChannelMapping {
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f64,
     /// See `scale`.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub offset: f64,
     /// The raw value at which a turning sensor starts again, e.g. 360 in degrees: it is unwrapped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -319,6 +318,15 @@ pub struct ChannelMapping {
     /// The values of `valid_column` that mean valid: numbers, texts, true or false. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub valid_values: Vec<RawValue>,
+    /// Bits of a status word in `valid_column` that are all set in a valid sample, e.g. `0x60`; instead of `valid_values`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid_bits: Option<u64>,
+    /// Bits of a status word in `valid_column` that are all clear in a valid sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub invalid_bits: Option<u64>,
+    /// Whether scale, offset and unit in the Arrow metadata of the column are ignored.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub ignore_metadata: bool,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
@@ -329,10 +337,10 @@ pub struct ChannelMapping {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Time from the row's timestamp to the channel's sampling instant, s.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub instant_s: f64,
     /// Recording delay of the channel, s: logged(t) = true(t − latency).
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub latency_s: f64,
     /// Redundant channels, best first: the first usable one is read where this channel is not usable.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -346,6 +354,13 @@ impl ChannelMapping {
     /// This channel and its alternatives, best first.
     pub fn choices(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(&self.alternatives)
+    }
+
+    /// Bits of the status word that are set and clear in a valid sample, where it has such bits.
+    pub(crate) fn status_bits(&self) -> Option<(u64, u64)> {
+        let bits = |bits: Option<u64>| bits.unwrap_or(0);
+        let has_bits = self.valid_bits.or(self.invalid_bits).is_some();
+        has_bits.then(|| (bits(self.valid_bits), bits(self.invalid_bits)))
     }
 
     /// How far the samples lie from the stamps of their rows, s.
@@ -364,6 +379,7 @@ impl From<&SampleFilter> for ChannelMapping {
             time_column: filter.time_column.clone(),
             rate_hz: filter.rate_hz,
             texts: RawValue::texts(&filter.equals),
+            ignore_metadata: true,
             ..Self::default()
         }
     }
@@ -382,6 +398,9 @@ impl Default for ChannelMapping {
             gear_ratio: 1.0,
             valid_column: None,
             valid_values: yes(),
+            valid_bits: None,
+            invalid_bits: None,
+            ignore_metadata: false,
             group: None,
             time_column: None,
             rate_hz: None,
@@ -418,9 +437,8 @@ fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]

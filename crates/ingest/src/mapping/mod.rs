@@ -1,6 +1,7 @@
 //! Log mapping: columns, clock and identity of a log as configured in `pipeline.toml`.
 
 pub mod column_pattern;
+pub(crate) mod field_metadata;
 mod log_mapping;
 mod sample_filter;
 pub mod units;

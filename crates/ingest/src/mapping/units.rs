@@ -6,6 +6,8 @@
 use std::f64::consts::{PI, TAU};
 
 use schemars::JsonSchema;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error, StrDeserializer};
 use serde::{Deserialize, Serialize};
 
 /// One pound-force, N.
@@ -98,58 +100,51 @@ pub enum Unit {
 }
 
 impl Unit {
+    /// The unit of a symbol, as configuration spells it.
+    pub(crate) fn from_symbol(symbol: &str) -> Option<Self> {
+        let symbol: StrDeserializer<'_, Error> = symbol.into_deserializer();
+        Self::deserialize(symbol).ok()
+    }
+
+    /// Name in the configuration, what it measures, and factor and offset of `SI = value · factor + offset`.
+    const fn entry(self) -> (&'static str, Dimension, f64, f64) {
+        use Dimension::{Angle, Force, Length, Temperature, Torque};
+        match self {
+            Self::Metre => ("m", Length, 1.0, 0.0),
+            Self::Millimetre => ("mm", Length, 1e-3, 0.0),
+            Self::Micrometre => ("um", Length, 1e-6, 0.0),
+            Self::Inch => ("in", Length, INCH_M, 0.0),
+            Self::Degree => ("deg", Angle, PI / 180.0, 0.0),
+            Self::Radian => ("rad", Angle, 1.0, 0.0),
+            Self::Revolution => ("rev", Angle, TAU, 0.0),
+            Self::Newton => ("N", Force, 1.0, 0.0),
+            Self::Kilonewton => ("kN", Force, 1e3, 0.0),
+            Self::Decanewton => ("daN", Force, 10.0, 0.0),
+            Self::PoundForce => ("lbf", Force, LBF_N, 0.0),
+            Self::NewtonMetre => ("N.m", Torque, 1.0, 0.0),
+            Self::PoundForceInch => ("lbf.in", Torque, LBF_N * INCH_M, 0.0),
+            Self::PoundForceFoot => ("lbf.ft", Torque, LBF_N * INCH_M * 12.0, 0.0),
+            Self::Celsius => ("degC", Temperature, 1.0, 0.0),
+            Self::Fahrenheit => ("degF", Temperature, 5.0 / 9.0, -160.0 / 9.0),
+            Self::Kelvin => ("K", Temperature, 1.0, -273.15),
+        }
+    }
+
     /// What it measures.
     pub fn dimension(self) -> Dimension {
-        match self {
-            Self::Metre | Self::Millimetre | Self::Micrometre | Self::Inch => Dimension::Length,
-            Self::Degree | Self::Radian | Self::Revolution => Dimension::Angle,
-            Self::Newton | Self::Kilonewton | Self::Decanewton | Self::PoundForce => Dimension::Force,
-            Self::NewtonMetre | Self::PoundForceInch | Self::PoundForceFoot => Dimension::Torque,
-            Self::Celsius | Self::Fahrenheit | Self::Kelvin => Dimension::Temperature,
-        }
+        self.entry().1
     }
 
     /// Factor and offset of `SI = value · factor + offset`; temperatures are converted to °C. Factors are exact by
     /// definition (NIST SP 811, 2008, appendix B: 1 in = 25.4 mm, 1 lbf = 4.448 221 615 260 5 N).
     pub fn to_si(self) -> (f64, f64) {
-        match self {
-            Self::Metre | Self::Radian | Self::Newton | Self::NewtonMetre | Self::Celsius => (1.0, 0.0),
-            Self::Millimetre => (1e-3, 0.0),
-            Self::Micrometre => (1e-6, 0.0),
-            Self::Inch => (INCH_M, 0.0),
-            Self::Degree => (PI / 180.0, 0.0),
-            Self::Revolution => (TAU, 0.0),
-            Self::Kilonewton => (1e3, 0.0),
-            Self::Decanewton => (10.0, 0.0),
-            Self::PoundForce => (LBF_N, 0.0),
-            Self::PoundForceInch => (LBF_N * INCH_M, 0.0),
-            Self::PoundForceFoot => (LBF_N * INCH_M * 12.0, 0.0),
-            Self::Fahrenheit => (5.0 / 9.0, -160.0 / 9.0),
-            Self::Kelvin => (1.0, -273.15),
-        }
+        let (_, _, factor, offset) = self.entry();
+        (factor, offset)
     }
 
     /// The name as configuration spells it.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Metre => "m",
-            Self::Millimetre => "mm",
-            Self::Micrometre => "um",
-            Self::Inch => "in",
-            Self::Degree => "deg",
-            Self::Radian => "rad",
-            Self::Revolution => "rev",
-            Self::Newton => "N",
-            Self::Kilonewton => "kN",
-            Self::Decanewton => "daN",
-            Self::PoundForce => "lbf",
-            Self::NewtonMetre => "N.m",
-            Self::PoundForceInch => "lbf.in",
-            Self::PoundForceFoot => "lbf.ft",
-            Self::Celsius => "degC",
-            Self::Fahrenheit => "degF",
-            Self::Kelvin => "K",
-        }
+        self.entry().0
     }
 }
 

@@ -12,11 +12,12 @@ use arrow::compute::take;
 use arrow::datatypes::{DataType, Field, Fields};
 
 use crate::error::ErrorKind;
+use crate::mapping::column_pattern::composed;
 
 /// One leaf of the schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LeafColumn {
-    /// Its name: that of its column, with the fields below joined by dots.
+    /// Its name: that of its column, with the fields below joined by dots, and with composed accents.
     pub(crate) name: String,
     /// Its number among the file's leaves.
     pub(crate) index: usize,
@@ -34,7 +35,7 @@ pub(crate) struct LeafColumn {
 pub(crate) fn leaves(fields: &Fields) -> Vec<LeafColumn> {
     let mut found = Vec::new();
     for (root, field) in fields.iter().enumerate() {
-        walk(field, field.name().clone(), root, LeafPath::default(), &mut found);
+        walk(field, composed(field.name()).into_owned(), root, LeafPath::default(), &mut found);
     }
     found
 }
@@ -51,7 +52,7 @@ fn walk(field: &Field, name: String, root: usize, path: LeafPath, found: &mut Ve
         DataType::Struct(inner) => {
             for field in inner {
                 let path = LeafPath { is_field: true, ..path };
-                walk(field, format!("{name}.{}", field.name()), root, path, found);
+                walk(field, format!("{name}.{}", composed(field.name())), root, path, found);
             }
         }
         DataType::List(inner) | DataType::LargeList(inner) | DataType::FixedSizeList(inner, _) => {

@@ -1,5 +1,6 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
@@ -24,7 +25,8 @@ use crate::io::digest::Digest;
 use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
-use crate::mapping::column_pattern::nearest;
+use crate::mapping::column_pattern::{composed, nearest};
+use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
@@ -73,6 +75,8 @@ pub(crate) struct LogFile {
     footer: ArrowReaderMetadata,
     /// The same footer, by which text columns are read as the codes of their dictionary.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
+    /// The schema of Arrow's writers, once it was asked for.
+    noted: OnceLock<Option<Schema>>,
     leaves: Vec<LeafColumn>,
     /// Places of the leaves of each name.
     by_name: HashMap<String, Vec<usize>>,
@@ -128,7 +132,8 @@ impl LogFile {
         for (place, leaf) in leaves.iter().enumerate() {
             by_name.entry(leaf.name.clone()).or_default().push(place);
         }
-        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves, by_name };
+        let (coded, noted) = (OnceLock::new(), OnceLock::new());
+        let opened = Self { path: path.to_owned(), source, footer, coded, noted, leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -162,7 +167,8 @@ impl LogFile {
     }
 
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        let mut named = self.named(name);
+        let name = composed(name);
+        let mut named = self.named(&name);
         let first = named.next()?;
         // A column called `a.b` comes before field `b` of struct `a`.
         if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
@@ -192,13 +198,34 @@ impl LogFile {
 
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
-        let file = self.footer.metadata().file_metadata();
-        // The decoder of that note panics on some damage.
-        let noted = catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()));
-        match noted.ok()?.ok()?.field_with_name(name).ok()?.data_type() {
+        match self.noted_field(name)?.data_type() {
             DataType::Duration(unit) => Some(*unit),
             _ => None,
         }
+    }
+
+    /// Scale, offset and unit in the metadata of a column.
+    pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
+        self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
+    }
+
+    /// A column as Arrow's writers note it; found by its place, as a log may have ten thousand columns.
+    fn noted_field(&self, name: &str) -> Option<&Field> {
+        let leaf = self.find(name).filter(|leaf| !leaf.is_field)?;
+        self.arrow_schema()?.fields().get(leaf.root).map(Arc::as_ref)
+    }
+
+    /// The schema that Arrow's writers note in the footer; none where it is missing or damaged.
+    fn arrow_schema(&self) -> Option<&Schema> {
+        let noted = || {
+            self.metadata("ARROW:schema")?;
+            let file = self.footer.metadata().file_metadata();
+            // The decoder of that note panics on some damage.
+            catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()))
+                .ok()?
+                .ok()
+        };
+        self.noted.get_or_init(noted).as_ref()
     }
 
     /// A value of the footer's key-value metadata.
@@ -490,7 +517,7 @@ impl LogFile {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
         let length = read_at::file_length(file).map_err(unreadable)?;
-        let names: HashSet<&str> = names.iter().copied().collect();
+        let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted)?;

@@ -1,17 +1,19 @@
 //! One clock for a log: which rows count, in which order, at which step, and where time breaks.
 //!
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out, unless
-//! the rate is declared and their number fits between their neighbours; rows out of order are put
-//! tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
+//! the rate is declared and their number fits between their neighbours; rows out of order are sorted, and rows that
+//! repeat a stamp are left out, or spread evenly where the clock is declared to tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
 //! starts again. Rows that are in order pass untouched.
 
 use std::ops::Range;
 
 use jiff::Timestamp;
-use multiversion::multiversion;
 
 use crate::error::ErrorKind;
 use crate::mapping::ClockMapping;
+
+/// Seconds of a day.
+pub(crate) const DAY_S: f64 = 86_400.0;
 
 /// A step longer than this many usual steps is a break: the filter cannot predict across it.
 pub(crate) const BREAK_STEPS: f64 = 1.5;
@@ -27,6 +29,12 @@ const MAX_FIRST_STAMP_S: f64 = 1e11;
 
 /// How far stamps may fall back by default, s.
 const MAX_BACK_S: f64 = 1.0;
+
+/// The longest pause within one flight by default, s: recorders pause for minutes, and a turnaround lasts longer.
+const MAX_GAP_S: f64 = 3600.0;
+
+/// The shortest recording on both sides of a pause that two flights have, s: a few wrong stamps are none.
+const SHORTEST_FLIGHT_S: f64 = 60.0;
 
 /// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
 const TICK_FOLLOW_S: f64 = 10.0;
@@ -68,6 +76,31 @@ impl TimestampRepairs {
     }
 }
 
+impl TimeBase {
+    /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::SeveralFlights`] where the clock pauses for more than `clock.max_gap_s` between two recordings of a
+    /// minute or more.
+    pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), ErrorKind> {
+        let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
+        let rows = self.segments.last().map_or(0, |last| last.end);
+        let length_s = |rows: usize| rows as f64 * self.step_s;
+        let mut start = (0, 0.0);
+        for &(row, after_s) in &self.breaks {
+            let before_s = start.1 + length_s(row - start.0 - 1);
+            let shortest_s = length_s(row.min(rows - row));
+            if after_s - before_s > max_gap_s && shortest_s >= SHORTEST_FLIGHT_S {
+                let end_s = self.breaks.last().map_or(0.0, |last| last.1 + length_s(rows - last.0));
+                let (column, row) = (column.to_owned(), row as u64);
+                return Err(ErrorKind::SeveralFlights { column, row, before_s, after_s, end_s, max_gap_s });
+            }
+            start = (row, after_s);
+        }
+        Ok(())
+    }
+}
+
 /// What the first stamp of a clock means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeOrigin {
@@ -75,6 +108,8 @@ pub enum TimeOrigin {
     Start,
     /// Seconds on a zero of the clock's own, which all clocks of a log share.
     Counted(f64),
+    /// Seconds since midnight.
+    OfDay(f64),
     /// An instant.
     Utc(Timestamp),
     /// A local time, read as if it were UTC, whose zone the log does not name.
@@ -87,6 +122,8 @@ impl TimeOrigin {
         match (self, other) {
             (Self::Start, _) | (_, Self::Start) => Some(0.0),
             (Self::Counted(a), Self::Counted(b)) => Some(a - b),
+            // A channel may begin before midnight, and another one after it.
+            (Self::OfDay(a), Self::OfDay(b)) => Some((a - b + 0.5 * DAY_S).rem_euclid(DAY_S) - 0.5 * DAY_S),
             (Self::Utc(a), Self::Utc(b)) | (Self::Local(a), Self::Local(b)) => {
                 Some(a.duration_since(b).as_secs_f64())
             }
@@ -145,10 +182,10 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
         plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
     }
     if clock.tick_s.is_none()
-        && let Some(seen) = UniformClock::of(&stamps.seconds)
+        && let Some((usual_s, longest_s)) = even_steps(&stamps.seconds)
     {
-        let step_s = checked_step(seen.step_s, clock, &stamps.column)?;
-        if seen.longest_s <= BREAK_STEPS * step_s {
+        let step_s = checked_step(usual_s, clock, &stamps.column)?;
+        if longest_s <= BREAK_STEPS * step_s {
             return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
         }
     }
@@ -207,107 +244,16 @@ fn plausible(
     Err(ErrorKind::TimeImplausible { column: column.to_owned(), what, value_s, least_s, most_s })
 }
 
-/// A clock with equal steps, which most logs have; two passes over the timestamps determine it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct UniformClock {
-    /// The usual step, as [`usual_step`] has it.
-    step_s: f64,
-    longest_s: f64,
-}
-
-impl UniformClock {
-    /// `None` where a timestamp is missing or does not increase, or where steps differ.
-    fn of(seconds: &[f64]) -> Option<Self> {
-        let StepStats { least_s, longest_s, rising } = StepStats::of(seconds);
-        if rising == 0 || rising + 1 < seconds.len() || longest_s - least_s > COARSE_TICK_SHARE * least_s {
-            return None;
-        }
-        Some(Self { step_s: median_step(seconds)?, longest_s })
-    }
-}
-
-/// Steps of a clock at a glance.
-struct StepStats {
-    /// Infinite where there is none.
-    least_s: f64,
-    /// Zero where none is longer.
-    longest_s: f64,
-    /// Steps forward.
-    rising: usize,
-}
-
-/// Steps that are compared side by side.
-const LANES: usize = 8;
-
-impl StepStats {
-    fn of(seconds: &[f64]) -> Self {
-        let mut lanes = ([f64::INFINITY; LANES], [0.0; LANES], [0; LANES]);
-        let done = steps_in_lanes(seconds, &mut lanes);
-        let (least_s, longest_s, rising) = lanes;
-        let mut all = Self {
-            least_s: least_s.into_iter().fold(f64::INFINITY, f64::min),
-            longest_s: longest_s.into_iter().fold(0.0, f64::max),
-            rising: rising.iter().sum::<u64>() as usize,
-        };
-        for pair in seconds[done..].windows(2) {
-            let step_s = pair[1] - pair[0];
-            all.rising += usize::from(step_s > 0.0);
-            all.least_s = all.least_s.min(step_s);
-            all.longest_s = all.longest_s.max(step_s);
-        }
-        all
-    }
-}
-
-/// Smallest, largest and increasing steps of each lane; the number of compared steps.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn steps_in_lanes(
-    seconds: &[f64],
-    (least_s, longest_s, rising): &mut ([f64; LANES], [f64; LANES], [u64; LANES]),
-) -> usize {
-    let mut done = 0;
-    while let Some(group) = seconds[done..].first_chunk::<{ LANES + 1 }>() {
-        for lane in 0..LANES {
-            let step_s = group[lane + 1] - group[lane];
-            rising[lane] += u64::from(step_s > 0.0);
-            least_s[lane] = if step_s < least_s[lane] { step_s } else { least_s[lane] };
-            longest_s[lane] = if step_s > longest_s[lane] { step_s } else { longest_s[lane] };
-        }
-        done += LANES;
-    }
-    done
-}
-
-/// Steps that a bracket about their median is laid by.
-const SUBSAMPLE_SIZE: usize = 4096;
-/// Half width of that bracket in the order of those steps: more than five standard deviations of a rank.
-const HALF_BRACKET: usize = 200;
-
-/// The lower median of the steps; none where few steps mislead about the rest.
-fn median_step(seconds: &[f64]) -> Option<f64> {
-    let steps = || seconds.windows(2).map(|pair| pair[1] - pair[0]);
-    let middle = (seconds.len() - 2) / 2;
-    let mut looks: Vec<f64> = steps().step_by(seconds.len() / SUBSAMPLE_SIZE + 1).collect();
-    looks.sort_unstable_by(f64::total_cmp);
-    let at = looks.len() / 2;
-    let low = looks[at.saturating_sub(HALF_BRACKET)];
-    let high = looks[(at + HALF_BRACKET).min(looks.len() - 1)];
-    let below = steps().filter(|step| *step < low).count();
-    let not_above = steps().filter(|step| *step <= high).count();
-    if !(below..not_above).contains(&middle) {
-        return None;
-    }
-    if low >= high {
-        return Some(low);
-    }
-    // Each is written where the next belongs, wanted or not: which are wanted is not to be guessed.
-    let (mut within, mut next) = (vec![0.0; not_above - below + 1], 0);
-    for step in steps() {
-        within[next] = step;
-        next += usize::from(step >= low && step <= high);
-    }
-    within.truncate(next);
-    Some(*within.select_nth_unstable_by(middle - below, f64::total_cmp).1)
+/// A clock with equal steps, which most logs have: its usual step, as [`usual_step`] has it, and its longest one, s. `None`
+/// where a stamp is missing or does not rise, or where steps differ.
+fn even_steps(seconds: &[f64]) -> Option<(f64, f64)> {
+    let mut steps: Vec<f64> = seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let (least_s, longest_s) =
+        (steps.iter().copied().fold(f64::INFINITY, f64::min), steps.iter().copied().fold(0.0, f64::max));
+    let middle = steps.len().checked_sub(1)? / 2;
+    let is_even =
+        steps.iter().all(|step_s| *step_s > 0.0) && longest_s - least_s <= COARSE_TICK_SHARE * least_s;
+    is_even.then(|| (*steps.select_nth_unstable_by(middle, f64::total_cmp).1, longest_s))
 }
 
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
@@ -571,14 +517,14 @@ mod tests {
                 (0..rows).map(|k| f64::from(k) * 0.5).collect(),
             ];
             for t in clocks {
-                let found = UniformClock::of(&t).unwrap();
+                let (usual_s, longest_s) = even_steps(&t).unwrap();
                 let steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-                assert_eq!(found.longest_s.to_bits(), steps.iter().copied().fold(0.0, f64::max).to_bits());
-                assert_eq!(found.step_s.to_bits(), usual_step(steps).to_bits(), "{rows} rows");
+                assert_eq!(longest_s.to_bits(), steps.iter().copied().fold(0.0, f64::max).to_bits());
+                assert_eq!(usual_s.to_bits(), usual_step(steps).to_bits(), "{rows} rows");
             }
         }
         for t in [&[0.0, 1.0, 1.0, 2.0][..], &[0.0, 1.0, f64::NAN, 2.0], &[0.0, 1.0, 2.5], &[0.0], &[]] {
-            assert_eq!(UniformClock::of(t), None);
+            assert_eq!(even_steps(t), None);
         }
     }
 

@@ -1,5 +1,6 @@
 //! A load that is recorded more slowly than the positions stands until the next one comes.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A load is held over so many of its own steps, or so many seconds if that is more.
@@ -58,10 +59,19 @@ pub(crate) fn median_sample_interval(load_n: &[f64]) -> usize {
     if !load_n.iter().any(|f| f.is_nan()) {
         return 1;
     }
-    let known: Vec<usize> = (0..load_n.len()).filter(|&i| !load_n[i].is_nan()).collect();
-    let mut steps: Vec<usize> = known.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() { 1 } else { *steps.select_nth_unstable(middle).1 }
+    let (mut intervals, mut count, mut last) = (BTreeMap::<usize, usize>::new(), 0, None);
+    for i in (0..load_n.len()).filter(|&i| !load_n[i].is_nan()) {
+        if let Some(last) = last.replace(i) {
+            *intervals.entry(i - last).or_default() += 1;
+            count += 1;
+        }
+    }
+    let mut shorter = 0;
+    let is_middle = |(_, samples): &(&usize, &usize)| {
+        shorter += **samples;
+        shorter > count / 2
+    };
+    intervals.iter().find(is_middle).map_or(1, |(interval, _)| *interval)
 }
 
 #[cfg(test)]
@@ -75,6 +85,15 @@ mod tests {
         let segments = zero_order_hold(&mut load, &[0..3, 3..5, 5..6], 0.1);
         assert_eq!(segments, [1..3, 3..5]);
         assert_eq!(load[1..5], [1.0, 1.0, 2.0, 2.0]);
+    }
+
+    /// By hand: intervals of 2, 2, 3 and 10 samples have the (upper) median 3.
+    #[test]
+    fn the_usual_interval_is_the_median() {
+        let mut load = [f64::NAN; 20];
+        [1, 3, 5, 8, 18].into_iter().for_each(|i| load[i] = 1.0);
+        assert_eq!(median_sample_interval(&load), 3);
+        assert_eq!([median_sample_interval(&[1.0; 5]), median_sample_interval(&[f64::NAN; 5])], [1, 1]);
     }
 
     /// The load comes every other sample, so it is held over eight at most.

@@ -3,15 +3,14 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int64Array, StringArray,
-    Time32MillisecondArray, UInt16Array,
+    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int16Array, Int64Array, StringArray,
+    Time32MillisecondArray, UInt16Array, UInt64Array,
 };
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Log, LogFiles, Mapping, RawValue};
-use records::Position;
+use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Mapping, RawValue};
 
-use crate::layouts::{channel, mapping, write};
+use crate::layouts::{self, channel, opened, place, plain, write};
 
 const STEP_S: f64 = 0.01;
 const ROWS: usize = 1000;
@@ -33,21 +32,14 @@ fn screw(t: f64) -> f64 {
     motor(t) + 5e-5 * (1.3 * t).cos()
 }
 
-fn plain() -> Mapping {
-    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
-}
-
 fn columns() -> Vec<(&'static str, ArrayRef)> {
     vec![("t", reals(|t| t)), ("m", reals(motor)), ("s", reals(screw)), ("f", reals(|t| 1e3 * t.cos()))]
 }
 
 fn read(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<ActuatorChannels, Error> {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     write(&file, columns);
-    let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone()))?;
-    let at = log.actuators(&mapping.channels, Some(&Position::new("a").unwrap()))?;
-    log.read_actuator(&at[0], &mapping.channels, Geometry::Linear { lead_m_per_rev: None })
+    layouts::read(&file, mapping, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn with(
@@ -173,6 +165,37 @@ fn a_sample_that_is_not_valid_is_missing() {
     }
 }
 
+/// A status word of 16 or 64 bits: bit 2 says powered, bit 5 says failed, and others are in use.
+#[test]
+fn bits_of_a_status_word_mark_valid_samples() {
+    let bad = |k: usize| (200..240).contains(&k);
+    let word = |k: usize| {
+        if !bad(k) {
+            0b0100
+        } else if k < 220 {
+            0b10_0100
+        } else {
+            0
+        }
+    };
+    let short = (0..ROWS).map(|k| (word(k) | 0b1000) as i16 | i16::MIN).collect::<Int16Array>();
+    let long = (0..ROWS).map(|k| (word(k) | (k as u64) << 40) | 1 << 63).collect::<UInt64Array>();
+    let mut m = plain();
+    m.channels.motor_position = ChannelMapping {
+        valid_column: Some("ok".into()),
+        valid_bits: Some(0b0100),
+        invalid_bits: Some(0b10_0000),
+        ..channel("m", Unit::Metre)
+    };
+    for words in [Arc::new(short) as ArrayRef, Arc::new(long)] {
+        let a = read(&m, &with(columns(), "ok", words)).unwrap();
+        let missing: Vec<usize> = (0..ROWS).filter(|&k| a.dx_m[k].is_nan()).collect();
+        assert_eq!(missing, (200..240).collect::<Vec<_>>());
+    }
+    let real = read(&m, &with(columns(), "ok", reals(|_| 4.0))).unwrap_err().diagnostic();
+    assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
+}
+
 #[test]
 fn a_counter_that_wraps_is_a_clock() {
     let count = Arc::new((0..ROWS).map(|k| ((65_400 + k) % 65_536) as u16).collect::<UInt16Array>());
@@ -215,11 +238,10 @@ fn numbers_since_1970_and_text_are_instants() {
     {
         let mut m = plain();
         (m.clock.unit, m.clock.epoch) = (unit, epoch);
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("x.parquet");
+        let (_dir, file) = place("x.parquet");
         let columns = with(columns(), "t", clock);
         write(&file, &columns);
-        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let log = opened(&file, &m);
         assert_eq!(log.start_utc().unwrap().unwrap().to_string(), "2025-11-19T04:13:00.25Z");
         assert!((read(&m, &columns).unwrap().step_s - 0.01).abs() < 1e-9);
     }

@@ -1,27 +1,28 @@
 //! Logs as fleets write them: several actuators or one, every unit, every kind of clock.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, Decimal128Array, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array,
-    Int32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray, TimestampNanosecondArray,
+    ArrayRef, Decimal128Array, DictionaryArray, DurationMillisecondArray, Float16Array, Float32Array,
+    Float64Array, Int16Array, Int32Array, Int64Array, ListArray, RecordBatch, StringArray,
+    Time32MillisecondArray, TimestampMillisecondArray, TimestampNanosecondArray,
 };
-use arrow::datatypes::{Int32Type, Schema};
+use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema};
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::mapping::{IdentityField, IdentityMapping};
-use ingest::{ActuatorChannels, ChannelMapping, Channels, ClockMapping, Geometry, Log, LogFiles, Mapping};
+use ingest::mapping::{Epoch, IdentityField, IdentityMapping};
+use ingest::{
+    ActuatorChannels, ChannelMapping, Channels, ClockMapping, Error, Geometry, Log, LogFiles, Mapping,
+};
 use parquet::arrow::ArrowWriter;
 use records::Position;
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
-    let fields: Vec<_> = columns
-        .iter()
-        .map(|(name, array)| arrow::datatypes::Field::new(*name, array.data_type().clone(), true))
-        .collect();
+    let fields: Vec<_> =
+        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(Arc::clone(&schema), columns.iter().map(|c| Arc::clone(&c.1)).collect())
         .unwrap();
@@ -57,16 +58,36 @@ pub(crate) fn mapping(motor: ChannelMapping, screw: ChannelMapping, load: Channe
     }
 }
 
+/// Motor, screw and load in the columns `m`, `s` and `f`.
+pub(crate) fn plain() -> Mapping {
+    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
+}
+
+/// A file in a folder of its own, which goes with it.
+pub(crate) fn place(name: &str) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join(name);
+    (dir, file)
+}
+
+pub(crate) fn opened(file: &Path, mapping: &Mapping) -> Log {
+    Log::open(&LogFiles::one(file), &Arc::new(mapping.clone())).unwrap()
+}
+
+/// Opens a log and reads its only actuator.
+pub(crate) fn read(file: &Path, mapping: &Mapping, geometry: Geometry) -> Result<ActuatorChannels, Error> {
+    let log = Log::open(&LogFiles::one(file), &Arc::new(mapping.clone()))?;
+    let at = log.actuators(&mapping.channels, Some(&Position::new("a").unwrap()))?;
+    log.read_actuator(&at[0], &mapping.channels, geometry)
+}
+
 const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
 
 /// Writes, opens and reads the only actuator of a log.
 fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)], geometry: Geometry) -> ActuatorChannels {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     write(&file, columns);
-    let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone())).unwrap();
-    let positions = log.actuators(&mapping.channels, Some(&Position::new("aileron").unwrap())).unwrap();
-    log.read_actuator(&positions[0], &mapping.channels, geometry).unwrap()
+    read(&file, mapping, geometry).unwrap()
 }
 
 fn reals(values: &[f64]) -> ArrayRef {
@@ -164,7 +185,7 @@ fn every_numeric_type_is_read() {
         Arc::new(decimals),
         Arc::new(dictionary),
     ];
-    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let m = plain();
     for kind in kinds {
         let name = kind.data_type().to_string();
         let columns =
@@ -200,12 +221,11 @@ fn every_clock_gives_the_same_step() {
     let x = reals(&[0.0, 1.0, 2.0, 3.0, 4.0]);
     for (clock, unit) in clocks {
         let absolute = unit.is_none();
-        let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+        let mut m = plain();
         m.clock.unit = unit;
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("N1_20261119T041300Z.parquet");
+        let (_dir, file) = place("N1_20261119T041300Z.parquet");
         write(&file, &[("t", clock), ("m", x.clone()), ("s", x.clone()), ("f", x.clone())]);
-        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let log = opened(&file, &m);
         let at = log.actuators(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
         let line = log.read_actuator(&at[0], &m.channels, LINEAR).unwrap();
         assert!((line.step_s - 0.02).abs() < 1e-9, "{line:?}");
@@ -218,8 +238,7 @@ fn every_clock_gives_the_same_step() {
 
 #[test]
 fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     let x = || reals(&[0.0, 1.0]);
     write(
         &file,
@@ -230,7 +249,7 @@ fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
         channel("{position}_s", Unit::Metre),
         channel("{position}_f", Unit::Newton),
     );
-    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let log = opened(&file, &m);
     let found = log.actuators(&m.channels, None).unwrap();
     let told: Vec<_> = found.iter().map(|p| (p.position.as_str(), p.lacking.clone())).collect();
     assert_eq!(told, [("left", vec![]), ("right", vec!["right_f".to_owned()])]);
@@ -241,8 +260,7 @@ fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
 
 #[test]
 fn metadata_wins_over_columns_and_columns_over_the_path() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     let x = || ingest::parquet::writer::Column::Real(vec![0.0, 1.0]);
     let text = |t: &str| ingest::parquet::writer::Column::Text(vec![t.to_owned(); 2]);
     let columns = [("t".to_owned(), x()), ("tail".into(), text("N2")), ("flight".into(), text("0413"))];
@@ -252,13 +270,13 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
         &[("reg".into(), "N3".into()), ("fh".into(), "1.5".into())],
     )
     .unwrap();
-    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let mut m = plain();
     m.identity.columns = BTreeMap::from([
         (IdentityField::TailNumber, "tail".into()),
         (IdentityField::FlightId, "flight".into()),
     ]);
     let tail = |m: &Mapping| {
-        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let log = opened(&file, m);
         log.identity(|_, _| IdentityFields::new()).unwrap()
     };
     assert_eq!(tail(&m).tail_number.as_str(), "N2");
@@ -273,17 +291,11 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
 
 #[test]
 fn an_absolute_clock_in_milliseconds_keeps_its_instant() {
-    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let m = plain();
     let stamps = |t: ArrayRef| {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("x.parquet");
+        let (_dir, file) = place("x.parquet");
         write(&file, &[("t", t)]);
-        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
-            .unwrap()
-            .start_utc()
-            .unwrap()
-            .unwrap()
-            .to_string()
+        opened(&file, &m).start_utc().unwrap().unwrap().to_string()
     };
     assert_eq!(
         stamps(Arc::new(TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]))),
@@ -300,17 +312,14 @@ fn an_absolute_clock_in_milliseconds_keeps_its_instant() {
 
 #[test]
 fn text_where_numbers_should_stand_is_refused_by_name() {
-    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let m = plain();
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
     let text: ArrayRef = Arc::new(StringArray::from(vec!["0.1", "0.2"]));
     write(
         &file,
         &[("t", reals(&[0.0, 1.0])), ("m", text), ("s", reals(&[0.0, 1.0])), ("f", reals(&[0.0, 1.0]))],
     );
-    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
-    let positions = log.actuators(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
-    let error = log.read_actuator(&positions[0], &m.channels, LINEAR).unwrap_err();
+    let error = read(&file, &m, LINEAR).unwrap_err();
     assert_eq!(error.diagnostic().code, "column_type");
     assert_eq!(error.diagnostic().column.as_deref(), Some("m"));
 }
@@ -328,20 +337,239 @@ fn a_dot_in_a_name_is_part_of_the_name() {
 /// Istanbul is three hours ahead: a clock that names no zone is local, and never taken for UTC.
 #[test]
 fn a_local_clock_takes_the_mapped_zone_or_gives_no_departure() {
-    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let mut m = plain();
     let start = |m: &Mapping| {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("x.parquet");
+        let (_dir, file) = place("x.parquet");
         let stamps = TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]);
         write(&file, &[("t", Arc::new(stamps))]);
-        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
-            .unwrap()
-            .start_utc()
-            .unwrap()
-            .map(|t| t.to_string())
+        opened(&file, m).start_utc().unwrap().map(|t| t.to_string())
     };
     m.identity.time_zone = Some("Europe/Istanbul".into());
     assert_eq!(start(&m).as_deref(), Some("2025-11-19T01:13:00.25Z"));
     m.identity.time_zone = None;
     assert_eq!(start(&m), None);
+}
+
+/// Two flights of a minute and more, five hours apart, in a file that names no flight: their mean would be no gap of
+/// either. A pause of 50 minutes, and a few rows whose clock was wrong, are of one flight.
+#[test]
+fn two_flights_in_one_log_are_refused_with_both_spans() {
+    let m = plain();
+    let read = |m: &Mapping, first: usize, pause_s: f64| {
+        let t: Vec<f64> = (0..3000).map(|k| 0.1 * k as f64 + if k < first { 0.0 } else { pause_s }).collect();
+        let x: ArrayRef =
+            Arc::new((0..3000).map(|k| Some((f64::from(k) * 0.01).sin())).collect::<Float64Array>());
+        let (_dir, file) = place("N1_20261119T041300Z.parquet");
+        write(&file, &[("t", reals(&t)), ("m", x.clone()), ("s", x.clone()), ("f", x.clone()), ("leg", x)]);
+        read(&file, m, LINEAR).map_err(|e| e.diagnostic())
+    };
+    let refused = read(&m, 1000, 18_000.0).unwrap_err();
+    assert_eq!((refused.code.as_str(), refused.row), ("several_flights", Some(1000)));
+    let found = refused.found.unwrap();
+    assert_eq!(found, "samples from 0 to 100 s and from 18100 to 18300 s after the first one");
+    assert!(refused.hint.unwrap().contains("`clock.max_gap_s`"));
+    assert_eq!(read(&m, 1000, 3000.0).unwrap().segments.len(), 2);
+    assert_eq!(read(&m, 2990, 18_000.0).unwrap().segments.len(), 2);
+    let mut longer = m.clone();
+    longer.clock.max_gap_s = Some(20_000.0);
+    assert_eq!(read(&longer, 1000, 18_000.0).unwrap().segments.len(), 2);
+    let mut named = m;
+    named.identity.columns.insert(IdentityField::FlightId, "leg".into());
+    assert_eq!(read(&named, 1000, 18_000.0).unwrap().segments.len(), 2);
+}
+
+/// As pyarrow writes `pa.field("m", pa.int32(), metadata={"unit": "mm", "scale": "0.01", "offset": "-5"})`: 700 counts are
+/// 2 mm.
+#[test]
+fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_others() {
+    let noted =
+        [("unit", "mm"), ("scale", "0.01"), ("offset", "-5")].map(|(k, v)| (k.to_owned(), v.to_owned()));
+    let counts: ArrayRef = Arc::new(Int32Array::from(vec![700, 800]));
+    let fields = [
+        Field::new("t", DataType::Float64, true),
+        Field::new("m", DataType::Int32, true).with_metadata(noted.into()),
+        Field::new("s", DataType::Float64, true),
+    ];
+    let schema = Arc::new(Schema::new(fields.to_vec()));
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
+    let columns = vec![reals(&[0.0, 0.1]), counts, reals(&[1.0, 2.0])];
+    let mut writer =
+        ArrowWriter::try_new(std::fs::File::create(&file).unwrap(), Arc::clone(&schema), None).unwrap();
+    writer.write(&RecordBatch::try_new(schema, columns).unwrap()).unwrap();
+    writer.close().unwrap();
+    let read = |motor: ChannelMapping| {
+        let m = mapping(motor, channel("s", Unit::Metre), channel("s", Unit::Newton));
+        read(&file, &m, LINEAR).map_err(|e| e.diagnostic())
+    };
+    near(&read(channel("m", Unit::Millimetre)).unwrap().motor_m, &[2e-3, 3e-3]);
+    let same = ChannelMapping { scale: 0.01, offset: -5.0, ..channel("m", Unit::Millimetre) };
+    near(&read(same).unwrap().motor_m, &[2e-3, 3e-3]);
+    let own = ChannelMapping { ignore_metadata: true, scale: 0.1, ..channel("m", Unit::Micrometre) };
+    near(&read(own).unwrap().motor_m, &[70e-6, 80e-6]);
+    for (other, key) in [
+        (channel("m", Unit::Micrometre), "`unit` = mm"),
+        (ChannelMapping { scale: 0.1, ..channel("m", Unit::Millimetre) }, "`scale` = 0.01"),
+    ] {
+        let refused = read(other).unwrap_err();
+        assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("metadata_contradicts", Some("m")));
+        assert!(refused.found.unwrap().starts_with(key) && refused.hint.unwrap().contains("ignore_metadata"));
+    }
+}
+
+/// The identity of a log whose motor, screw and load are one column.
+fn identity(name: &str, m: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<String, records::Diagnostic> {
+    let (_dir, file) = place(name);
+    write(&file, columns);
+    let log = opened(&file, m);
+    let identity = log.identity(|_, _| IdentityFields::new()).map_err(|e| e.diagnostic())?;
+    Ok(identity.departure_utc.to_string())
+}
+
+/// Istanbul is three hours ahead of UTC. The log begins at 23:59:50, and goes on after midnight.
+#[test]
+fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
+    let mut m = plain();
+    m.identity.path = Some(r"(?<tail_number>N\w+)_(?<departure_date>\d{8})".into());
+    m.identity.departure_format = Some("%Y%m%d".into());
+    m.identity.time_zone = Some("Europe/Istanbul".into());
+    let seconds: Vec<f64> = (0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0)).collect();
+    let columns = [("t", reals(&seconds))];
+    let of = |m: &Mapping| identity("N1_20261119.parquet", m, &columns);
+    let refused = of(&m).unwrap_err();
+    assert!(refused.code == "identity_invalid" && refused.message.contains("clock.epoch"), "{refused}");
+    m.clock.epoch = Epoch::Midnight;
+    assert_eq!(of(&m).unwrap(), "2026-11-19T20:59:50Z");
+    m.clock.unit = None;
+    let of_day = (0..200).map(|k| Some(86_390_000 + 50 * k)).collect::<Time32MillisecondArray>();
+    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(of_day))];
+    assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
+    // An absolute clock gives the time, unless it is of another day.
+    let instant = |day: i64| -> ArrayRef {
+        let first = 1_794_000_000_000 + 86_400_000 * day;
+        Arc::new(
+            (0..200)
+                .map(|k| Some(first + 50 * k))
+                .collect::<TimestampMillisecondArray>()
+                .with_timezone("UTC"),
+        )
+    };
+    assert_eq!(identity("N1_20261106.parquet", &m, &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
+    let other = identity("N1_20261106.parquet", &m, &[("t", instant(3))]).unwrap_err();
+    assert!(other.message.contains("another day"), "{other}");
+}
+
+/// Two hours before the landing by the hours that the log states, or 20 s before it by its clock.
+#[test]
+fn a_landing_stands_for_the_departure() {
+    let mut m = plain();
+    m.identity.path = Some(r"(?<tail_number>N\w+)_(?<landing_utc>\d{8}T\d{6}Z)".into());
+    let seconds: Vec<f64> = (0..201).map(|k| 50.0 + 0.1 * f64::from(k)).collect();
+    let of = |m: &Mapping| identity("N1_20261119T041300Z.parquet", m, &[("t", reals(&seconds))]).unwrap();
+    assert_eq!(of(&m), "2026-11-19T04:12:40Z");
+    m.identity.values.insert(IdentityField::FlightHours, "2.0".into());
+    assert_eq!(of(&m), "2026-11-19T02:13:00Z");
+}
+
+/// 2026-11-19 is day 46345 of spreadsheets (as LibreOffice has it): 6:00 in UTC is a quarter of a day more.
+#[test]
+fn days_since_1899_are_instants() {
+    let mut m = plain();
+    m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
+    (m.clock.epoch, m.clock.unit) = (Epoch::Excel, Some(TimeUnit::Day));
+    let days: Vec<f64> = (0..100).map(|k| 46_345.25 + f64::from(k) * 0.1 / 86_400.0).collect();
+    let start = identity("N1_x.parquet", &m, &[("t", reals(&days))]).unwrap();
+    let start: jiff::Timestamp = start.parse().unwrap();
+    let wanted: jiff::Timestamp = "2026-11-19T06:00:00Z".parse().unwrap();
+    assert!(start.duration_since(wanted).as_secs_f64().abs() < 1e-5, "{start}");
+}
+
+/// A duration column has a unit of its own, whatever the configuration says.
+#[test]
+fn the_type_of_a_duration_wins_over_the_mapped_unit() {
+    let m = plain();
+    let t: ArrayRef = Arc::new(DurationMillisecondArray::from_iter_values((0..100).map(|k| 20 * k)));
+    let x = reals(&(0..100).map(|k| f64::from(k % 7)).collect::<Vec<_>>());
+    let a = only(&m, &[("t", t), ("m", x.clone()), ("s", x.clone()), ("f", x)], LINEAR);
+    assert!((a.step_s - 0.02).abs() < 1e-12, "{} s", a.step_s);
+}
+
+/// `höhe` with a composed and a decomposed ö: a file of one system, and a configuration of another.
+#[test]
+fn accents_of_names_are_composed_and_blanks_are_told_apart() {
+    let composed = "{position}_h\u{f6}he";
+    let m = mapping(
+        channel(composed, Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
+    let x = || reals(&[1.0, 2.0]);
+    write(
+        &file,
+        &[
+            ("t", reals(&[0.0, 0.1])),
+            ("au\u{df}eno\u{308}_ho\u{308}he", x()),
+            ("au\u{df}en\u{f6}_s", x()),
+            ("f", x()),
+        ],
+    );
+    let log = opened(&file, &m);
+    let found = log.actuators(&m.channels, None).unwrap();
+    assert_eq!((found.len(), found[0].position.as_str()), (1, "au\u{df}en\u{f6}"));
+    let a = log.read_actuator(&found[0], &m.channels, LINEAR).unwrap();
+    assert_eq!(a.motor_m, [1.0, 2.0]);
+    let m = mapping(
+        channel("{position} motor", Unit::Metre),
+        channel("s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    write(&file, &[("t", x()), ("left\u{a0}motor", x()), ("s", x()), ("f", x())]);
+    let log = opened(&file, &m);
+    let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
+    assert!(hint.contains("left\u{a0}motor") && hint.contains("U+00A0"), "{hint}");
+}
+
+/// `FLT_NO` begins as `{position}_FORCE_LBF` does, and is not meant.
+#[test]
+fn the_closest_column_shares_the_end_of_the_pattern() {
+    let m = mapping(
+        channel("{position}_FORCE_LBF", Unit::Metre),
+        channel("s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
+    write(&file, &["t", "FLT_NO", "AIL_L_LOAD_LBF", "s", "f"].map(|name| (name, reals(&[0.0, 1.0]))));
+    let log = opened(&file, &m);
+    let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
+    assert!(hint.contains("`AIL_L_LOAD_LBF`"), "{hint}");
+}
+
+/// Rows of 0.1 s with ten positions and five loads each: both begin at the stamp of their row.
+#[test]
+fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
+    let lists = |each: usize, of: &dyn Fn(f64) -> f64| -> ArrayRef {
+        let row = |row: usize| {
+            Some((0..each).map(|k| Some(of(0.1 * (row as f64 + k as f64 / each as f64)))).collect::<Vec<_>>())
+        };
+        Arc::new(ListArray::from_iter_primitive::<Float64Type, _, _>((0..50).map(row)))
+    };
+    let t = reals(&(0..50).map(|row| 0.1 * f64::from(row)).collect::<Vec<_>>());
+    let columns: [(&str, ArrayRef); 4] = [
+        ("t", t.clone()),
+        ("m", lists(10, &|t| t)),
+        ("s", lists(10, &|t| t + 1e-3)),
+        ("f", lists(5, &|t| 100.0 * t)),
+    ];
+    let mut m = plain();
+    let a = only(&m, &columns, LINEAR);
+    assert_eq!((a.dx_m.len(), a.segments.len()), (500, 1));
+    // The load of 50 Hz is held over the next sample of 100 Hz.
+    let held = |k: usize| 100.0 * 0.02 * (k / 2) as f64;
+    let worst = (0..500).map(|k| (a.load_n[k] - held(k)).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-9, "{worst} N");
+    (m.clock.column, m.clock.rate_hz) = (None, Some(100.0));
+    let (_dir, file) = place("N1_20261119T041300Z.parquet");
+    write(&file, &columns);
+    let refused = read(&file, &m, LINEAR).unwrap_err().diagnostic();
+    assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
 }

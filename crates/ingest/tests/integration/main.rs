@@ -9,3 +9,4 @@ mod fuzz;
 mod layouts;
 mod sample_filters;
 mod simulated_channels;
+mod turns;

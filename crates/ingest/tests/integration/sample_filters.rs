@@ -13,9 +13,8 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
-use records::Position;
 
-use crate::layouts::{channel, mapping};
+use crate::layouts::{self, channel, mapping};
 
 const ROWS: usize = 3000;
 /// Where the state is 1.
@@ -77,9 +76,7 @@ fn conditional(is_conditional: bool) -> Mapping {
 }
 
 fn read(file: &Path, mapping: &Mapping) -> Result<ActuatorChannels, Error> {
-    let log = Log::open(&LogFiles::one(file), &Arc::new(mapping.clone()))?;
-    let at = log.actuators(&mapping.channels, Some(&Position::new("rudder").unwrap()))?;
-    log.read_actuator(&at[0], &mapping.channels, Geometry::Linear { lead_m_per_rev: None })
+    layouts::read(file, mapping, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {

@@ -2,6 +2,7 @@
 
 use ingest::ActuatorChannels;
 use ingest::channel::noise_floor::white_noise;
+use ingest::channel::position_ratio::position_ratio;
 use ingest::log::in_memory::ChannelArrays;
 use records::Position;
 use simulator::{Flight, Plant, Profile, Sensors, Vibration, simulate};
@@ -107,5 +108,27 @@ fn missing_rows_are_no_spikes() {
             }
         }
         assert_eq!(read(&flight).quality.map(|q| q.spikes), [0, 0, 0], "{rate_hz} Hz");
+    }
+}
+
+/// Soft rotary actuators wind up by a twentieth of their motion, and a sensor of theirs has outliers: the ratio of the
+/// positions is still that of the simulator, 1.
+#[test]
+fn the_ratio_of_the_positions_is_one_under_wind_up_and_outliers() {
+    for (stiffness_n_per_m, hinge_share) in [(1e7, 0.3), (1e7, 0.4), (5e6, 0.3), (1e8, 0.3)] {
+        for seed in 1..=3 {
+            let mut plant = Plant::default();
+            plant.contact.stiffness_n_per_m = stiffness_n_per_m;
+            let profile = Profile { duration_s: 100.0, hinge_share, ..Profile::default() };
+            let mut flight = simulate(&plant, &profile, &Sensors::default(), seed).unwrap();
+            let rows = flight.motor_m.len();
+            for at in [rows / 3, rows / 2, rows - 100] {
+                flight.motor_m[at] += 0.5;
+                flight.screw_m[at + 9] -= 2.0;
+            }
+            let a = read(&flight);
+            let ratio = position_ratio(&a.motor_m, &a.dx_m, &a.load_n).unwrap();
+            assert!((ratio - 1.0).abs() < 0.01, "{stiffness_n_per_m} N/m, {hinge_share}, {seed}: {ratio}");
+        }
     }
 }

@@ -494,6 +494,7 @@ pub(super) fn check_clock(
     for (key, value) in [
         ("rate_hz", clock.rate_hz),
         ("max_back_s", clock.max_back_s),
+        ("max_gap_s", clock.max_gap_s),
         ("tick_s", clock.tick_s),
         ("wraps_at", clock.wraps_at),
     ] {

@@ -43,6 +43,7 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("initial_backlash_rms_m", 1e-9, 1.0),
     ("rate_hz", 1e-6, 1e6),
     ("max_back_s", 1e-9, 1e9),
+    ("max_gap_s", 1.0, 1e9),
     ("tick_s", 1e-9, 1e4),
     ("wraps_at", 1e-6, 1e20),
     ("gear_ratio", 1e-6, 1e6),

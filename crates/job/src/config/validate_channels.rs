@@ -133,6 +133,7 @@ fn one(
     ] {
         found.extend(bounded(key, value).map(|c| (key, c)));
     }
+    found.extend(status_bits(channel).map(|c| ("valid_bits", c)));
     found.extend(implausible("scale", Some(channel.scale)).map(|c| ("scale", c)));
     for (key, value) in
         [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
@@ -144,6 +145,26 @@ fn one(
     }
     found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
     found
+}
+
+/// Bits of a status word that no word can have, or that no column holds.
+fn status_bits(channel: &ChannelMapping) -> Option<Diagnostic> {
+    let (set, clear) = (channel.valid_bits.unwrap_or(0), channel.invalid_bits.unwrap_or(0));
+    channel.valid_bits.or(channel.invalid_bits)?;
+    let (what, hint) = if channel.valid_column.is_none() {
+        ("`valid_bits` names bits of no column".to_owned(), "valid_column = \"…\"")
+    } else if set & clear != 0 {
+        let what = format!("bits {:#x} are in both `valid_bits` and `invalid_bits`", set & clear);
+        (what, "a bit is set or clear in a valid sample, not both")
+    } else if channel.valid_values != ChannelMapping::default().valid_values {
+        (
+            "both `valid_bits` and `valid_values` are given".to_owned(),
+            "name the bits, or the values of the whole word",
+        )
+    } else {
+        return None;
+    };
+    Some(Diagnostic::new("bad_parameter", what).hint(hint))
 }
 
 fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Option<Diagnostic> {

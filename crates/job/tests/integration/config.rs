@@ -89,6 +89,17 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("column = \"{position}_screw\"", "column = \"{position}_{position}\"", "bad_pattern"),
         ("unit = \"deg\"", "unit = \"deg\"\nsign = 2", "bad_sign"),
         ("unit = \"deg\"", "unit = \"deg\"\nscale = 0.0", "bad_scale"),
+        ("unit = \"deg\"", "unit = \"deg\"\nvalid_bits = 4", "bad_parameter"),
+        (
+            "unit = \"deg\"",
+            "unit = \"deg\"\nvalid_column = \"w\"\nvalid_bits = 0x60\ninvalid_bits = 0x20",
+            "bad_parameter",
+        ),
+        (
+            "unit = \"deg\"",
+            "unit = \"deg\"\nvalid_column = \"w\"\nvalid_bits = 4\nvalid_values = [4]",
+            "bad_parameter",
+        ),
         ("unit = \"deg\"", "unit = \"deg\"\ngear_ratio = -1.0", "not_positive"),
         ("files = [\"logs/*.parquet\"]", "files = []", "no_logs"),
         ("column = \"t\"", "", "no_clock"),

@@ -1,6 +1,6 @@
 //! Channels of one actuator: mapping, quality, and what the estimator would reject.
 
-use ingest::channel::quality;
+use ingest::channel::position_ratio::position_ratio;
 use ingest::{ActuatorChannels, ActuatorColumns, Quality};
 use job::flight_log::FlightLog;
 use job::{Config, estimate, rejection};
@@ -140,7 +140,7 @@ pub(super) fn actuator(
     let slope = if a.output_locked {
         Some("the output is locked: minus the motor position".to_owned())
     } else {
-        quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note)
+        position_ratio(&a.motor_m, &a.dx_m, &a.load_n).map(slope_note)
     };
     let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![

@@ -1,0 +1,71 @@
+//! Scale, offset and unit of a column in the metadata of its Arrow field, as pyarrow and others write them.
+
+use arrow::datatypes::Field;
+
+use crate::error::ErrorKind;
+use crate::mapping::ChannelMapping;
+use crate::mapping::units::Unit;
+
+/// What a field notes of its column: `unit = raw · scale + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldMetadata {
+    /// By the keys `scale` and `scale_factor` (the latter of the CF conventions 1.11, section 8.1); else 1.
+    pub(crate) scale: f64,
+    /// By the keys `offset` and `add_offset`; else 0.
+    pub(crate) offset: f64,
+    /// By the keys `unit` and `units`, where it is one that a mapping knows.
+    pub(crate) unit: Option<Unit>,
+}
+
+impl FieldMetadata {
+    /// A column of which nothing is noted.
+    pub(crate) const NONE: Self = Self { scale: 1.0, offset: 0.0, unit: None };
+
+    pub(crate) fn of(field: &Field) -> Self {
+        let text =
+            |keys: [&str; 2]| keys.iter().find_map(|key| field.metadata().get(*key)).map(|text| text.trim());
+        let number =
+            |keys| text(keys).and_then(|text| text.parse().ok()).filter(|number: &f64| number.is_finite());
+        Self {
+            scale: number(["scale", "scale_factor"]).filter(|scale| *scale != 0.0).unwrap_or(1.0),
+            offset: number(["offset", "add_offset"]).unwrap_or(0.0),
+            unit: text(["unit", "units"]).and_then(Unit::from_symbol),
+        }
+    }
+
+    /// Scale and offset of the channel: those of the mapping, or those that are noted where it leaves both open.
+    ///
+    /// # Errors
+    /// [`ErrorKind::MetadataContradicts`] where both are given and differ, or the noted unit is not the mapped one.
+    pub(crate) fn line(&self, column: &str, map: &ChannelMapping) -> Result<(f64, f64), ErrorKind> {
+        let mapped = Self { scale: map.scale, offset: map.offset, unit: Some(map.unit) };
+        let is_open = |line: &Self| Self { unit: None, ..*line } == Self::NONE;
+        let known =
+            if is_open(&mapped) || is_open(self) { Self { unit: mapped.unit, ..*self } } else { mapped };
+        self.check(column, &known)?;
+        let of = if is_open(self) { &mapped } else { self };
+        Ok((of.scale, of.offset))
+    }
+
+    /// Whether all that is noted here agrees with what is known of the column.
+    ///
+    /// # Errors
+    /// [`ErrorKind::MetadataContradicts`] for the first that differs.
+    pub(crate) fn check(&self, column: &str, known: &Self) -> Result<(), ErrorKind> {
+        let differs = |noted: f64, known: f64| {
+            ((noted - known).abs() > 1e-9 * known.abs()).then(|| (noted.to_string(), known.to_string()))
+        };
+        let units = self.unit.zip(known.unit).filter(|(noted, known)| noted != known);
+        let found = [
+            ("scale", differs(self.scale, known.scale)),
+            ("offset", differs(self.offset, known.offset)),
+            ("unit", units.map(|(noted, known)| (noted.as_str().to_owned(), known.as_str().to_owned()))),
+        ];
+        match found.into_iter().find_map(|(key, differs)| Some((key, differs?))) {
+            None => Ok(()),
+            Some((key, (noted, known))) => {
+                Err(ErrorKind::MetadataContradicts { column: column.to_owned(), key, noted, known })
+            }
+        }
+    }
+}
