@@ -6,9 +6,7 @@ use multiversion::multiversion;
 
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::friction::flank::{FIRM_SHARE, Flank};
-use crate::contact::friction::friction_model::{
-    Coupling, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
-};
+use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, FrictionState, ScrewState};
 use crate::simd::Lanes;
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
@@ -135,30 +133,31 @@ impl Channels<'_> {
 fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut [Coupling]) {
     let part = found.len() / Lanes::COUNT;
     let ends = integrate_lanes(params, channels, part, found);
-    let mut integrator = CouplingIntegrator::new(params);
+    let mut screw = None;
     for number in 0..Lanes::COUNT {
         let part = number * part..(number + 1) * part;
-        if recompute_until_match(&mut integrator, channels, part, found) {
-            integrator.set(ends.get(number));
+        if recompute_until_match(params, &mut screw, channels, part, found) {
+            screw = Some(ends.get(number));
         }
     }
     // No lane covers the rest of the segment.
-    recompute_until_match(&mut integrator, channels, Lanes::COUNT * part..found.len(), found);
+    recompute_until_match(params, &mut screw, channels, Lanes::COUNT * part..found.len(), found);
 }
 
 /// Integrates through a part until its values are those found before: once the screw has slipped, its force determines
 /// all of its state. False where it integrated to the end.
 fn recompute_until_match(
-    integrator: &mut CouplingIntegrator,
+    params: CouplingParams,
+    screw: &mut Option<ScrewState>,
     channels: Channels<'_>,
     part: Range<usize>,
     found: &mut [Coupling],
 ) -> bool {
     for k in part {
-        let here = integrator.step(channels.at(k));
+        let here = params.follow(screw, channels.at(k));
         let is_same = found[k].force_n.to_bits() == here.force_n.to_bits()
             && found[k].dforce_ddry.to_bits() == here.dforce_ddry.to_bits();
-        if is_same && here.force_n.is_finite() && integrator.has_slipped() {
+        if is_same && here.force_n.is_finite() && screw.is_some_and(|screw| screw.has_slipped) {
             return true;
         }
         found[k] = here;
@@ -275,7 +274,7 @@ mod tests {
             let mut path = CouplingPath::default();
             path.integrate(&blocks, &state, 1.0);
             for segment in blocks.segments() {
-                let mut integrator = CouplingIntegrator::new(CouplingParams::new(&state, 1.0));
+                let (params, mut screw) = (CouplingParams::new(&state, 1.0), None);
                 for k in segment {
                     let drive = Drive {
                         motor_m: blocks.motor_m[k],
@@ -285,7 +284,7 @@ mod tests {
                     let bits = |c: Coupling| {
                         [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
                     };
-                    prop_assert_eq!(bits(path.couplings[k]), bits(integrator.step(drive)), "block {}", k);
+                    prop_assert_eq!(bits(path.couplings[k]), bits(params.follow(&mut screw, drive)), "block {}", k);
                 }
             }
         }

@@ -178,8 +178,20 @@ impl CouplingParams {
         }
     }
 
+    /// Takes a screw, if there is one yet, to the next block, and returns the coupling there. A block with a missing channel
+    /// is skipped.
+    #[inline]
+    pub(crate) fn follow(&self, screw: &mut Option<ScrewState>, drive: Drive) -> Coupling {
+        if !(drive.motor_m + drive.load_n).is_finite() {
+            return Coupling::UNKNOWN;
+        }
+        let next = screw.map_or_else(|| self.rest(drive), |before| self.step(&before, drive));
+        *screw = Some(next);
+        next.coupling
+    }
+
     /// The screw at the start of a segment: at rest, its friction unknown.
-    pub(crate) fn rest(&self, drive: Drive) -> ScrewState {
+    fn rest(&self, drive: Drive) -> ScrewState {
         let force_n = drive.load_n - self.load_zero_n;
         let relative_m = self.relative_m(force_n);
         ScrewState {
@@ -198,41 +210,5 @@ impl CouplingParams {
         let above_m = if force_n > 0.0 { self.half_gap_m } else { 0.0 };
         let flank_m = if force_n < 0.0 { -self.half_gap_m } else { above_m };
         force_n * self.compliance_m_per_n + flank_m
-    }
-}
-
-/// The coupling integrated from block to block; each segment starts at rest.
-#[derive(Debug)]
-pub(crate) struct CouplingIntegrator {
-    params: CouplingParams,
-    screw: Option<ScrewState>,
-}
-
-impl CouplingIntegrator {
-    /// At rest.
-    pub(crate) fn new(params: CouplingParams) -> Self {
-        Self { params, screw: None }
-    }
-
-    /// Whether the screw slipped last.
-    pub(crate) fn has_slipped(&self) -> bool {
-        self.screw.is_some_and(|screw| screw.has_slipped)
-    }
-
-    /// Continues from another state.
-    pub(crate) fn set(&mut self, screw: ScrewState) {
-        self.screw = Some(screw);
-    }
-
-    /// The coupling at the next block. A block with a missing channel is skipped.
-    #[inline]
-    pub(crate) fn step(&mut self, drive: Drive) -> Coupling {
-        if !(drive.motor_m + drive.load_n).is_finite() {
-            return Coupling::UNKNOWN;
-        }
-        let screw =
-            self.screw.map_or_else(|| self.params.rest(drive), |before| self.params.step(&before, drive));
-        self.screw = Some(screw);
-        screw.coupling
     }
 }
