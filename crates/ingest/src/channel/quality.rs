@@ -1,8 +1,6 @@
 //! What a channel looks like before anything is estimated: so that a mapping error is seen in seconds, and
 //! a sensor that lies is not believed.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::ops::Range;
 
 use crate::channel::noise_floor::white_noise_of;
@@ -111,6 +109,30 @@ fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
+/// Those of [`runs`] that repeat one of two values: rare, so most samples are passed over in groups.
+#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
+fn repeat_runs_of(values: &[f64], of: [f64; 2], least: usize) -> Vec<Range<usize>> {
+    const GROUP: usize = 16;
+    let is_one = |v: &f64| *v == of[0] || *v == of[1];
+    let (mut found, mut done) = (Vec::new(), 0);
+    for start in (0..values.len()).step_by(GROUP) {
+        let group = &values[start..values.len().min(start + GROUP)];
+        if group.iter().filter(|v| is_one(v)).count() == 0 {
+            continue;
+        }
+        for at in start..start + group.len() {
+            if at < done || !is_one(&values[at]) {
+                continue;
+            }
+            done = at + values[at..].iter().take_while(|v| **v == values[at]).count();
+            if done - at >= least {
+                found.push(at..done);
+            }
+        }
+    }
+    found
+}
+
 /// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
 /// leaves it at full speed, more than once. A position that comes to rest slows down first.
 #[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
@@ -120,12 +142,10 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     if longest_run < LEAST_RUN {
         return 0;
     }
-    let count_at_rails = values.iter().filter(|v| **v == min || **v == max).count();
-    if count_at_rails < LEAST_RUN {
+    let at_rails: Vec<Range<usize>> = repeat_runs_of(values, [min, max], LEAST_RUN);
+    if at_rails.is_empty() {
         return 0;
     }
-    let is_at_rail = |run: &Range<usize>| values[run.start] == min || values[run.start] == max;
-    let at_rails: Vec<Range<usize>> = runs(values, LEAST_RUN).filter(is_at_rail).collect();
     let speed = 0.5 * mean_step(values);
     let mut count = [0, 0];
     let mut samples = 0;
@@ -167,11 +187,6 @@ fn spikes(
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
-    /// Impacts recur at least so often, s; so many are looked at in a short flight.
-    const IMPACT_EVERY_S: f64 = 6.0;
-    const LEAST_IMPACTS: usize = 20;
-    /// For the uncertainty of the noise itself.
-    const MARGIN: f64 = 1.05;
     /// Enough for a threshold: the noise is known to about 3 %.
     const NOISE_BLOCKS: usize = 1000;
     let step = resolution.unwrap_or(0.0);
@@ -191,19 +206,11 @@ fn spikes(
     };
     // A window across a break in time shows the break.
     let inner = || segments.iter().flat_map(|s| s.start + 3..s.end.saturating_sub(3));
-    let heights = inner().map(|i| (height(i).abs(), i)).filter(|(height, _)| !height.is_nan());
-    let rank = |count: usize| ((count as f64 * step_s / IMPACT_EVERY_S) as usize).max(LEAST_IMPACTS);
-    let (largest, count) = largest_heights(heights, rank(inner().count()) + 1);
-    if largest.first().is_none_or(|(highest, _)| *highest <= far) {
+    if !inner().any(|i| height(i).abs() > far) {
         return 0;
     }
-    let recurring = largest.get(rank(count)).map_or(0.0, |(level, _)| {
-        // Two-sided tail of the normal distribution, to within 3 % for these ranks.
-        let deviate = (2.0 * (count as f64 / rank(count) as f64).ln()).sqrt() - 0.35;
-        let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
-        (level * level - explained * explained).max(0.0).sqrt()
-    });
-    let far = far.max(IMPACTS * recurring);
+    let heights: Vec<f64> = inner().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
+    let far = far.max(IMPACTS * recurring_impact(heights, noise, step_s));
     let is_outlier = |i: usize| {
         let at = height(i);
         let (before, after) = (height(i - 1) / at, height(i + 1) / at);
@@ -216,31 +223,25 @@ fn spikes(
             && (before - after).abs() < SHAPE_TOLERANCE
             && !around.any(|other| other >= LOCAL_SHARE * at.abs())
     };
-    if largest.last().is_some_and(|(least, _)| *least > far) {
-        return inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count();
-    }
-    largest.iter().filter(|(height, i)| *height > far && is_outlier(*i)).count()
+    inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count()
 }
 
 /// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
 const DIFFERENCE_NOISE: f64 = 1.394;
 
-/// The largest heights with their places, at most so many, the largest first; and how many heights there are.
-fn largest_heights(heights: impl Iterator<Item = (f64, usize)>, most: usize) -> (Vec<(f64, usize)>, usize) {
-    // The least of them first; bits of positive numbers rise as the numbers do.
-    let (mut largest, mut count, mut least) = (BinaryHeap::new(), 0, 0);
-    for (height, at) in heights {
-        count += 1;
-        if largest.len() < most || height.to_bits() > least {
-            largest.push(Reverse((height.to_bits(), at)));
-            if largest.len() > most {
-                largest.pop();
-            }
-            least = largest.peek().map_or(0, |Reverse((least, _))| *least);
-        }
-    }
-    let sorted = largest.into_sorted_vec().into_iter();
-    (sorted.map(|Reverse((bits, at))| (f64::from_bits(bits), at)).collect(), count)
+/// Height that fourth differences exceed every six seconds, less what white noise explains of it.
+fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
+    const EVERY_S: f64 = 6.0;
+    const LEAST: usize = 20;
+    /// For the uncertainty of the noise itself.
+    const MARGIN: f64 = 1.05;
+    let rank = ((heights.len() as f64 * step_s / EVERY_S) as usize).max(LEAST);
+    let Some(at) = heights.len().checked_sub(rank + 1) else { return 0.0 };
+    let level = *heights.select_nth_unstable_by(at, f64::total_cmp).1;
+    // Two-sided tail of the normal distribution, to within 3 % for these ranks.
+    let deviate = (2.0 * (heights.len() as f64 / rank as f64).ln()).sqrt() - 0.35;
+    let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
+    (level * level - explained * explained).max(0.0).sqrt()
 }
 
 /// Quality flags of the motor, screw and load channels: stable codes.
@@ -332,7 +333,20 @@ pub(crate) fn load_frozen(
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        /// Passing over samples in groups finds the runs at the rails that looking at each of them does.
+        #[test]
+        fn runs_at_the_rails_are_those_of_all_runs(ticks in proptest::collection::vec(-2_i32..3, 0..90)) {
+            let values: Vec<f64> =
+                ticks.iter().map(|&k| if k == 0 { f64::NAN } else { f64::from(k) }).collect();
+            let all = runs(&values, 2).filter(|run| values[run.start].abs() > 1.5);
+            prop_assert_eq!(repeat_runs_of(&values, [-2.0, 2.0], 2), all.collect::<Vec<_>>());
+        }
+    }
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {

@@ -1,8 +1,15 @@
-//! Figures of a channel, gathered in one pass that follows the decoder: columns are longer than any cache, so each further
-//! pass would cost as much as reading memory.
+//! What can be seen of a channel in one pass over it: sound channels need no other.
+//!
+//! Columns are longer than any cache, so each further pass would cost as much as reading memory; where it can, this one
+//! follows what reads the column. The pass goes in groups of samples whose figures are kept apart, since a chain of
+//! comparisons is as slow as its links.
 
-/// Samples whose range is found side by side: a chain of comparisons is as slow as its links.
+use multiversion::multiversion;
+
+/// Samples in a group.
 const LANES: usize = 8;
+/// Samples whose repeats are found together.
+const BLOCK: usize = 64;
 
 /// Figures of a channel; missing samples are NaN, and compare as nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,55 +35,52 @@ impl ChannelStats {
     }
 }
 
-/// Figures of a channel that grows.
+/// Looks at a channel that grows, at what is new of it.
 #[derive(Debug, Clone)]
 pub(crate) struct StatsAccumulator {
-    stats: ChannelStats,
-    /// Samples up to the latest one that repeat its value.
-    run: usize,
-    /// Samples processed so far.
+    lanes: LaneStats,
+    run: RepeatCounter,
+    /// Samples processed so far; the last ones wait for their successors.
     done: usize,
 }
 
 impl StatsAccumulator {
     pub(crate) fn new() -> Self {
-        let stats = ChannelStats {
-            min: f64::INFINITY,
-            max: f64::NEG_INFINITY,
-            missing: 0,
-            min_step: f64::INFINITY,
-            max_second_difference: 0.0,
-            longest_run: 0,
-        };
-        Self { stats, run: 0, done: 0 }
+        Self { lanes: LaneStats::new(), run: RepeatCounter::default(), done: 0 }
     }
 
-    /// Takes in what is new of the channel, given from its first sample on.
-    #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+    /// The channel as far as it is known by now, from its first sample on.
     pub(crate) fn advance(&mut self, values: &[f64]) {
-        let known = |back: usize| self.done.checked_sub(back).map_or(f64::NAN, |at| values[at]);
-        let (mut earlier, mut before) = (known(2), known(1));
-        let (mut stats, mut run) = (self.stats, self.run);
-        for &at in &values[self.done..] {
-            stats.min = min(stats.min, at);
-            stats.max = max(stats.max, at);
-            stats.missing += usize::from(at.is_nan());
-            let step = (at - before).abs();
-            stats.min_step = min(stats.min_step, if step > 0.0 { step } else { f64::INFINITY });
-            let difference = second_difference(earlier, before, at);
-            stats.max_second_difference = max(stats.max_second_difference, difference);
-            run = if at == before { run + 1 } else { 1 };
-            stats.longest_run = stats.longest_run.max(run);
-            (earlier, before) = (before, at);
-        }
-        (self.stats, self.run, self.done) = (stats, run, values.len());
+        self.done += groups(&values[self.done..], &mut self.lanes, &mut self.run);
     }
 
-    /// The figures of the whole channel.
+    /// What was seen of the whole channel.
     pub(crate) fn end(mut self, values: &[f64]) -> ChannelStats {
         self.advance(values);
-        self.stats
+        let Self { mut lanes, mut run, done } = self;
+        let rest = &values[done..];
+        let at = |k: usize| rest.get(k).copied().unwrap_or(f64::NAN);
+        (0..rest.len()).for_each(|k| lanes.one(0, [at(k), at(k + 1), at(k + 2)]));
+        run.take_rest(rest);
+        lanes.folded(if values.is_empty() { 0 } else { run.most + 1 })
     }
+}
+
+/// Looks at whole groups; how many samples those are. Vectors change no figure: comparisons and halves are exact in all.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn groups(values: &[f64], lanes: &mut LaneStats, run: &mut RepeatCounter) -> usize {
+    let mut done = 0;
+    while let Some(block) = values[done..].first_chunk::<{ BLOCK + 2 }>() {
+        let mut same = 0_u64;
+        for k in (0..BLOCK).step_by(LANES) {
+            let Some(group) = block[k..].first_chunk::<{ LANES + 2 }>() else { continue };
+            lanes.take(group);
+            same |= u64::from(repeat_mask(group)) << k;
+        }
+        run.take(same);
+        done += BLOCK;
+    }
+    done
 }
 
 /// How far a sample lies from the middle of its neighbours.
@@ -110,6 +114,22 @@ pub(crate) struct MinMax {
     high: [f64; LANES],
 }
 
+/// Least and greatest of each lane.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn extend_min_max(
+    mut low: [f64; LANES],
+    mut high: [f64; LANES],
+    groups: &[[f64; LANES]],
+) -> ([f64; LANES], [f64; LANES]) {
+    for group in groups {
+        for lane in 0..LANES {
+            low[lane] = min(low[lane], group[lane]);
+            high[lane] = max(high[lane], group[lane]);
+        }
+    }
+    (low, high)
+}
+
 impl MinMax {
     pub(crate) const NONE: Self = Self { low: [f64::INFINITY; LANES], high: [f64::NEG_INFINITY; LANES] };
 
@@ -117,12 +137,7 @@ impl MinMax {
     #[inline]
     pub(crate) fn take(&mut self, values: &[f64]) {
         let (groups, rest) = values.as_chunks::<LANES>();
-        for group in groups {
-            for (lane, &value) in group.iter().enumerate() {
-                self.low[lane] = min(self.low[lane], value);
-                self.high[lane] = max(self.high[lane], value);
-            }
-        }
+        (self.low, self.high) = extend_min_max(self.low, self.high, groups);
         for &value in rest {
             self.low[0] = min(self.low[0], value);
             self.high[0] = max(self.high[0], value);
@@ -134,6 +149,114 @@ impl MinMax {
         let low = self.low.iter().copied().fold(f64::INFINITY, min);
         self.high.iter().copied().fold(f64::NEG_INFINITY, max) - low
     }
+}
+
+/// Figures of every eighth sample, eight times side by side.
+#[derive(Debug, Clone)]
+struct LaneStats {
+    min: [f64; LANES],
+    max: [f64; LANES],
+    missing: [u64; LANES],
+    min_step: [f64; LANES],
+    max_second_difference: [f64; LANES],
+}
+
+impl LaneStats {
+    fn new() -> Self {
+        Self {
+            min: [f64::INFINITY; LANES],
+            max: [f64::NEG_INFINITY; LANES],
+            missing: [0; LANES],
+            min_step: [f64::INFINITY; LANES],
+            max_second_difference: [0.0; LANES],
+        }
+    }
+
+    /// A group and the two samples after it.
+    #[inline]
+    fn take(&mut self, group: &[f64; LANES + 2]) {
+        for lane in 0..LANES {
+            self.one(lane, [group[lane], group[lane + 1], group[lane + 2]]);
+        }
+    }
+
+    #[inline]
+    fn one(&mut self, lane: usize, [at, next, after]: [f64; 3]) {
+        self.min[lane] = min(self.min[lane], at);
+        self.max[lane] = max(self.max[lane], at);
+        self.missing[lane] += u64::from(at.is_nan());
+        let step = (next - at).abs();
+        self.min_step[lane] = min(self.min_step[lane], if step > 0.0 { step } else { f64::INFINITY });
+        self.max_second_difference[lane] =
+            max(self.max_second_difference[lane], second_difference(at, next, after));
+    }
+
+    fn folded(&self, longest_run: usize) -> ChannelStats {
+        ChannelStats {
+            min: self.min.iter().copied().fold(f64::INFINITY, min),
+            max: self.max.iter().copied().fold(f64::NEG_INFINITY, max),
+            missing: self.missing.iter().sum::<u64>() as usize,
+            min_step: self.min_step.iter().copied().fold(f64::INFINITY, min),
+            max_second_difference: self.max_second_difference.iter().copied().fold(0.0, max),
+            longest_run,
+        }
+    }
+}
+
+/// Follows samples that repeat the one before.
+#[derive(Debug, Clone, Default)]
+struct RepeatCounter {
+    /// Repeats up to here.
+    repeats: usize,
+    most: usize,
+}
+
+impl RepeatCounter {
+    /// Which samples of a block are repeated by the one after them, a bit each.
+    #[inline]
+    fn take(&mut self, same: u64) {
+        let joined = self.repeats + same.trailing_ones() as usize;
+        self.repeats = if same == u64::MAX { joined } else { same.leading_ones() as usize };
+        self.most = self.most.max(joined);
+        while has_ones_run(same, self.most + 1) {
+            self.most += 1;
+        }
+    }
+
+    /// Some samples, of which the first was the last of those before.
+    #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+    fn take_rest(&mut self, values: &[f64]) {
+        for (a, b) in values.iter().zip(values.iter().skip(1)) {
+            self.repeats = (self.repeats + 1) * usize::from(a == b);
+            self.most = self.most.max(self.repeats);
+        }
+    }
+}
+
+/// Which samples of a group are repeated by the one after them, a bit each.
+#[inline]
+#[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+fn repeat_mask(group: &[f64; LANES + 2]) -> u8 {
+    let mut same = 0;
+    for lane in 0..LANES {
+        same |= u8::from(group[lane] == group[lane + 1]) << lane;
+    }
+    same
+}
+
+/// Whether there are `ones` consecutive set bits, at least one: each shift keeps the bits that end a longer run.
+#[inline]
+fn has_ones_run(bits: u64, ones: usize) -> bool {
+    if ones > BLOCK {
+        return false;
+    }
+    let (mut ends, mut known) = (bits, 1);
+    while known < ones {
+        let more = known.min(ones - known);
+        ends &= ends >> more;
+        known += more;
+    }
+    ends != 0
 }
 
 #[cfg(test)]
@@ -153,9 +276,9 @@ mod tests {
     }
 
     proptest! {
-        /// Over channels with repeats and holes.
+        /// One pass sees what a pass for each figure does, over channels with repeats and holes.
         #[test]
-        fn one_pass_sees_what_a_pass_for_each_figure_does(values in channel()) {
+        fn the_lanes_see_what_plain_passes_do(values in channel()) {
             let seen = ChannelStats::of(&values);
             let known = || values.iter().copied().filter(|v| !v.is_nan());
             prop_assert_eq!(seen.min.to_bits(), known().fold(f64::INFINITY, f64::min).to_bits());
