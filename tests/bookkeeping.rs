@@ -268,6 +268,20 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
         text.lines().map(line).collect::<Vec<_>>()
     };
     assert_eq!(gaps(&fleet.exported()), gaps(&before));
+    // Both logs new in one run: neither is an error, and each accounts for its own, whichever is read first. The larger
+    // one is: that without a load in the second case, where the other one has the ailerons alone.
+    let run_anew = || {
+        std::fs::remove_dir_all(fleet.path("results")).unwrap();
+        fleet.run_ok(&["run", "--jobs", "1"]);
+        assert_eq!(gaps(&fleet.exported()), gaps(&before));
+        fleet.run_ok(&["store", "verify"]);
+        assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
+    };
+    run_anew();
+    let of_ailerons = |column: &str| column == "time_s" || column.starts_with("aileron");
+    rewrite(&whole, &fleet.path("ailerons"), &facts(&whole), of_ailerons, |_| true);
+    std::fs::rename(fleet.path("ailerons"), &whole).unwrap();
+    run_anew();
 }
 
 #[test]

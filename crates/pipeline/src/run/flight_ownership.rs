@@ -67,8 +67,8 @@ pub(crate) struct OwnershipLedger<'a> {
 
 /// What becomes of a record that another log holds too.
 enum Claim {
-    /// The new record counts; the other one may have the same samples.
-    Takes { is_same: bool },
+    /// The new record counts.
+    Takes,
     /// The other log's record stays; it has the same samples.
     IsCopy,
     /// The other log's record stays, since it has a gap and the new one has none.
@@ -126,7 +126,8 @@ impl<'a> OwnershipLedger<'a> {
             LogOutcomeData::Same(account) => {
                 report.known += 1;
                 if let Some(digests) = plan::digests(&account) {
-                    let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
+                    let is_new_path = !self.plan.accounts.contains_key(&account.log_path);
+                    let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
                     let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
                     self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
                     let owner = self.plan.here.get(&digests).filter(|owner| **owner != account.log_path);
@@ -161,16 +162,18 @@ impl<'a> OwnershipLedger<'a> {
         let (mut kept, mut displaced) = (Vec::new(), BTreeMap::<String, bool>::new());
         let (mut copy_of, mut contradicts, mut worse_than) = (None, None, None);
         for record in records {
-            let Some(other) = held.get(&RecordKey::of(&record)) else {
+            let key = RecordKey::of(&record);
+            let Some(other) = held.get(&key) else {
                 kept.push(record);
                 continue;
             };
             let owner = other.log_path.clone();
             let new = HeldRecord::of(&record);
+            let is_held_by_run = self.own.contains_key(&key);
             let is_same = other.log_digest == new.log_digest || other.fingerprint == new.fingerprint;
-            match self.claim(&account, &record, other, is_same) {
-                Claim::Takes { is_same } => {
-                    if self.own.contains_key(&RecordKey::of(&record)) {
+            match self.claim(&account, &new, other, is_same, is_held_by_run) {
+                Claim::Takes => {
+                    if is_held_by_run {
                         displaced.entry(owner).or_insert(is_same);
                     }
                     kept.push(record);
@@ -191,7 +194,15 @@ impl<'a> OwnershipLedger<'a> {
         }
         let mut results = vec![self.store(account, kept, &diagnostics, moved_from, report)];
         for (log, is_same) in displaced {
-            let Some(loser) = self.accounts.get(&log).cloned() else { continue };
+            let Some(mut loser) = self.accounts.get(&log).cloned() else { continue };
+            let left = self.left_to(&loser);
+            if !left.is_empty() {
+                let estimated = left.iter().filter(|record| record.is_estimated).count();
+                (loser.estimated, loser.refused) = (estimated as i64, (left.len() - estimated) as i64);
+                self.insert(loser.clone());
+                results.push(LogResult { account: loser, records: Vec::new(), moved_from: Vec::new() });
+                continue;
+            }
             let (loser, diagnostics) = superseded(loser, &results[0].account, is_same);
             if is_same {
                 let (log, owner) = (log, results[0].account.log_path.clone());
@@ -200,6 +211,12 @@ impl<'a> OwnershipLedger<'a> {
             results.push(self.store(loser, Vec::new(), &diagnostics, Vec::new(), report));
         }
         Ok(results)
+    }
+
+    /// The records of this run that a log still has, after another one took some of them.
+    fn left_to(&self, log: &LogRecord) -> Vec<&HeldRecord> {
+        let keys = log.keys();
+        keys.iter().filter_map(|key| self.own.get(key)).filter(|held| held.log_path == log.log_path).collect()
     }
 
     /// The records that other logs hold of the same flights: those of this run, and stored ones.
@@ -219,30 +236,32 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// What becomes of a record of a log where another log's record of the same flight is held.
-    fn claim(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord, is_same: bool) -> Claim {
-        let is_estimated = record.estimate.status == Status::Estimated;
+    fn claim(
+        &self,
+        account: &LogRecord,
+        new: &HeldRecord,
+        held: &HeldRecord,
+        is_same: bool,
+        is_held_by_run: bool,
+    ) -> Claim {
         let holder = self.accounts.get(&held.log_path);
         let is_gone = holder.is_none();
         // A log that broke speaks for no record any more; a copy of what it was takes its place.
         let is_broken = holder.is_some_and(|holder| holder.estimated + holder.refused == 0);
-        match (is_estimated, held.is_estimated) {
-            (true, false) => Claim::Takes { is_same: false },
+        match (new.is_estimated, held.is_estimated) {
+            (true, false) => Claim::Takes,
             (false, true) => Claim::IsWorse,
-            _ if is_gone || (is_broken && is_same) => Claim::Takes { is_same },
-            _ => match (self.precedes(account, record, held), is_same) {
-                (true, is_same) => Claim::Takes { is_same },
-                (false, true) => Claim::IsCopy,
-                (false, false) => Claim::Contradicts,
-            },
+            _ if is_gone || (is_broken && is_same) => Claim::Takes,
+            _ if is_held_by_run && self.precedes(account, held) => Claim::Takes,
+            _ if is_same => Claim::IsCopy,
+            _ => Claim::Contradicts,
         }
     }
 
     /// Whether a log comes before the holder of its flight: the one that was stored before this run, else by name.
-    fn precedes(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord) -> bool {
-        let is_held_by_run = self.own.contains_key(&RecordKey::of(record));
+    fn precedes(&self, account: &LogRecord, held: &HeldRecord) -> bool {
         let holder = self.accounts.get(&held.log_path);
         match (self.is_stored(account), holder.is_some_and(|holder| self.is_stored(holder))) {
-            _ if !is_held_by_run => false,
             (true, false) => true,
             (false, true) => false,
             _ => account.log_path < held.log_path,
