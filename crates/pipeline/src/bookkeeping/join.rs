@@ -7,7 +7,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{ArrayRef, AsArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray};
+use arrow::array::{
+    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
+};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int32Type, TimestampMicrosecondType};
 use arrow::error::ArrowError;
@@ -138,8 +140,7 @@ impl Bookkeeping {
 
     /// Whether the latest run wrote these tables into all records, and ended.
     fn is_written(&self, store: &Store) -> Result<bool, Error> {
-        let latest = store.runs()?.into_iter().next_back();
-        Ok(latest.is_some_and(|run| run.tables_digest.as_deref() == Some(self.digest.as_str())))
+        Ok(store.tables_digest()?.as_deref() == Some(self.digest.as_str()))
     }
 
     /// Writes the tables into all records of the store, and the new paths of renamed logs.
@@ -235,7 +236,9 @@ fn set(values: Option<&mut Vec<Option<f64>>>, row: usize, value: Option<f64>) {
 /// A column of texts as codes, to which texts can be added.
 struct Coded {
     keys: Vec<i32>,
-    texts: Vec<String>,
+    texts: StringArray,
+    /// Texts that were added, and the codes of all; filled by the first one that is asked for.
+    added: Vec<String>,
     codes: HashMap<String, i32>,
 }
 
@@ -243,30 +246,34 @@ impl Coded {
     fn of(column: &ArrayRef) -> Result<Self, ArrowError> {
         let coded = cast(column, &DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)))?;
         let coded = coded.as_dictionary::<Int32Type>();
-        let texts = coded.values().as_string::<i32>();
-        let texts: Vec<String> = texts.iter().map(|text| text.unwrap_or_default().to_owned()).collect();
-        let codes = texts.iter().cloned().zip(0..).collect();
-        Ok(Self { keys: coded.keys().values().to_vec(), texts, codes })
+        let (keys, texts) = (coded.keys().values().to_vec(), coded.values().as_string::<i32>().clone());
+        Ok(Self { keys, texts, added: Vec::new(), codes: HashMap::new() })
     }
 
+    /// The stored text of a row.
     fn text(&self, row: usize) -> &str {
-        self.texts.get(self.keys[row] as usize).map_or("", String::as_str)
+        self.texts.value(self.keys[row] as usize)
     }
 
     /// The code of a text.
     fn code(&mut self, text: &str) -> i32 {
+        if self.codes.is_empty() {
+            let stored = self.texts.iter().map(|text| text.unwrap_or_default().to_owned());
+            self.codes = stored.zip(0..).collect();
+        }
         if let Some(code) = self.codes.get(text) {
             return *code;
         }
-        let code = self.texts.len() as i32;
-        self.texts.push(text.to_owned());
+        let code = (self.texts.len() + self.added.len()) as i32;
+        self.added.push(text.to_owned());
         self.codes.insert(text.to_owned(), code);
         code
     }
 
     fn array(self) -> Result<ArrayRef, ArrowError> {
-        let (keys, texts) = (Int32Array::from(self.keys), StringArray::from(self.texts));
-        Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(texts))?))
+        let added = self.added.iter().map(|text| Some(text.as_str()));
+        let texts: StringArray = self.texts.iter().chain(added).collect();
+        Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(Int32Array::from(self.keys), Arc::new(texts))?))
     }
 }
 

@@ -60,6 +60,17 @@ impl Store {
         Ok(runs)
     }
 
+    /// Digest of the tables that the latest run wrote into all records; none where it has not ended. The latest one is the one
+    /// whose row was committed last: a clock may go back.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn tables_digest(&self) -> Result<Option<String>, Error> {
+        let name = |run: &RunRecord| run.run_id.clone();
+        let runs = self.newest_with_commits(&self.runs, None, |_| true, name)?;
+        Ok(runs.into_iter().max_by_key(|(commit, _)| *commit).and_then(|(_, run)| run.tables_digest))
+    }
+
     /// Whether a run holds the store now; in a bucket, whether a run without an end sent a heartbeat recently.
     ///
     /// # Errors

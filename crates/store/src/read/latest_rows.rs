@@ -37,6 +37,18 @@ impl Store {
         may_hold: impl Fn(&Stats) -> bool,
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
+        let rows = self.newest_with_commits(table, wanted, may_hold, name)?;
+        Ok(rows.into_iter().map(|(_, row)| row).collect())
+    }
+
+    /// The same, each row with the number of its commit.
+    pub(crate) fn newest_with_commits<R: Row + FromCells>(
+        &self,
+        table: &Table,
+        wanted: Option<TextFilter<'_>>,
+        may_hold: impl Fn(&Stats) -> bool,
+        name: impl Fn(&R) -> String,
+    ) -> Result<Vec<(i64, R)>, Error> {
         let snapshot = table.snapshot()?;
         let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
         let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
@@ -49,7 +61,7 @@ fn newest_of<R: Row + FromCells>(
     files: &[PathBuf],
     wanted: Option<TextFilter<'_>>,
     name: impl Fn(&R) -> String,
-) -> Result<Vec<R>, Error> {
+) -> Result<Vec<(i64, R)>, Error> {
     let schema = versioned::schema::<R>();
     let commit_column = schema.index_of(versioned::COMMIT)?;
     // By name: the row, and the commit that it came with.
@@ -68,7 +80,7 @@ fn newest_of<R: Row + FromCells>(
             }
         }
     }
-    Ok(newest.into_values().map(|(_, row)| row).collect())
+    Ok(newest.into_values().collect())
 }
 
 impl TextFilter<'_> {
@@ -118,7 +130,7 @@ mod tests {
             writer.close().unwrap();
         }
         let newest = newest_of(&files, wanted, |run: &RunRecord| run.run_id.clone())?;
-        Ok(newest.into_iter().map(|run| (run.run_id, run.found)).collect())
+        Ok(newest.into_iter().map(|(_, run)| (run.run_id, run.found)).collect())
     }
 
     #[test]

@@ -13,7 +13,7 @@ use arrow::datatypes::{Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use records::{GapRecord, Status};
 
-use crate::delta::snapshot::Snapshot;
+use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::join::Join;
@@ -44,9 +44,8 @@ impl Selection {
     pub(crate) fn of(store: &Store, snapshot: &Snapshot, query: &Query, wanted: &SchemaRef) -> Self {
         let join = store.join.clone();
         let is_joined = |column: &str| join.is_some() && JOINED.contains(&column);
-        let may_hold = |file: &&crate::delta::snapshot::DataFile| {
-            file.has_rows() && query.may_be_in(&file.stats, |column| !is_joined(column))
-        };
+        let may_hold =
+            |file: &&DataFile| file.has_rows() && query.may_be_in(&file.stats, |column| !is_joined(column));
         let files: Vec<_> = snapshot.files.iter().filter(may_hold).collect();
         let (joined, mut stored): (Vec<_>, Vec<_>) =
             query.conditions().into_iter().partition(|condition| is_joined(condition.column));

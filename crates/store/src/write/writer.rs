@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
-use arrow::compute::filter_record_batch;
+use arrow::compute::kernels::cmp::distinct;
+use arrow::compute::{filter_record_batch, or};
 use arrow::datatypes::{Float64Type, Int64Type, Schema, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use records::{GapRecord, Status};
@@ -192,7 +193,7 @@ impl Writer {
                 self.store.check(files)?;
                 let before = scan::read_table(files, &some, &[])?;
                 let after = change(&before)?;
-                let rows = differing_rows(&before, &after);
+                let rows = differing_rows(&before, &after)?;
                 if rows == 0 {
                     continue;
                 }
@@ -247,12 +248,12 @@ impl Writer {
 }
 
 /// Number of rows that differ between two batches of the same columns.
-fn differing_rows(before: &RecordBatch, after: &RecordBatch) -> usize {
-    if before.columns() == after.columns() {
-        return 0;
+fn differing_rows(before: &RecordBatch, after: &RecordBatch) -> Result<usize, ArrowError> {
+    let mut differs = BooleanArray::from(vec![false; before.num_rows()]);
+    for (before, after) in before.columns().iter().zip(after.columns()) {
+        differs = or(&differs, &distinct(before, after)?)?;
     }
-    let is_other = |row: &usize| before.slice(*row, 1).columns() != after.slice(*row, 1).columns();
-    (0..before.num_rows()).filter(is_other).count()
+    Ok(differs.true_count())
 }
 
 /// Appends rows to a table of which the newest counts.
