@@ -1,15 +1,15 @@
 //! Fleet assessment: trends of units from the store's records, by part and serial number across tails.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::{Installation, Installations, QuantityChange, QuantityRow};
+use records::{Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 
-use crate::bookkeeping::inspections::{self, InspectionRow};
+use crate::bookkeeping::inspections::InspectionIndex;
 use crate::bookkeeping::installation_index::InstallationIndex;
 use crate::bookkeeping::usage::UsageSources;
 use crate::error::Error;
@@ -339,35 +339,6 @@ impl UnitFacts for Facts<'_, '_> {
     }
 }
 
-/// Inspections by serial number, earliest first.
-fn by_serial(rows: Option<Vec<InspectionRow>>) -> HashMap<String, Vec<InspectionRow>> {
-    let mut rows = rows.unwrap_or_default();
-    rows.sort_by_key(|row| row.date_utc);
-    let mut found = HashMap::<String, Vec<InspectionRow>>::new();
-    for row in rows {
-        found.entry(row.serial_number.clone()).or_default().push(row);
-    }
-    found
-}
-
-/// The row of a unit with its latest inspection: one at or above the limit makes the state, and one that contradicts the
-/// records is named.
-fn inspected(row: TrendRow, inspection: &InspectionRow, records: &[FlightRow]) -> TrendRow {
-    let (statement, contradicts) = inspection.statement(records);
-    let reason = row.reason.clone().unwrap_or_default();
-    let is_above = row.limit_m.is_some_and(|limit_m| inspection.play_m >= limit_m);
-    if is_above && row.state != Some(State::Act.as_str()) {
-        let limit_um = row.limit_m.unwrap_or_default() * 1e6;
-        let reason = format!("{statement}, at or above the limit of {limit_um:.1} µm; records: {reason}");
-        let (state, reason_code) = (Some(State::Act.as_str()), Some("inspected"));
-        return TrendRow { state, reason_code, reason: Some(reason), ..row };
-    }
-    if is_above || contradicts {
-        return TrendRow { reason: Some(format!("{reason}; {statement}")), ..row };
-    }
-    row
-}
-
 /// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
     limits: Limits<'a>,
@@ -383,8 +354,8 @@ pub(crate) struct FleetContext<'a> {
     mapping_faults: Vec<MappingFault>,
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
-    /// Inspections of the store's own units, by serial number, earliest first.
-    inspections: HashMap<String, Vec<InspectionRow>>,
+    /// Inspections of the store's own units.
+    inspections: InspectionIndex,
 }
 
 impl<'a> FleetContext<'a> {
@@ -400,9 +371,7 @@ impl<'a> FleetContext<'a> {
         let units: Vec<_> = histories.iter().collect();
         let read = |(name, history)| books.series(name, history, is_booked);
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let installations = is_booked.then(|| InstallationIndex::new(installations));
-        let inspections = if is_booked { by_serial(inspections::read(config)?) } else { HashMap::new() };
-        Ok(Self { installations, inspections, ..Self::of(config, histories, series) }.taught_by(days))
+        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
     }
 
     /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
@@ -421,17 +390,21 @@ impl<'a> FleetContext<'a> {
         };
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let installations = is_booked.then(|| InstallationIndex::new(installations));
-        let inspections = if is_booked { by_serial(inspections::read(config)?) } else { HashMap::new() };
-        Ok(Self { installations, inspections, ..Self::of(config, histories, series) }.taught_by(days))
+        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
     }
 
-    /// Histories, and the usage series of each.
-    fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
+    /// Histories, and the usage series of each; the operator's tables apply to those of the store alone.
+    fn of(
+        config: &'a Config,
+        installations: &'a Installations,
+        histories: &'a Histories,
+        series: Vec<Series>,
+    ) -> Result<Self, Error> {
+        let is_booked = histories.is_booked();
         let limits = Limits::new(config, series.iter());
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
-        Self {
+        Ok(Self {
             limits,
             units,
             priors: FleetPriors::default(),
@@ -439,9 +412,9 @@ impl<'a> FleetContext<'a> {
             conditions: BTreeMap::new(),
             moved: Vec::new(),
             mapping_faults: Vec::new(),
-            installations: None,
-            inspections: HashMap::new(),
-        }
+            installations: is_booked.then(|| InstallationIndex::new(installations)),
+            inspections: if is_booked { InspectionIndex::read(config)? } else { InspectionIndex::default() },
+        })
     }
 
     /// The same with the priors of the cut-off before each of the days.
@@ -596,32 +569,13 @@ impl<'a> FleetContext<'a> {
             trend_row::row(name, history, series, limit_m, trend, as_of, wide, (installed, removal), fault);
         let conditions = self.conditions.get(name).cloned().unwrap_or_default();
         let row = TrendRow { usage_axis, conditions, ..row };
-        let row = match self.latest_inspection(name, series, installed, as_of) {
-            Some(inspection) => inspected(row, inspection, history.until(as_of)),
-            None => row,
-        };
-        row.with_action(self.limits.at_limit(name.0.as_deref()))
-    }
-
-    /// The latest inspection of a unit in its present installation, since its last renewal.
-    fn latest_inspection(
-        &self,
-        name: &UnitKey,
-        series: Option<&Series>,
-        installed: Option<&Installation>,
-        as_of: Timestamp,
-    ) -> Option<&InspectionRow> {
-        let installed_utc = installed?.installed_utc;
         let renewals =
             series.map(|series| series.maintenance_until(as_of.as_microsecond())).unwrap_or_default();
-        let renewed_us = renewals.iter().rev().find(|event| event.renews).map(|event| event.utc_us);
-        let mut of_unit =
-            self.inspections.get(&name.1)?.iter().rev().filter(|inspection| inspection.is_of(name));
-        let is_of_now = |inspection: &&InspectionRow| {
-            (installed_utc..=as_of).contains(&inspection.date_utc)
-                && renewed_us.is_none_or(|us| us < inspection.date_utc.as_microsecond())
-        };
-        of_unit.find(is_of_now)
+        let renewed = renewals.iter().rev().find(|event| event.renews);
+        let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
+        let inspection = installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of));
+        let row = trend_row::inspected(row, inspection, history.until(as_of));
+        row.with_action(self.limits.at_limit(name.0.as_deref()))
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

@@ -6,7 +6,9 @@ use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
 use trend::{Assessment, ForecastMethod, Reason, Series, State};
 
+use crate::bookkeeping::inspections::InspectionRow;
 use crate::fleet_trends::tail_wide_steps::TailWide;
+use crate::history::flight_row::FlightRow;
 use crate::history::histories::{History, TailPosition, UnitKey};
 use crate::monitoring::mapping_faults::MappingFault;
 
@@ -108,6 +110,29 @@ pub(crate) fn row(
         elapsed_hours: NoColumn(trend.elapsed_hours),
         sketch_m: sketched(&gaps_m),
     }
+}
+
+/// The row of a unit with its latest inspection: one at or above the limit makes the state, and one that contradicts the
+/// records is named.
+pub(crate) fn inspected(
+    row: TrendRow,
+    inspection: Option<&InspectionRow>,
+    records: &[FlightRow],
+) -> TrendRow {
+    let Some(inspection) = inspection else { return row };
+    let (statement, contradicts) = inspection.statement(records);
+    let reason = row.reason.clone().unwrap_or_default();
+    let is_above = row.limit_m.is_some_and(|limit_m| inspection.play_m >= limit_m);
+    if is_above && row.state != Some(State::Act.as_str()) {
+        let limit_um = row.limit_m.unwrap_or_default() * 1e6;
+        let reason = format!("{statement}, at or above the limit of {limit_um:.1} µm; records: {reason}");
+        let (state, reason_code) = (Some(State::Act.as_str()), Some("inspected"));
+        return TrendRow { state, reason_code, reason: Some(reason), ..row };
+    }
+    if is_above || contradicts {
+        return TrendRow { reason: Some(format!("{reason}; {statement}")), ..row };
+    }
+    row
 }
 
 /// Rows of a unit that cannot be right, in words.

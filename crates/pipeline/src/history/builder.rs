@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use crate::history::flight_row::{FlightExtras, FlightInput};
 use crate::history::histories::{Positions, UnitKey};
 use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
-use crate::history::settings_counts::{SettingsCounts, add_settings};
+use crate::history::settings_counts::SettingsCounts;
 
 /// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
 const BLOCK_ROWS: usize = 1 << 19;
@@ -139,7 +139,6 @@ impl HistoryBuilder {
         let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
         let mut seen = KeyCache::default();
         let settings = TextColumn::of(chunk, &[SETTINGS])?;
-        let mut counts = HashMap::<(usize, &str), (usize, i64)>::new();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
             let position_key = match seen.get(position_keys, row) {
@@ -168,12 +167,9 @@ impl HistoryBuilder {
             };
             self.push_row(position_key, &said);
             if let Some(settings) = settings.get(row).filter(|_| said.gap_m.is_some()) {
-                let count = counts.entry((position_key.unit, settings)).or_insert((0, i64::MIN));
-                *count = (count.0 + 1, count.1.max(said.departure_utc.as_microsecond()));
+                let latest_us = said.departure_utc.as_microsecond();
+                self.units[position_key.unit].settings.add(settings, 1, latest_us);
             }
-        }
-        for ((unit, settings), count) in counts {
-            add_settings(&mut self.units[unit].settings, settings, count);
         }
         Ok(())
     }

@@ -110,11 +110,7 @@ impl History {
     /// Number of gaps by other settings of the estimate than the latest gap, the departure of the last of them, and the number
     /// of all gaps; none where all are by the same.
     pub(crate) fn other_settings(&self) -> Option<(usize, Timestamp, usize)> {
-        let latest_us = self.settings.values().map(|(_, us)| *us).max()?;
-        let others = || self.settings.values().filter(|(_, us)| *us < latest_us);
-        let all = self.settings.values().map(|(gaps, _)| gaps).sum();
-        let last_us = others().map(|(_, us)| *us).max()?;
-        Some((others().map(|(gaps, _)| gaps).sum(), Timestamp::from_microsecond(last_us).ok()?, all))
+        self.settings.others()
     }
 
     /// The one that departed then.

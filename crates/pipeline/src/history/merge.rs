@@ -11,7 +11,7 @@ use crate::history::builder::{HistoryBuilder, RowBlock, StagedRow, UnitEntry};
 use crate::history::extras::ExtrasArena;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, Positions, UnitKey};
-use crate::history::settings_counts::{SettingsCounts, add_settings};
+use crate::history::settings_counts::SettingsCounts;
 
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
 const SHARES: usize = 4;
@@ -52,9 +52,7 @@ fn capacities(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
         let capacity = capacities.entry(unit.name.clone()).or_default();
         capacity.rows += unit.rows;
         capacity.bytes += unit.bytes;
-        unit.settings
-            .iter()
-            .for_each(|(settings, count)| add_settings(&mut capacity.settings, settings, *count));
+        capacity.settings.add_all(&unit.settings);
     }
     for (rank, capacity) in capacities.values_mut().enumerate() {
         capacity.rank = rank as u32;

@@ -149,8 +149,7 @@ pub(crate) fn execute_run(
     units.extend(report.moved.iter().flat_map(|moved| [moved.former_unit(), moved.present_unit()]));
 
     (context.watch)(Event::Trends { units: units.len() });
-    let moved = report.moved.clone();
-    let facts = RunFacts { run_id: &inputs.run_id, with_records: &with_records, moved: &moved };
+    let facts = RunFacts { run_id: &inputs.run_id, with_records: &with_records, moved: &report.moved };
     let mut assessments = assess::assess_run(config, &inputs.installations, &store, &units, facts)?;
     let findings = std::mem::take(&mut assessments.findings);
     let states = std::mem::take(&mut assessments.changes.states);
