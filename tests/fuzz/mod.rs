@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use ingest::log::in_memory::ChannelArrays;
 use job::Config;
-use pipeline::bookkeeping::maintenance_log;
-use pipeline::history::external_estimates;
+use pipeline::fleet::bookkeeping::maintenance_log;
+use pipeline::fleet::external_estimates;
 use records::{PartNumber, Status, TailNumber};
 
 use self::engine::{Input, Random, change_edits, edit_text, fuzz};
@@ -177,7 +177,7 @@ fn fuzz_estimators() {
     fuzz("estimator inputs", corpus, 150, change, |bytes| {
         let [time_s, motor_m, screw_m, load_n] = channels(bytes);
         let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
-        match pipeline::estimate::of_arrays(&arrays, &config, &part, "fuzz") {
+        match pipeline::inspect::estimate::of_arrays(&arrays, &config, &part, "fuzz") {
             Ok(row) => {
                 let found = row.estimate;
                 if found.status == Status::Estimated {

@@ -7,8 +7,8 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use pipeline::fleet_trends::assess::load_histories;
-use pipeline::history::external_estimates;
+use pipeline::assess::trends::load_histories;
+use pipeline::fleet::external_estimates;
 use store::Store;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -15,9 +15,10 @@ use std::error::Error;
 use std::sync::atomic::AtomicBool;
 
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::Request;
+use pipeline::assess::trends::{self, UnitSelection};
+use pipeline::inspect::simulate;
 use pipeline::run::scheduler::{self, Context};
-use pipeline::{Request, simulate};
 use records::QuantityChange;
 use simulator::{PlantedChange, Spec};
 use store::{Holder, Store};
@@ -172,7 +173,7 @@ fn changes_of(spec: &Spec) -> Result<Vec<QuantityChange>, Box<dyn Error>> {
     let store = Store::open(folder.path().join("results"))?;
     let installations = scheduler::installations(&config)?;
     let ask = UnitSelection::default();
-    Ok(assess::assess_store_with_quantities(&config, &installations, &store, &ask)?.followed.changes)
+    Ok(trends::assess_store_with_quantities(&config, &installations, &store, &ask)?.followed.changes)
 }
 
 fn name_of(change: &QuantityChange) -> String {

@@ -13,8 +13,8 @@ use ingest::log::in_memory::ChannelArrays;
 use ingest::parquet::writer::Encoding;
 use ingest::tables::{Table as Cells, TableBatch};
 use pipeline::Request;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::history::external_estimates;
+use pipeline::assess::trends::{self, UnitSelection};
+use pipeline::fleet::external_estimates;
 use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
 use store::{Holder, Query};
@@ -54,7 +54,14 @@ pub(crate) fn estimate(
         py.check_signals()?;
         let number = number.as_ref();
         let read = py.detach(|| {
-            pipeline::estimate::estimate(log, &config.inner, installations, number, VERSION, &mut diagnostics)
+            pipeline::inspect::estimate::estimate(
+                log,
+                &config.inner,
+                installations,
+                number,
+                VERSION,
+                &mut diagnostics,
+            )
         });
         found.extend(read.map_err(|error| to_run_exception(py, error))?);
     }
@@ -78,7 +85,7 @@ pub(crate) fn estimate_arrays(
         [numbers(time_s)?, numbers(motor_m)?, numbers(screw_m)?, numbers(load_n)?];
     let found = py.detach(|| {
         let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
-        pipeline::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
+        pipeline::inspect::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
     Ok(Table::of(to_nullable_batch(&[found]).map_err(|e| to_run_exception(py, e.into()))?))
@@ -96,7 +103,7 @@ pub(crate) fn trace(
     let no_installations = Installations::default();
     let number = part_number.map(|number| part(py, config, number)).transpose()?;
     let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
-    let files = pipeline::run::discover::log_containing(&config.inner, &log)
+    let files = pipeline::logs::discover::log_containing(&config.inner, &log)
         .map_err(|error| to_run_exception(py, error))?;
     let log_path = log.display().to_string();
     let seen =
@@ -144,7 +151,7 @@ fn assess(
 ) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (estimate_batches, queries_table) {
         (None, None) => {
-            return assess::assess_store(
+            return trends::assess_store(
                 config,
                 installations,
                 &pipeline::open_store(config, installations)?,
@@ -152,11 +159,11 @@ fn assess(
             );
         }
         (Some(batches), _) => external_estimates::from_batches(&chunks(batches))?,
-        (None, Some(_)) => assess::load_histories(&pipeline::open_store(config, installations)?)?,
+        (None, Some(_)) => trends::load_histories(&pipeline::open_store(config, installations)?)?,
     };
     match queries_table {
-        None => assess::assess_histories(config, installations, histories, ask),
-        Some(queries_table) => assess::assess_queries(
+        None => trends::assess_histories(config, installations, histories, ask),
+        Some(queries_table) => trends::assess_queries(
             config,
             installations,
             histories,
@@ -220,11 +227,11 @@ pub(crate) fn normalize(
     let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
     let done = py.detach(|| {
         let whole = |log: &PathBuf| {
-            Ok((pipeline::run::discover::log_containing(&config.inner, log)?, log.display().to_string()))
+            Ok((pipeline::logs::discover::log_containing(&config.inner, log)?, log.display().to_string()))
         };
         let logs = logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?;
         let place = (output.as_path(), encoding);
-        pipeline::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
+        pipeline::inspect::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
     });
     let done = done.map_err(|error| to_run_exception(py, error))?;
     let trouble = (!done.diagnostics.is_empty())

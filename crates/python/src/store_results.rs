@@ -7,13 +7,13 @@ use std::sync::Arc;
 use ::records::row_schema::{Row, to_nullable_batch};
 use ::records::{Diagnostic, GapRecord};
 use jiff::Timestamp;
-use pipeline::explain::RecordKey;
-use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
-use pipeline::fleet_trends::backtest;
-use pipeline::follow_up::work_requests::{self, WorkSelection};
-use pipeline::history::external_estimates;
+use pipeline::assess::backtest;
+use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
+use pipeline::findings::work_requests::{self, WorkSelection};
+use pipeline::fleet::external_estimates;
+use pipeline::inspect::explain::RecordKey;
+use pipeline::inspect::store_diff::compare_stores;
 use pipeline::report::{compose, data, publish};
-use pipeline::store_diff::compare_stores;
 use pyo3::prelude::*;
 use store::Store;
 
@@ -52,7 +52,7 @@ fn followed(
     let (installations, ask) = (config.installations(py)?, selection(py, units, as_of)?);
     let config = &config.inner;
     let found = py.detach(|| {
-        assess::assess_store_with_quantities(
+        trends::assess_store_with_quantities(
             config,
             installations,
             &pipeline::open_store(config, installations)?,
@@ -101,7 +101,7 @@ pub(crate) fn backtest_forecasts(
     let rows = py.detach(|| {
         let histories = match batches {
             Some(batches) => external_estimates::from_batches(&chunks(batches))?,
-            None => assess::load_histories(&pipeline::open_store(config, installations)?)?,
+            None => trends::load_histories(&pipeline::open_store(config, installations)?)?,
         };
         backtest::of_histories(config, installations, &histories)
     });
@@ -128,7 +128,7 @@ pub(crate) fn explain(
     let key = RecordKey { flight_id: flight, position, tail_number: tail };
     let found = py
         .detach(|| {
-            pipeline::explain::explain(
+            pipeline::inspect::explain::explain(
                 config,
                 installations,
                 &pipeline::open_store(config, installations)?,
@@ -204,18 +204,18 @@ pub(crate) fn check(
         let (logs, faults) = match logs {
             Some(logs) => {
                 let whole = |log: &PathBuf| {
-                    Ok((pipeline::run::discover::log_containing(&config, log)?, log.display().to_string()))
+                    Ok((pipeline::logs::discover::log_containing(&config, log)?, log.display().to_string()))
                 };
                 (logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?, Vec::new())
             }
             None => {
-                let found = pipeline::run::discover::discover(&config)?;
+                let found = pipeline::logs::discover::discover(&config)?;
                 let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
                 let logs = found.logs.into_iter().map(|(name, files)| (files, name)).take(limit);
                 (logs.collect(), faults)
             }
         };
-        Ok(pipeline::check::check_logs(&config, &installations, logs, faults))
+        Ok(pipeline::inspect::check::check_logs(&config, &installations, logs, faults))
     });
     let seen = seen.map_err(|error| to_run_exception(py, error))?;
     let batch = to_nullable_batch(&seen.channels()).map_err(|e| to_run_exception(py, e.into()))?;

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use jiff::Timestamp;
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::history::histories::Histories;
+use pipeline::assess::trends::{self, UnitSelection};
+use pipeline::fleet::histories::Histories;
 use records::Installations;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
@@ -103,7 +103,7 @@ impl KnownNames {
     pub(crate) fn read(config: &Config) -> Self {
         let installations = pipeline::run::scheduler::installations(config).unwrap_or_default();
         let store = pipeline::open_store(config, &installations).ok();
-        let histories = store.and_then(|store| assess::load_histories(&store).ok());
+        let histories = store.and_then(|store| trends::load_histories(&store).ok());
         Self { histories: histories.unwrap_or_default(), installations }
     }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::ValueEnum as _;
 use jiff::Timestamp;
-use pipeline::follow_up::work_requests::{self, Decision, WorkSelection};
+use pipeline::findings::work_requests::{self, Decision, WorkSelection};
 use records::{WorkEventKind, WorkRequest};
 use store::{Holder, Store};
 

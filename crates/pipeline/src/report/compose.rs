@@ -13,13 +13,13 @@ use records::{Installations, PartNumber, Quantity, QuantityRow};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
-use crate::bookkeeping::inspections::{self, InspectionRow};
-use crate::bookkeeping::installation_index::InstallationIndex;
+use crate::assess::trends::{self, ReportAssessments, UnitSelection};
 use crate::error::Error;
-use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
-use crate::follow_up::work_requests;
-use crate::history::flight_row::FlightRow as FlownRow;
-use crate::history::histories::{Histories, History, TailPosition, UnitKey as Name};
+use crate::findings::work_requests;
+use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
+use crate::fleet::bookkeeping::installation_index::InstallationIndex;
+use crate::fleet::flight_row::FlightRow as FlownRow;
+use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::report::flight_columns::{FlightExtras, StoreContents};
 use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow, WorkRequest};
@@ -47,7 +47,7 @@ pub fn compose(
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors } =
-        assess::assess_for_report(config, installations, &histories, ask, &days, store)?;
+        trends::assess_for_report(config, installations, &histories, ask, &days, store)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
     checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));

@@ -10,10 +10,10 @@ use records::Quantity;
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::history::builder::{HistoryBuilder, at};
-use crate::history::histories::{Histories, UnitKey};
-use crate::history::parallel_scan::read_each;
-use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+use crate::fleet::builder::{HistoryBuilder, at};
+use crate::fleet::histories::{Histories, UnitKey};
+use crate::fleet::parallel_scan::read_each;
+use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 
 /// Columns of numbers that a page shows and no assessment needs.
 const NUMBERS: [&str; 6] =

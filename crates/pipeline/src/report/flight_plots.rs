@@ -10,9 +10,9 @@ use records::{Diagnostic, Installations};
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::estimate_plots;
-use crate::run::discover;
-use crate::time_limit::within_time_limit;
+use crate::inspect::estimate_plots;
+use crate::logs::discover;
+use crate::run::time_limit::within_time_limit;
 
 /// Most flights of actuators that one report draws: some 40 MB of pages.
 pub const MAX_PLOTS: usize = 200;

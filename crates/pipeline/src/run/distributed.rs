@@ -21,10 +21,10 @@ use serde::{Deserialize, Serialize};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
+use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::plan::{Plan, Request, WorkItem, WorkReason};
 use crate::run::scheduler::{Context, Touched, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::StepCount;

@@ -17,9 +17,9 @@ use records::{Diagnostic, GapRecord, Status};
 use store::{HeldRecord, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
-use crate::history::histories::UnitKey;
+use crate::fleet::histories::UnitKey;
+use crate::logs::plan::{self, Plan, WorkItem};
 use crate::run::event::Event;
-use crate::run::plan::{self, Plan, WorkItem};
 use crate::run::summary::{self, DuplicateLog, RunSummary};
 
 /// Outcome of one log.

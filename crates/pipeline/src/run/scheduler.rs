@@ -18,20 +18,20 @@ use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
-use crate::bookkeeping::inspections;
-use crate::bookkeeping::installation_index::dates_ahead;
-use crate::bookkeeping::join::Bookkeeping;
-use crate::bookkeeping::maintenance_log::unknown_units;
+use crate::assess::changes::RunFacts;
+use crate::assess::trends;
 use crate::error::Error;
-use crate::fleet_trends::assess;
-use crate::fleet_trends::changes::RunFacts;
-use crate::follow_up::FollowUp;
-use crate::history::histories::UnitKey;
-use crate::run::discover;
+use crate::findings::FollowUp;
+use crate::fleet::bookkeeping::inspections;
+use crate::fleet::bookkeeping::installation_index::dates_ahead;
+use crate::fleet::bookkeeping::join::Bookkeeping;
+use crate::fleet::bookkeeping::maintenance_log::unknown_units;
+use crate::fleet::histories::UnitKey;
+use crate::logs::discover;
+use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::summary::{self, KilledRun, RunSummary};
 use crate::run::worker_pool::{Next, PoolSettings, StepCount, WorkerPool};
 
@@ -150,7 +150,7 @@ pub(crate) fn execute_run(
 
     (context.watch)(Event::Trends { units: units.len() });
     let facts = RunFacts { run_id: &inputs.run_id, with_records: &with_records, moved: &report.moved };
-    let mut assessments = assess::assess_run(config, &inputs.installations, &store, &units, facts)?;
+    let mut assessments = trends::assess_run(config, &inputs.installations, &store, &units, facts)?;
     let findings = std::mem::take(&mut assessments.findings);
     let states = std::mem::take(&mut assessments.changes.states);
     report.add_assessments(assessments);

@@ -8,21 +8,21 @@ use records::time::days_between;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 
-use crate::bookkeeping::installation_index::DateAhead;
-use crate::bookkeeping::join::MovedFlights;
-use crate::bookkeeping::maintenance_log::UnknownUnit;
+use crate::assess::changes::UnitChange;
+use crate::assess::trends::RunAssessments;
 use crate::error::is_passing;
-use crate::fleet_trends::assess::RunAssessments;
-use crate::fleet_trends::changes::UnitChange;
-use crate::follow_up::summary::FollowUpSummary;
-use crate::history::histories::UnitKey;
-use crate::monitoring::REPORTED_DAYS;
-use crate::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
-use crate::monitoring::mapping_faults::MappingFault;
-use crate::monitoring::recent;
-use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
-use crate::monitoring::repeated_samples::{self, RepeatedSamples};
-use crate::run::plan::{Plan, StandingError, WorkItem};
+use crate::findings::monitoring::REPORTED_DAYS;
+use crate::findings::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
+use crate::findings::monitoring::mapping_faults::MappingFault;
+use crate::findings::monitoring::recent;
+use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
+use crate::findings::monitoring::repeated_samples::{self, RepeatedSamples};
+use crate::findings::summary::FollowUpSummary;
+use crate::fleet::bookkeeping::installation_index::DateAhead;
+use crate::fleet::bookkeeping::join::MovedFlights;
+use crate::fleet::bookkeeping::maintenance_log::UnknownUnit;
+use crate::fleet::histories::UnitKey;
+use crate::logs::plan::{Plan, StandingError, WorkItem};
 use records::{QuantityChange, TrendRow};
 
 /// Error of a log.

@@ -15,11 +15,11 @@ use std::time::{Duration, Instant};
 use records::Diagnostic;
 
 use crate::error::Error;
+use crate::logs::plan::{Plan, WorkItem};
 use crate::run::event::Event;
 use crate::run::flight_ownership::LogOutcomeData;
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::plan::{Plan, WorkItem};
-use crate::time_limit::log_timeout;
+use crate::run::time_limit::log_timeout;
 
 /// Interval at which the time limits are checked while no worker reports.
 const TURN: Duration = Duration::from_millis(100);
@@ -326,7 +326,7 @@ impl Drop for WorkerPool<'_> {
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
-    use crate::run::plan::WorkReason;
+    use crate::logs::plan::WorkReason;
     use crate::run::summary::not_reached;
 
     /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run.

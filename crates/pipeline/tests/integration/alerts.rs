@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use job::config::AlertChannel;
-use pipeline::follow_up::alert_changes::{self, Channels};
-use pipeline::follow_up::delivery::{self, Attempt, Courier};
-use pipeline::follow_up::finding::{Finding, GAP};
+use pipeline::findings::alert_changes::{self, Channels};
+use pipeline::findings::delivery::{self, Attempt, Courier};
+use pipeline::findings::finding::{Finding, GAP};
 use records::{AlertRecord, AlertStatus};
 use serde_json::Value;
 use store::{Holder, Store};

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use ingest::Flights;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::bookkeeping::join::Bookkeeping;
+use pipeline::fleet::bookkeeping::join::Bookkeeping;
 use records::{
     Alias, Flight, FlightId, GapEstimate, GapRecord, Installation, Installations, LogRecord, PartNumber,
     Position, Provenance, RunRecord, SerialNumber, Status, TailNumber,

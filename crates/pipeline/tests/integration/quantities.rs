@@ -8,8 +8,8 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::quantities::follow::FollowedQuantities;
+use pipeline::assess::quantities::follow::FollowedQuantities;
+use pipeline::assess::trends::{self, UnitSelection};
 use records::{
     Flight, FlightId, GapEstimate, GapRecord, Installations, LogRecord, PartNumber, Position, Provenance,
     QuantityChange, SerialNumber, Status, TailNumber, TrendRow,
@@ -181,7 +181,7 @@ fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, Foll
     let config = Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
     let ask = UnitSelection::default();
     let found =
-        assess::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap();
+        trends::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap();
     (found.now, found.followed)
 }
 

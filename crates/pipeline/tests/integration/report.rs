@@ -8,7 +8,7 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::report::compose::compose;
 use records::{
     Flight, FlightId, GapEstimate, GapRecord, Installations, PartNumber, Position, Provenance, SerialNumber,
@@ -90,7 +90,7 @@ fn log(record: &GapRecord) -> LogRecord {
 
 fn assessed(store: &Store, as_of: Timestamp) -> BTreeMap<String, TrendRow> {
     let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
-    let rows = assess::assess_store(&config(), &Installations::default(), store, &ask).unwrap();
+    let rows = trends::assess_store(&config(), &Installations::default(), store, &ask).unwrap();
     rows.into_iter().map(|row| (row.serial_number.clone(), row)).collect()
 }
 

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::fleet_trends::backtest;
-use pipeline::fleet_trends::changes::{Cause, RunFacts, changes};
-use pipeline::history::builder::HistoryBuilder;
-use pipeline::history::flight_row::FlightInput;
-use pipeline::history::histories::Histories;
-use pipeline::history::row_keys::RowKey;
+use pipeline::assess::backtest;
+use pipeline::assess::changes::{Cause, RunFacts, changes};
+use pipeline::assess::trends::{self, UnitSelection};
+use pipeline::fleet::builder::HistoryBuilder;
+use pipeline::fleet::flight_row::FlightInput;
+use pipeline::fleet::histories::Histories;
+use pipeline::fleet::row_keys::RowKey;
 use records::Installations;
 use records::TrendRow;
 
@@ -80,7 +80,7 @@ fn flown(days: i32) -> Vec<Row> {
 
 fn assess(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
     let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
-    assess::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
+    trends::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
         ingest::tables::installations(table.path(), &config.document.columns.installations).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
     let rows =
-        assess::assess_histories(&config, &installations, gathering(&rows).into_store(), &ask).unwrap();
+        trends::assess_histories(&config, &installations, gathering(&rows).into_store(), &ask).unwrap();
     for row in &rows {
         let is_removed = row.serial_number == "S03";
         assert_eq!(row.state.is_none(), is_removed, "{row:?}");
@@ -202,7 +202,7 @@ fn recorded_maintenance_is_a_change_point_from_its_date_on() {
     let nobody = Installations::default();
     let ask = UnitSelection { as_of_utc: Some(day(199)), ..UnitSelection::default() };
     let rows =
-        assess::assess_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
+        trends::assess_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -215,7 +215,7 @@ fn recorded_maintenance_is_a_change_point_from_its_date_on() {
 #[test]
 fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     let nobody = Installations::default();
-    let found = assess::assess_histories(
+    let found = trends::assess_histories(
         &booked("maintenance_unknown.csv"),
         &nobody,
         histories(&flown(20)),
@@ -237,7 +237,7 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
         let nobody = Installations::default();
         let rows =
-            assess::assess_histories(config, &nobody, histories(&flown(60)), &UnitSelection::default())
+            trends::assess_histories(config, &nobody, histories(&flown(60)), &UnitSelection::default())
                 .unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
@@ -281,7 +281,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight_id.ends_with(['1', '3', '5', '7', '9']));
         logged.iter_mut().for_each(|row| row.assess.tail_hours_end = None);
-        assess::assess_histories(config, &installations, gathering(&logged).into_store(), &ask).unwrap()
+        trends::assess_histories(config, &installations, gathering(&logged).into_store(), &ask).unwrap()
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in assess(&config_with).iter().zip(assess(&config())).enumerate() {
@@ -309,7 +309,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     }
     let known: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc < day(200)).cloned().collect();
     let assess = |rows: &[Row]| {
-        assess::assess_histories(&config(), &nobody, histories(rows), &UnitSelection::default()).unwrap()
+        trends::assess_histories(&config(), &nobody, histories(rows), &UnitSelection::default()).unwrap()
     };
     let states = |rows: &[Row]| -> Vec<records::UnitState> {
         assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
@@ -400,7 +400,7 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
         ..UnitSelection::default()
     };
     let alone =
-        assess::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
+        trends::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
     assert_eq!(alone, assess[2..3]);
 }
 
@@ -434,12 +434,12 @@ fn contradicting_rows_of_a_flight_are_named_and_decide_nothing() {
     let rows: String =
         (1..=12).map(|n| day(n, "30e-6")).chain([day(12, "42e-6"), day(12, "30e-6")]).collect();
     std::fs::write(&file, format!("serial_number,departure_utc,gap_m,flight_hours\n{rows}")).unwrap();
-    let histories = pipeline::history::external_estimates::read(&file).unwrap();
+    let histories = pipeline::fleet::external_estimates::read(&file).unwrap();
     let ask = UnitSelection {
         as_of_utc: Some("2026-01-12T06:00:00Z".parse().unwrap()),
         ..UnitSelection::default()
     };
-    let rows = assess::assess_histories(&config(), &Installations::default(), histories, &ask).unwrap();
+    let rows = trends::assess_histories(&config(), &Installations::default(), histories, &ask).unwrap();
     let reason = rows[0].reason.as_deref().unwrap();
     assert!(reason.contains("1 flights with records that contradict each other"), "{reason}");
     assert!((rows[0].gap_m.unwrap() - 30e-6).abs() < 1e-7, "{:?}", rows[0]);

@@ -1,10 +1,10 @@
 //! Work requests against the tables of an operator: what opens, moves, closes and reopens them.
 
 use jiff::Timestamp;
-use pipeline::bookkeeping::maintenance_log::MaintenanceLog;
-use pipeline::follow_up::finding::{Finding, GAP};
-use pipeline::follow_up::work_requests::{self, Decision};
-use pipeline::follow_up::work_update::{self, Tables};
+use pipeline::findings::finding::{Finding, GAP};
+use pipeline::findings::work_requests::{self, Decision};
+use pipeline::findings::work_update::{self, Tables};
+use pipeline::fleet::bookkeeping::maintenance_log::MaintenanceLog;
 use records::{
     Installation, Installations, PartNumber, Position, SerialNumber, TailNumber, WorkEvent, WorkEventKind,
     WorkRequest,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use ingest::LogFiles;
 use job::Config;
 use job::part_identification::IdentifiedParams;
-use pipeline::check::{ChannelCheck, LogCheck, RATIO, check_logs};
-use pipeline::run::discover;
+use pipeline::inspect::check::{ChannelCheck, LogCheck, RATIO, check_logs};
+use pipeline::logs::discover;
 use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use job::Config;
 use job::flight_log::part_of;
-use pipeline::estimate::{self, EstimateRow};
-use pipeline::time_limit::within_time_limit;
+use pipeline::inspect::estimate::{self, EstimateRow};
+use pipeline::run::time_limit::within_time_limit;
 use records::{Diagnostic, Installations, PartNumber};
 
 use crate::args::{EstimateArgs, Global};
@@ -148,7 +148,7 @@ fn trace(
     for path in logs {
         // A failed log is reported already; it has no trace.
         let Ok(opened) = job::trace::of_log(
-            &pipeline::run::discover::log_containing(config, path)?,
+            &pipeline::logs::discover::log_containing(config, path)?,
             &display_path(path),
             config,
             installations,

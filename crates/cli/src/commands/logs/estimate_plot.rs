@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use job::Config;
-use pipeline::estimate_plots;
+use pipeline::inspect::estimate_plots;
 use records::{Installations, PartNumber};
 use report::{estimate_plot_html, estimate_plot_svg};
 
@@ -30,7 +30,7 @@ pub(super) fn estimate_plot(
     for path in logs {
         let name = display_path(path);
         // A failed log is reported already; it is not drawn.
-        let files = pipeline::run::discover::log_containing(config, path)?;
+        let files = pipeline::logs::discover::log_containing(config, path)?;
         let found = estimate_plots::of_log(&files, &name, config, installations, part).unwrap_or_default();
         plots.extend(found.into_iter().map(|(_, plot)| plot));
     }

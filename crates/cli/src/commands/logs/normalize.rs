@@ -2,7 +2,7 @@
 
 use ingest::LogFiles;
 use pipeline::Event;
-use pipeline::run::discover;
+use pipeline::logs::discover;
 
 use crate::args::{Global, NormalizeArgs};
 use crate::exit::{Code, Failure};
@@ -34,7 +34,7 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
         _ => {}
     };
     let place = (args.output.as_path(), args.encoding.into());
-    let done = pipeline::normalize::normalize(
+    let done = pipeline::inspect::normalize::normalize(
         &config,
         &installations,
         &logs,

@@ -1,7 +1,7 @@
 //! `backtest`: scores past forecasts against later measurements, by share of life used.
 
-use pipeline::fleet_trends::assess;
-use pipeline::fleet_trends::backtest::{self, BacktestRow};
+use pipeline::assess::backtest::{self, BacktestRow};
+use pipeline::assess::trends;
 
 use crate::args::{BacktestArgs, Global};
 use crate::exit::{Code, Failure};
@@ -26,8 +26,8 @@ const SHARES: [(f64, f64, &str); 4] = [
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {
-        Some(file) => pipeline::history::external_estimates::read(file)?,
-        None => assess::load_histories(&pipeline::open_store(&config, &installations)?)?,
+        Some(file) => pipeline::fleet::external_estimates::read(file)?,
+        None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
     };
     let found = backtest::of_histories(&config, &installations, &histories)?;
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;

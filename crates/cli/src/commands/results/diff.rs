@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pipeline::store_diff::{DiffRow, RecordCounts, StoreDiff, compare_stores};
+use pipeline::inspect::store_diff::{DiffRow, RecordCounts, StoreDiff, compare_stores};
 
 use crate::args::DiffArgs;
 use crate::exit::{Code, Failure};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use ingest::ActuatorChannels;
 use job::Config;
-use pipeline::explain::{Explanation, Recomputation, RecordKey, remedy};
+use pipeline::inspect::explain::{Explanation, Recomputation, RecordKey, remedy};
 use records::uncertainty::NORMAL_95;
 use serde_json::Value;
 
@@ -28,7 +28,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
         tail_number: args.tail.clone(),
     };
     let store = pipeline::open_store(&config, &installations)?;
-    let found = match pipeline::explain::explain(&config, &installations, &store, &key) {
+    let found = match pipeline::inspect::explain::explain(&config, &installations, &store, &key) {
         Ok(found) => found,
         Err(error) => {
             let known = KnownNames::read(&config);

@@ -8,7 +8,7 @@ use arrow::datatypes::{DataType, Field, Schema};
 use clap::ValueEnum;
 use ingest::mapping::column_pattern::nearest;
 use job::Config;
-use pipeline::explain::remedy;
+use pipeline::inspect::explain::remedy;
 use records::row_schema::to_batch;
 use records::{GapRecord, PartNumber};
 use store::Query;

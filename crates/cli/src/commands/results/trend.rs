@@ -1,8 +1,8 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use job::Config;
-use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
-use pipeline::monitoring::mapping_faults::MappingFault;
+use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
+use pipeline::findings::monitoring::mapping_faults::MappingFault;
 use records::uncertainty::NORMAL_95;
 use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 
@@ -30,23 +30,23 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => {
             let store = pipeline::open_store(&config, &installations)?;
-            let found = assess::assess_store_with_quantities(&config, &installations, &store, &ask)?;
+            let found = trends::assess_store_with_quantities(&config, &installations, &store, &ask)?;
             (mapping_faults, notes) = (found.mapping_faults, found.notes);
             found.now
         }
         (estimates, queries) => {
             let histories = match estimates {
-                Some(file) => pipeline::history::external_estimates::read(file)?,
-                None => assess::load_histories(&pipeline::open_store(&config, &installations)?)?,
+                Some(file) => pipeline::fleet::external_estimates::read(file)?,
+                None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
             };
             match queries {
                 Some(file) => {
-                    let queries = pipeline::history::external_estimates::queries(file)?;
-                    assess::assess_queries(&config, &installations, histories, &queries)?
+                    let queries = pipeline::fleet::external_estimates::queries(file)?;
+                    trends::assess_queries(&config, &installations, histories, &queries)?
                 }
                 None => {
-                    let found = assess::assess_histories(&config, &installations, histories, &ask)?;
-                    notes = pipeline::monitoring::coverage::notes(&found, &config);
+                    let found = trends::assess_histories(&config, &installations, histories, &ask)?;
+                    notes = pipeline::findings::monitoring::coverage::notes(&found, &config);
                     found
                 }
             }
@@ -56,7 +56,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if found.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
             Some(file) => {
-                KnownNames::new(pipeline::history::external_estimates::read(file)?, Installations::default())
+                KnownNames::new(pipeline::fleet::external_estimates::read(file)?, Installations::default())
             }
             None => KnownNames::read(&config),
         };
@@ -88,7 +88,7 @@ fn quantities(
 ) -> Result<Code, Failure> {
     let store = pipeline::open_store(config, installations)?;
     let StoreAssessment { now: units, followed, .. } =
-        assess::assess_store_with_quantities(config, installations, &store, ask)?;
+        trends::assess_store_with_quantities(config, installations, &store, ask)?;
     if units.is_empty() {
         let known = KnownNames::read(config);
         known.check_units(&args.units)?;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pipeline::follow_up::summary::{AlertSummary, FollowUpSummary, WorkSummary};
+use pipeline::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use records::WorkRequest;
 
 use crate::output::escape;

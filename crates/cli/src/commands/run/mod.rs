@@ -10,10 +10,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use jiff::Timestamp;
-use pipeline::bookkeeping::maintenance_log::UnknownUnit;
-use pipeline::fleet_trends::changes::{Cause, UnitChange};
-use pipeline::history::histories::Histories;
-use pipeline::monitoring::recorder_change::RecorderChange;
+use pipeline::assess::changes::{Cause, UnitChange};
+use pipeline::findings::monitoring::recorder_change::RecorderChange;
+use pipeline::fleet::bookkeeping::maintenance_log::UnknownUnit;
+use pipeline::fleet::histories::Histories;
 use pipeline::run::scheduler::{self, Context};
 use pipeline::run::summary::LogError;
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};

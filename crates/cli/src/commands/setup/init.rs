@@ -13,8 +13,8 @@ use ingest::infer::{
 use ingest::mapping::IdentityField;
 use ingest::mapping::units::Unit;
 use ingest::{Layout, Role};
-use pipeline::discovery::temporary_files::is_temporary;
-use pipeline::simulate::{SAMPLE_FOLDER, write_sample};
+use pipeline::inspect::simulate::{SAMPLE_FOLDER, write_sample};
+use pipeline::logs::temporary_files::is_temporary;
 use records::sanitize::csv_cell;
 
 use crate::args::InitArgs;

@@ -1,6 +1,7 @@
 //! `simulate`: simulates a fleet with known gaps.
 
-use pipeline::{Event, simulate as fleet};
+use pipeline::Event;
+use pipeline::inspect::simulate as fleet;
 
 use crate::args::SimulateArgs;
 use crate::exit::{Code, Failure};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use pipeline::follow_up::finding::GAP;
+use pipeline::findings::finding::GAP;
 use records::{AlertRecord, AlertStatus};
 use store::{Holder, Store};
 

@@ -1,0 +1,181 @@
+//! Values of the followed quantities, read from the store.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use arrow::array::RecordBatch;
+use ingest::tables::TableBatch;
+use jiff::{SignedDuration, Timestamp};
+use records::Quantity;
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::findings::monitoring::median;
+use crate::fleet::builder::at;
+use crate::fleet::histories::{Positions, TailPosition, UnitKey};
+use crate::fleet::parallel_scan::read_each;
+use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey};
+
+/// Flights that are followed: three years. It bounds what a fleet of any age takes.
+const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
+
+/// Quantities that are read, with the column of their standard error.
+pub(crate) const READ: [(Quantity, &str); 9] = [
+    (Quantity::LostMotionM, "lost_motion_se_m"),
+    (Quantity::StiffnessNPerM, "stiffness_se_n_per_m"),
+    (Quantity::FrictionN, "friction_se_n"),
+    (Quantity::FrictionDryN, "friction_dry_se_n"),
+    (Quantity::FrictionLoadShare, "friction_load_share_se"),
+    (Quantity::SkewS, "skew_se_s"),
+    (Quantity::LoadZeroN, "load_zero_se_n"),
+    (Quantity::LoadDelayS, "load_delay_se_s"),
+    (Quantity::Nis, "nis_se"),
+];
+
+/// One flight of one unit, in as few bytes as its numbers take; NaN for none.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FlightValues {
+    pub(crate) departure_us: i64,
+    /// Index of the unit's positions.
+    pub(crate) place: u32,
+    pub(crate) temperature_c: f32,
+    pub(crate) load_p95_n: f32,
+    /// Value and standard error, in the order of [`READ`].
+    pub(crate) values: [(f32, f32); READ.len()],
+}
+
+/// Values of one unit, by departure.
+#[derive(Debug, Default)]
+pub(crate) struct UnitValues {
+    pub(crate) places: Positions,
+    pub(crate) flights: Vec<FlightValues>,
+    /// Median 95 % load, N.
+    pub(crate) usual_load_n: Option<f64>,
+}
+
+impl UnitValues {
+    fn new(places: Positions, mut flights: Vec<FlightValues>) -> Self {
+        flights.sort_by_key(|flight| flight.departure_us);
+        let loads_n: Vec<f64> =
+            flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
+        let usual_load_n = (!loads_n.is_empty()).then(|| median(loads_n));
+        Self { places, flights, usual_load_n }
+    }
+
+    /// Where a flight was flown.
+    pub(crate) fn place(&self, flight: &FlightValues) -> &TailPosition {
+        self.places.get(flight.place)
+    }
+}
+
+/// Values of all units.
+pub(crate) type FleetValues = BTreeMap<UnitKey, UnitValues>;
+
+/// Reads the values of the last three years before a time, with it.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error> {
+    let query = Query {
+        since_utc: until.checked_sub(WINDOW).ok(),
+        until_utc: until.checked_add(SignedDuration::from_micros(1)).ok(),
+        ..Query::default()
+    };
+    let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
+    let keys = [
+        "tail_number",
+        "position",
+        "part_number",
+        "serial_number",
+        "departure_utc",
+        "temperature_c",
+        "load_p05_n",
+        "load_p95_n",
+    ];
+    let columns: Vec<&str> = keys.into_iter().chain(numbers).collect();
+    let mut found = Reader::default();
+    read_each(&store.scan_columns(&query, &columns)?, |batch| found.add(batch))?;
+    let unit = |(name, unit): (UnitKey, usize)| {
+        let (places, flights) = std::mem::take(&mut found.units[unit]);
+        (name, UnitValues::new(places, flights))
+    };
+    Ok(found.names.into_iter().map(unit).collect())
+}
+
+/// The same by position: all flights there, under the unit that flew there last.
+pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
+    type Place<'a> = (i64, Option<&'a UnitKey>, Vec<FlightValues>);
+    let mut positions: BTreeMap<&TailPosition, Place<'_>> = BTreeMap::new();
+    for (name, unit) in fleet {
+        for flight in &unit.flights {
+            let (last_us, last, flights) = positions.entry(unit.place(flight)).or_default();
+            flights.push(FlightValues { place: 0, ..*flight });
+            if last.is_none() || flight.departure_us > *last_us {
+                (*last_us, *last) = (flight.departure_us, Some(name));
+            }
+        }
+    }
+    // A unit that was the last one at two positions is at the later one.
+    let mut of_units: BTreeMap<&UnitKey, (i64, UnitValues)> = BTreeMap::new();
+    for (position, (last_us, name, flights)) in positions {
+        let Some(name) = name else { continue };
+        if of_units.get(name).is_some_and(|(known_us, _)| *known_us >= last_us) {
+            continue;
+        }
+        let mut places = Positions::default();
+        places.number(position.tail_number.as_deref(), position.position.as_deref());
+        of_units.insert(name, (last_us, UnitValues::new(places, flights)));
+    }
+    of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
+}
+
+/// Values while their rows come in.
+#[derive(Default)]
+struct Reader {
+    names: BTreeMap<UnitKey, usize>,
+    units: Vec<(Positions, Vec<FlightValues>)>,
+}
+
+impl Reader {
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
+        let keys = KeyColumns::of(&chunk)?;
+        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let (temperatures, lows, highs) =
+            (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
+        let mut columns = Vec::with_capacity(READ.len());
+        for (quantity, error) in READ {
+            columns.push((numbers(quantity.as_str())?, numbers(error)?));
+        }
+        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let Some(who) = keys.key_at(row) else { continue };
+            let (unit, place) = seen.get_or(&keys, row, || self.place(who));
+            let values = std::array::from_fn(|k| {
+                let (values, errors) = &columns[k];
+                (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)
+            });
+            let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
+            self.units[unit].1.push(FlightValues {
+                departure_us: departures.value(row),
+                place,
+                temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
+                load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
+                values,
+            });
+        }
+        Ok(())
+    }
+
+    /// Index of a unit, and of one of its positions.
+    fn place(&mut self, who: RowKey<'_>) -> (usize, u32) {
+        let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
+        let units = &mut self.units;
+        let unit = *self.names.entry(name).or_insert_with(|| {
+            units.push(Default::default());
+            units.len() - 1
+        });
+        (unit, self.units[unit].0.number(who.tail_number, who.position))
+    }
+}

@@ -1,0 +1,616 @@
+//! Fleet assessment: trends of units from the store's records, by part and serial number across tails.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use job::Config;
+use rayon::prelude::*;
+use records::{Installations, QuantityChange, QuantityRow};
+use store::{Query, Store};
+use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
+
+use crate::assess::changes::{Changes, RunFacts, changes};
+use crate::assess::limits::Limits;
+use crate::assess::priors::FleetPriors;
+use crate::assess::quantities::follow::{FollowedQuantities, UnitFacts, follow, gap_row};
+use crate::assess::quantities::peers;
+use crate::assess::quantities::values;
+use crate::assess::tail_wide_steps::TailWide;
+use crate::assess::trend_row;
+use crate::error::Error;
+use crate::findings::finding::Finding;
+use crate::findings::monitoring::coverage;
+use crate::findings::monitoring::mapping_faults::{self, MappingFault};
+use crate::findings::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
+use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
+use crate::fleet::bookkeeping::inspections::InspectionIndex;
+use crate::fleet::bookkeeping::installation_index::InstallationIndex;
+use crate::fleet::bookkeeping::usage::UsageSources;
+use crate::fleet::builder::HistoryBuilder;
+use crate::fleet::external_estimates::AsOfQuery;
+use crate::fleet::flight_row::FlightRow;
+use crate::fleet::histories::{Histories, History, UnitKey};
+use crate::fleet::merge::of_parts;
+use job::config::{AsOf, QuantityLimits};
+use records::TrendRow;
+
+/// Assessments of units, and steps of the gap that whole tails made.
+type Statements = (Vec<TrendRow>, Vec<QuantityChange>);
+
+/// Which units to assess, and at which date.
+#[derive(Debug, Clone, Default)]
+pub struct UnitSelection {
+    /// Units on this tail at the end of the records only.
+    pub tail_number: Option<String>,
+    /// This serial number only.
+    pub serial_number: Option<String>,
+    /// This part number only.
+    pub part_number: Option<String>,
+    /// The date; that of the configuration when not given.
+    pub as_of_utc: Option<Timestamp>,
+}
+
+impl UnitSelection {
+    /// Whether a unit of that name is selected, on any tail.
+    fn names(&self, name: &UnitKey) -> bool {
+        self.serial_number.as_ref().is_none_or(|s| *s == name.1)
+            && (self.part_number.is_none() || self.part_number == name.0)
+    }
+
+    /// Whether an assessed unit is on the selected tail.
+    fn fits(&self, row: &TrendRow) -> bool {
+        self.tail_number.is_none() || row.tail_number == self.tail_number
+    }
+}
+
+/// The date of assessments: the given one, else that of the configuration, by default the time of the run. None without
+/// a record.
+pub(crate) fn as_of_date(
+    config: &Config,
+    given: Option<Timestamp>,
+    histories: &Histories,
+) -> Option<Timestamp> {
+    let newest_utc = histories.newest_utc()?;
+    Some(given.unwrap_or(match config.document.trend.as_of {
+        AsOf::Now => Timestamp::now(),
+        AsOf::NewestRecord => newest_utc,
+    }))
+}
+
+/// Assesses the selected units.
+///
+/// # Errors
+/// When the store cannot be read, or a part's limits are invalid.
+pub fn assess_store(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &UnitSelection,
+) -> Result<Vec<TrendRow>, Error> {
+    Ok(assess_store_with_quantities(config, installations, store, ask)?.now)
+}
+
+/// Assessments of selected units with what was found about them in addition to gaps.
+#[derive(Debug, Default)]
+pub struct StoreAssessment {
+    /// One assessment for each unit.
+    pub now: Vec<TrendRow>,
+    /// Their followed quantities, and what changed on their tails and parts.
+    pub followed: FollowedQuantities,
+    /// Wrong mappings that concern them.
+    pub mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that their assessments lack, in words.
+    pub notes: Vec<String>,
+}
+
+/// As [`assess_store`], with the followed quantities and the mapping faults of the selected units.
+///
+/// # Errors
+/// As [`assess_store`].
+pub fn assess_store_with_quantities(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &UnitSelection,
+) -> Result<StoreAssessment, Error> {
+    // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
+    let mut histories = load_histories(store)?;
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
+        return Ok(StoreAssessment::default());
+    };
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
+    let (now, tail_wide) = fleet.selected(ask, as_of)?;
+    Ok(StoreAssessment {
+        followed: fleet.followed_of(&now, &tail_wide),
+        mapping_faults: fleet.mapping_faults_of(&now),
+        notes: fleet.notes(&now, config),
+        now,
+    })
+}
+
+/// Assessments of the units of a run.
+#[derive(Debug, Default)]
+pub struct RunAssessments {
+    /// Assessments at the newest date in the store.
+    pub now: Vec<TrendRow>,
+    /// Changes against the states after the run before.
+    pub changes: Changes,
+    /// Recent diagnostics in addition to gaps, of all tails.
+    pub recent: RecentDiagnostics,
+    /// Followed quantities of all units, and what changed.
+    pub followed: FollowedQuantities,
+    /// Number of units of the fleet by state.
+    pub states: BTreeMap<&'static str, usize>,
+    /// Units of the whole fleet in another state than `normal`, touched by the run or not.
+    pub work_list: Vec<TrendRow>,
+    /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
+    pub mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that assessments of the fleet lack, in words.
+    pub notes: Vec<String>,
+    /// Findings about all units of the fleet, for alerts and work requests.
+    pub findings: Vec<Finding>,
+}
+
+/// Assesses the fleet after a run: the units whose records it changed, the work list of all units, and what differs from the
+/// states after the run before.
+///
+/// # Errors
+/// As [`assess_store`].
+pub fn assess_run(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    units: &BTreeSet<UnitKey>,
+    run: RunFacts<'_>,
+) -> Result<RunAssessments, Error> {
+    let mut histories = load_histories(store)?;
+    let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
+    let (mut now, tail_wide) = fleet.statements_with_steps(fleet.units.keys().copied(), as_of)?;
+    now.retain(|row| row.flights > 0);
+    let mut run = RunAssessments {
+        recent,
+        followed: fleet.followed.clone(),
+        mapping_faults: fleet.mapping_faults.clone(),
+        notes: fleet.notes(&now, config),
+        changes: changes(config, &store.states()?, &now, run),
+        ..RunAssessments::default()
+    };
+    run.followed.changes.extend(tail_wide);
+    run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
+    let states = now.iter().filter_map(|row| row.state);
+    states.for_each(|state| *run.states.entry(state).or_default() += 1);
+    let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
+    let causes: BTreeMap<UnitKey, &String> =
+        run.changes.changed.iter().map(|change| (change.unit(), &change.because)).collect();
+    let gap = |row: &TrendRow| Finding {
+        cause: causes.get(&row.unit()).map(|cause| (*cause).clone()),
+        ..Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))
+    };
+    let of_common = Finding::of_common_changes(&run.followed.changes, as_of);
+    run.findings =
+        now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).chain(of_common).collect();
+    run.work_list = now.iter().filter(needs_attention).cloned().collect();
+    now.retain(|row| units.contains(&row.unit()));
+    Ok(RunAssessments { now, ..run })
+}
+
+/// Assessments of the selected units with everything that a report shows.
+#[derive(Default)]
+pub(crate) struct ReportAssessments {
+    /// Assessments at the date.
+    pub(crate) now: Vec<TrendRow>,
+    /// Followed quantities of these units, and what changed on their tails and parts.
+    pub(crate) followed: FollowedQuantities,
+    /// Wrong mappings that concern them.
+    pub(crate) mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that their assessments lack, in words.
+    pub(crate) notes: Vec<String>,
+    /// Plotted forecast of each of them.
+    pub(crate) drawn: Vec<trend::Forecast>,
+    /// Assessments of earlier dates, by the number of days before.
+    pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
+    /// Forecasts of those dates for the date of the report, by days and unit.
+    pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
+    /// Fleet prior of each part, and its training cut-off.
+    pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
+}
+
+/// Assesses the selected units at the date, and at earlier dates given in days before.
+///
+/// # Errors
+/// As [`assess_histories`].
+pub(crate) fn assess_for_report(
+    config: &Config,
+    installations: &Installations,
+    histories: &Histories,
+    ask: &UnitSelection,
+    days_before: &[i64],
+    store: &Store,
+) -> Result<ReportAssessments, Error> {
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, histories) else {
+        return Ok(ReportAssessments::default());
+    };
+    let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
+    let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
+    let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
+    let fleet = FleetContext::new(config, installations, histories, &days)?;
+    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
+    let (now, tail_wide) = fleet.selected(ask, as_of)?;
+    let followed = fleet.followed_of(&now, &tail_wide);
+    let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
+    let drawn =
+        names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
+    let past = earlier
+        .iter()
+        .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
+        .collect::<Result<_, Error>>()?;
+    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
+    let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
+    let selected: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
+    let priors = |part: Option<&str>| {
+        let (turn, prior) = fleet.priors.of(part, as_of)?;
+        Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
+    };
+    let priors = selected.into_iter().filter_map(priors).collect();
+    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, config));
+    Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
+}
+
+/// One assessment for each query, without data later than its date.
+///
+/// # Errors
+/// When a history or a part's limits are invalid.
+pub fn assess_queries(
+    config: &Config,
+    installations: &Installations,
+    mut histories: Histories,
+    queries: &[AsOfQuery],
+) -> Result<Vec<TrendRow>, Error> {
+    let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
+    let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &days)?;
+    let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
+    queries.par_iter().zip(&selected).map(statement).collect()
+}
+
+/// The unit a query means; one that never flew has a name all the same.
+fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
+    let named = (query.part_number.clone(), query.serial_number.clone());
+    if query.part_number.is_some() || histories.get(&named).is_some() {
+        return named;
+    }
+    histories.names().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
+}
+
+/// Every unit's flights in the store.
+///
+/// # Errors
+/// When the store cannot be read.
+pub fn load_histories(store: &Store) -> Result<Histories, Error> {
+    read_histories(store, &Query::default())
+}
+
+fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
+    let parts = store.scan_columns(query, &HistoryBuilder::of_store())?;
+    of_parts(parts.len(), true, |gathering, some| {
+        for part in some {
+            let mut batches = parts.read(part)?.into_iter();
+            let put = batches.try_for_each(|batch| gathering.add_store_batch(batch));
+            put.map_err(|e| Error::refused(e.diagnostic()))?;
+        }
+        Ok(())
+    })
+}
+
+/// One assessment for each selected unit, by part and serial number.
+///
+/// # Errors
+/// When a history or a part's limits are invalid.
+pub fn assess_histories(
+    config: &Config,
+    installations: &Installations,
+    mut histories: Histories,
+    ask: &UnitSelection,
+) -> Result<Vec<TrendRow>, Error> {
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    Ok(fleet.selected(ask, as_of)?.0)
+}
+
+/// What the followed quantities need to know of units.
+struct Facts<'f, 'a>(&'f FleetContext<'a>);
+
+impl UnitFacts for Facts<'_, '_> {
+    fn series(&self, unit: &UnitKey) -> Option<&Series> {
+        self.0.series(unit)
+    }
+
+    fn flight_id(&self, unit: &UnitKey, departure_us: i64) -> Option<String> {
+        let history = self.0.units.get(unit)?.0;
+        let flown = history.at(Timestamp::from_microsecond(departure_us).ok()?)?;
+        history.flight_id(flown).map(str::to_owned)
+    }
+
+    fn limits(&self, part_number: Option<&str>) -> QuantityLimits {
+        self.0.limits.quantities(part_number)
+    }
+}
+
+/// All units, and the fleet prior of each part by training cut-off.
+pub(crate) struct FleetContext<'a> {
+    limits: Limits<'a>,
+    units: BTreeMap<&'a UnitKey, (&'a History, Series)>,
+    priors: FleetPriors<'a>,
+    /// Followed quantities of all units; nothing for external tables.
+    followed: FollowedQuantities,
+    /// Their states, by unit.
+    conditions: BTreeMap<UnitKey, Vec<String>>,
+    /// Recorder changes of whole aircraft.
+    moved: Vec<RecorderChange>,
+    /// Wrong mappings of all units.
+    mapping_faults: Vec<MappingFault>,
+    /// Installations of the store's own units; of external tables none apply.
+    installations: Option<InstallationIndex<'a>>,
+    /// Inspections of the store's own units.
+    inspections: InspectionIndex,
+}
+
+impl<'a> FleetContext<'a> {
+    /// Reads all histories and learns the priors of the cut-off before each of the `days`, without later data.
+    pub(crate) fn new(
+        config: &'a Config,
+        installations: &'a Installations,
+        histories: &'a Histories,
+        days: &[Timestamp],
+    ) -> Result<Self, Error> {
+        let books = UsageSources::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let units: Vec<_> = histories.iter().collect();
+        let read = |(name, history)| books.series(name, history, is_booked);
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+    }
+
+    /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
+    fn consuming(
+        config: &'a Config,
+        installations: &'a Installations,
+        histories: &'a mut Histories,
+        days: &[Timestamp],
+    ) -> Result<Self, Error> {
+        let books = UsageSources::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let read = |(name, history): (&UnitKey, &mut History)| {
+            let series = books.series(name, history, is_booked)?;
+            history.drop_secondary();
+            Ok(series)
+        };
+        let units: Vec<_> = histories.iter_mut().collect();
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+    }
+
+    /// Histories, and the usage series of each; the operator's tables apply to those of the store alone.
+    fn of(
+        config: &'a Config,
+        installations: &'a Installations,
+        histories: &'a Histories,
+        series: Vec<Series>,
+    ) -> Result<Self, Error> {
+        let is_booked = histories.is_booked();
+        let limits = Limits::new(config, series.iter());
+        let units = histories.iter().zip(series);
+        let units = units.map(|((name, history), series)| (name, (history, series))).collect();
+        Ok(Self {
+            limits,
+            units,
+            priors: FleetPriors::default(),
+            followed: FollowedQuantities::default(),
+            conditions: BTreeMap::new(),
+            moved: Vec::new(),
+            mapping_faults: Vec::new(),
+            installations: is_booked.then(|| InstallationIndex::new(installations)),
+            inspections: if is_booked { InspectionIndex::read(config)? } else { InspectionIndex::default() },
+        })
+    }
+
+    /// The same with the priors of the cut-off before each of the days.
+    fn taught_by(mut self, days: &[Timestamp]) -> Self {
+        let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
+        self.priors = FleetPriors::train(units, self.limits, days);
+        self
+    }
+
+    /// A unit's flights.
+    pub(crate) fn series(&self, name: &UnitKey) -> Option<&Series> {
+        self.units.get(name).map(|(_, series)| series)
+    }
+
+    /// Departure of a unit's latest flight until a date.
+    fn latest_flight(&self, name: &UnitKey, as_of: Timestamp) -> Option<Timestamp> {
+        let (history, _) = self.units.get(name)?;
+        history.until(as_of).last().map(FlightRow::departure_utc)
+    }
+
+    /// Trend settings of a unit.
+    pub(crate) fn settings(&self, name: &UnitKey) -> trend::Settings {
+        self.limits.settings(name.0.as_deref())
+    }
+
+    /// Fleet prior of a unit at a date.
+    pub(crate) fn prior<'s>(&'s self, name: &'s UnitKey, as_of: Timestamp) -> Option<&'s FleetPrior> {
+        Some(self.priors.of(name.0.as_deref(), as_of)?.1)
+    }
+
+    /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings; and the
+    /// diagnostics of the last months, which show them.
+    fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<(Self, RecentDiagnostics), Error> {
+        let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
+        let moved = recorder_changes(&followed.changes, as_of);
+        let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
+        for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
+            conditions.entry(row.unit()).or_default().push(state.to_owned());
+        }
+        let recent = recent_diagnostics(store, as_of)?;
+        let mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
+        Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
+    }
+
+    /// What assessments lack, and what of the fleet differs from its peers, in words.
+    fn notes(&self, rows: &[TrendRow], config: &Config) -> Vec<String> {
+        let mut notes = coverage::notes(rows, config);
+        notes.extend(peers::notes(&self.followed.rows));
+        notes
+    }
+
+    /// The wrong mappings that concern some assessed units.
+    fn mapping_faults_of(&self, rows: &[TrendRow]) -> Vec<MappingFault> {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let concerns = |fault: &&MappingFault| !fault.units.is_disjoint(&units);
+        self.mapping_faults.iter().filter(concerns).cloned().collect()
+    }
+
+    /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
+    fn followed_of(&self, rows: &[TrendRow], tail_wide: &[QuantityChange]) -> FollowedQuantities {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
+        let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
+        let mut of_units: Vec<QuantityRow> = rows.iter().map(gap_row).collect();
+        of_units.extend(self.followed.rows.iter().filter(|row| units.contains(&row.unit())).cloned());
+        of_units.sort_by(|a, b| (&a.part_number, &a.serial_number).cmp(&(&b.part_number, &b.serial_number)));
+        let concerns = |change: &&QuantityChange| match &change.serial_number {
+            Some(serial) => units.contains(&(change.part_number.clone(), serial.clone())),
+            None => match &change.tail_number {
+                Some(tail) => tails.contains(&Some(tail.as_str())),
+                None => parts.contains(&change.part_number.as_deref()),
+            },
+        };
+        let all = self.followed.changes.iter().chain(tail_wide);
+        let mut changes: Vec<QuantityChange> = all.filter(concerns).cloned().collect();
+        changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
+        FollowedQuantities { rows: of_units, changes }
+    }
+
+    /// The selected assessments.
+    fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Statements, Error> {
+        let names = self.units.keys().copied();
+        let (mut rows, tail_wide) =
+            self.statements_with_steps(names.filter(|name| ask.names(name)), as_of)?;
+        // A unit that flew later than the date asked for did not exist then; one whose records are all dated ahead of
+        // today's clock does, and nothing is known of it.
+        let now = Timestamp::now();
+        let is_ahead =
+            |row: &TrendRow| self.units.get(&row.unit()).is_some_and(|unit| unit.0.until(now).is_empty());
+        rows.retain(|row| (row.flights > 0 || is_ahead(row)) && ask.fits(row));
+        Ok((rows, tail_wide))
+    }
+
+    fn statements<'b>(
+        &self,
+        names: impl Iterator<Item = &'b UnitKey>,
+        as_of: Timestamp,
+    ) -> Result<Vec<TrendRow>, Error> {
+        Ok(self.statements_with_steps(names, as_of)?.0)
+    }
+
+    /// The same, with one change of the gap for each step of a whole tail.
+    fn statements_with_steps<'b>(
+        &self,
+        names: impl Iterator<Item = &'b UnitKey>,
+        as_of: Timestamp,
+    ) -> Result<Statements, Error> {
+        let names: BTreeSet<&UnitKey> = names.collect();
+        // A change is a tail's when its other units made it too, so they are assessed with the selected ones.
+        let judged: Vec<&UnitKey> = self.tail_mates(&names).union(&names).copied().collect();
+        let trends: Vec<Assessment> =
+            judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
+        let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
+        let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
+        let selected = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
+        let rows = selected.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect();
+        Ok((rows, wide.changes().collect()))
+    }
+
+    /// All units that have flown on the tails of some units.
+    fn tail_mates(&self, names: &BTreeSet<&UnitKey>) -> BTreeSet<&UnitKey> {
+        let history = |name: &&UnitKey| self.units.get(*name).map(|unit| unit.0);
+        let tails: BTreeSet<&str> = names.iter().filter_map(history).flat_map(History::tails).collect();
+        let is_mate = |unit: &(&'a History, Series)| unit.0.tails().any(|tail| tails.contains(tail));
+        self.units.iter().filter(|(_, unit)| is_mate(unit)).map(|(name, _)| *name).collect()
+    }
+
+    fn trend(&self, name: &UnitKey, as_of: Timestamp) -> Result<Assessment, Error> {
+        let nothing = (&History::default(), Series::new([], &UsageDefaults::default())?);
+        let (_, series) = self.units.get(name).unwrap_or(&nothing);
+        let prior = self.prior(name, as_of);
+        Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
+    }
+
+    /// Assessment of one unit, without the tail-wide steps.
+    fn statement(&self, name: &UnitKey, as_of: Timestamp) -> Result<TrendRow, Error> {
+        Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
+    }
+
+    fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide) -> TrendRow {
+        let unit = self.units.get(name);
+        let nobody = History::default();
+        let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
+        let limit_m = self.limits.stated_m(name.0.as_deref());
+        let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
+        let usage_axis = prior.map(|prior| prior.axis().to_string());
+        let index = self.installations.as_ref();
+        let installed = index.and_then(|index| index.installed(name, as_of));
+        let removal = index.and_then(|index| index.removal(name, as_of));
+        let fault = self.mapping_faults.iter().find(|fault| fault.units.contains(name));
+        let row =
+            trend_row::row(name, history, series, limit_m, trend, as_of, wide, (installed, removal), fault);
+        let conditions = self.conditions.get(name).cloned().unwrap_or_default();
+        let row = TrendRow { usage_axis, conditions, ..row };
+        let renewals =
+            series.map(|series| series.maintenance_until(as_of.as_microsecond())).unwrap_or_default();
+        let renewed = renewals.iter().rev().find(|event| event.renews);
+        let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
+        let inspection = installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of));
+        let row = trend_row::inspected(row, inspection, history.until(as_of));
+        row.with_action(self.limits.at_limit(name.0.as_deref()))
+    }
+
+    /// Forecasts of units at a date, for the hours flown until a later one.
+    fn forecasts(
+        &self,
+        names: &[UnitKey],
+        at: Timestamp,
+        later: Timestamp,
+    ) -> Result<BTreeMap<UnitKey, trend::Interval>, Error> {
+        let forecast = |name: &UnitKey| {
+            let Some(series) = self.series(name) else { return Ok(None) };
+            let hours_until = |day: Timestamp| Some(series.flights_until(day.as_microsecond()).last()?.hours);
+            let Some(hours) = hours_until(at).zip(hours_until(later)).map(|(a, b)| b - a) else {
+                return Ok(None);
+            };
+            let (settings, prior) = (self.settings(name), self.prior(name, at));
+            let made = trend::forecast(series, at.as_microsecond(), &settings, prior, [hours])?;
+            Ok(made.ahead.first().map(|(_, interval)| (name.clone(), *interval)))
+        };
+        let made: Vec<Option<_>> = names.par_iter().map(forecast).collect::<Result<_, Error>>()?;
+        Ok(made.into_iter().flatten().collect())
+    }
+
+    /// Plotted forecast of an assessment: to its crossing, limited to a multiple of the observed time.
+    fn forecast(&self, name: &UnitKey, row: &TrendRow) -> Result<trend::Forecast, Error> {
+        const STEPS: u32 = 24;
+        let Some(series) = self.series(name) else { return Ok(trend::Forecast::default()) };
+        let as_of_us = row.as_of_utc.as_microsecond();
+        let flown = series.flights_until(as_of_us);
+        let span_hours = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.hours - a.hours);
+        let far = row
+            .crossing_hours_p95
+            .map_or(span_hours, |h| (1.1 * h).clamp(0.3 * span_hours, 2.0 * span_hours));
+        let steps = (0..=STEPS).map(|step| far * f64::from(step) / f64::from(STEPS));
+        let prior = self.prior(name, row.as_of_utc);
+        Ok(trend::forecast(series, as_of_us, &self.settings(name), prior, steps)?)
+    }
+}

@@ -1,0 +1,198 @@
+//! Changes of state since the last one that the alert table has, and the messages that are due.
+//!
+//! A change is relative to the table, not to a run: a run that is killed before the change is written finds it again,
+//! a run that is repeated finds none, and a state that leaves and returns within one back-fill is no change.
+
+use std::collections::BTreeMap;
+
+use jiff::{SignedDuration, Timestamp};
+use job::config::AlertChannel;
+use records::{AlertRecord, AlertStatus};
+
+use crate::findings::alert_message;
+use crate::findings::finding::{Finding, GAP, UNCHANGED};
+use crate::fleet::histories::UnitKey;
+
+/// Channels by name.
+pub type Channels = BTreeMap<String, AlertChannel>;
+
+/// Kind of the row of a change.
+const CHANGE: &str = "change";
+/// Kind of the rows that hold the states known when alerts begin.
+const BASELINE: &str = "baseline";
+
+/// Changes of one tail or part in one quantity within these days are one: later flights can move its date.
+const SAME_CHANGE: SignedDuration = SignedDuration::from_hours(24 * 14);
+
+/// Latest known state of each quantity of each unit, and the number of its change.
+type KnownStates<'a> = BTreeMap<(UnitKey, &'a str), (i64, Option<&'a str>)>;
+
+/// Rows to write for the findings of a run: one for each change, and one for each message that is due.
+///
+/// Without any known state the rows are the baseline, and each channel gets one summary.
+pub fn detect(
+    known: &[AlertRecord],
+    findings: &[Finding],
+    channels: &Channels,
+    run_id: &str,
+    now: Timestamp,
+) -> Vec<AlertRecord> {
+    let states = known_states(known);
+    if states.is_empty() {
+        return baseline(findings, channels, run_id, now);
+    }
+    let mut rows = Vec::new();
+    for finding in findings {
+        let before = match finding.since_utc {
+            None => state_before(&states, finding),
+            Some(since_utc) => changes_before(known, finding, since_utc),
+        };
+        let Some((number, from)) = before else { continue };
+        let id = change_id(finding, number + 1, from);
+        let change = row(&id, CHANGE, number + 1, from, finding, run_id, now);
+        let (part, tail) = (finding.unit.0.as_deref(), finding.tail_number.as_deref());
+        let selects = |channel: &AlertChannel| channel.enabled && channel.selects(finding.state, part, tail);
+        let message = alert_message::change(&id, from, finding, run_id);
+        for (name, _) in channels.iter().filter(|(_, channel)| selects(channel)) {
+            rows.push(pending(&change, name, &message));
+        }
+        rows.push(change);
+    }
+    rows
+}
+
+/// Number and state of a unit's last change, if its state is another one now.
+fn state_before<'a>(states: &KnownStates<'a>, finding: &Finding) -> Option<(i64, Option<&'a str>)> {
+    match states.get(&(finding.unit.clone(), finding.quantity)) {
+        Some((number, state)) => (*state != finding.state).then_some((*number, *state)),
+        // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
+        None => finding.is_noteworthy().then_some((0, None)),
+    }
+}
+
+/// Number of the changes that a tail or part is known to have made, unless this one is among them.
+fn changes_before(
+    known: &[AlertRecord],
+    finding: &Finding,
+    since_utc: Timestamp,
+) -> Option<(i64, Option<&'static str>)> {
+    let is_same = |at: Timestamp| since_utc.duration_since(at).abs() <= SAME_CHANGE;
+    let mut number = 0;
+    for row in
+        known.iter().filter(|row| row.status == AlertStatus::Recorded && row.quantity == finding.quantity)
+    {
+        let is_of = row.part_number == finding.unit.0 && row.tail_number == finding.tail_number;
+        let Some(at) = row.since_utc.filter(|_| is_of) else { continue };
+        if is_same(at) {
+            return None;
+        }
+        number = number.max(row.change_number);
+    }
+    Some((number, Some(UNCHANGED)))
+}
+
+fn known_states(known: &[AlertRecord]) -> KnownStates<'_> {
+    let mut states = KnownStates::new();
+    for row in known.iter().filter(|row| row.status == AlertStatus::Recorded) {
+        let Some(serial) = row.serial_number.clone() else { continue };
+        let key = ((row.part_number.clone(), serial), row.quantity.as_str());
+        let latest = states.entry(key).or_insert((row.change_number, row.to_state.as_deref()));
+        if latest.0 <= row.change_number {
+            *latest = (row.change_number, row.to_state.as_deref());
+        }
+    }
+    states
+}
+
+fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timestamp) -> Vec<AlertRecord> {
+    let is_kept = |finding: &&Finding| finding.quantity == GAP || finding.is_noteworthy();
+    let mut rows: Vec<AlertRecord> = findings
+        .iter()
+        .filter(is_kept)
+        .map(|finding| {
+            let id = change_id(finding, 0, None);
+            row(&id, BASELINE, 0, None, finding, run_id, now)
+        })
+        .collect();
+    let Some(first) = findings.first() else { return rows };
+    let all: Vec<&Finding> = findings.iter().filter(|finding| finding.quantity == GAP).collect();
+    for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
+        let is_selected =
+            |f: &&Finding| channel.selects(f.state, f.unit.0.as_deref(), f.tail_number.as_deref());
+        let selected: Vec<&Finding> = findings.iter().filter(is_selected).collect();
+        let id = identifier(first.as_of_utc, &[BASELINE, name, run_id]);
+        let message = alert_message::baseline(&id, &all, &selected, run_id);
+        let of_fleet = Finding {
+            unit: (None, String::new()),
+            tail_number: None,
+            position: None,
+            state: None,
+            reason: None,
+            ..first.clone()
+        };
+        let summary = row(&id, BASELINE, 0, None, &of_fleet, run_id, now);
+        let summary = AlertRecord { serial_number: None, since_utc: None, ..summary };
+        rows.push(pending(&summary, name, &message));
+    }
+    rows
+}
+
+fn row(
+    id: &str,
+    kind: &str,
+    number: i64,
+    from: Option<&str>,
+    to: &Finding,
+    run_id: &str,
+    now: Timestamp,
+) -> AlertRecord {
+    AlertRecord {
+        alert_id: id.to_owned(),
+        channel: String::new(),
+        kind: kind.to_owned(),
+        part_number: to.unit.0.clone(),
+        serial_number: to.serial_number().map(str::to_owned),
+        tail_number: to.tail_number.clone(),
+        position: to.position.clone(),
+        quantity: to.quantity.to_owned(),
+        change_number: number,
+        from_state: from.map(str::to_owned),
+        to_state: to.state.map(str::to_owned),
+        since_utc: to.since_utc,
+        as_of_utc: to.as_of_utc,
+        message: None,
+        status: AlertStatus::Recorded,
+        attempts: 0,
+        error: None,
+        run_id: run_id.to_owned(),
+        recorded_utc: now,
+    }
+}
+
+fn pending(change: &AlertRecord, channel: &str, message: &str) -> AlertRecord {
+    AlertRecord {
+        channel: channel.to_owned(),
+        message: Some(message.to_owned()),
+        status: AlertStatus::Pending,
+        ..change.clone()
+    }
+}
+
+/// Identifier of a change: the same whenever it is computed from the same table.
+fn change_id(to: &Finding, number: i64, from: Option<&str>) -> String {
+    let number = number.to_string();
+    let state = |state: Option<&str>| alert_message::word(state).to_owned();
+    let part = to.unit.0.as_deref().unwrap_or_default();
+    let name = to.serial_number().or(to.tail_number.as_deref()).unwrap_or_default();
+    identifier(to.as_of_utc, &[part, name, to.quantity, &number, &state(from), &state(to.state)])
+}
+
+/// Date and digest: names of files sort by date, and hold no character of a name from a log.
+fn identifier(at: Timestamp, parts: &[&str]) -> String {
+    let mut digest = blake3::Hasher::new();
+    for part in parts {
+        digest.update(&(part.len() as u64).to_le_bytes());
+        digest.update(part.as_bytes());
+    }
+    format!("{}-{}", at.strftime("%Y%m%dT%H%M%SZ"), &digest.finalize().to_hex()[..16])
+}

@@ -1,0 +1,114 @@
+//! Message of an alert: one JSON document, made once and sent unchanged in every attempt.
+
+use records::sanitize::escape_cell;
+use serde_json::{Value, json};
+
+use crate::findings::finding::{Finding, GAP};
+use job::config::alerts::NOT_ASSESSED;
+
+/// Version of the message: it is raised when a key changes its meaning.
+const VERSION: u32 = 1;
+/// Units listed in the summary of a baseline.
+const MAX_LISTED: usize = 50;
+
+/// Word of a state in messages.
+pub(super) fn word(state: Option<&str>) -> &str {
+    state.unwrap_or(NOT_ASSESSED)
+}
+
+/// Name of a unit as text of one line.
+pub(super) fn unit_text(part: Option<&str>, serial: &str) -> String {
+    let name = part.map_or_else(|| serial.to_owned(), |part| format!("{part} / {serial}"));
+    escape_cell(&name).into_owned()
+}
+
+/// Message of a change.
+pub(super) fn change(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -> String {
+    let mut message = unit_fields(to);
+    let head = json!({
+        "freeplay_alert": VERSION,
+        "id": id,
+        "kind": "change",
+        "text": change_text(from, to),
+        "from": word(from),
+        "to": word(to.state),
+        "cause": to.cause,
+        "run_id": run_id,
+    });
+    merge(&mut message, head);
+    message.to_string()
+}
+
+/// Summary of the states that are known when alerts begin.
+pub(super) fn baseline(id: &str, known: &[&Finding], selected: &[&Finding], run_id: &str) -> String {
+    let count = |state: &str| known.iter().filter(|f| word(f.state) == state).count();
+    let mut states = serde_json::Map::new();
+    for finding in known {
+        let state = word(finding.state);
+        states.entry(state).or_insert_with(|| json!(count(state)));
+    }
+    let text = format!(
+        "Alerts begin with {} units, {} of them in a selected state; from now on changes are sent.",
+        known.len(),
+        selected.len()
+    );
+    json!({
+        "freeplay_alert": VERSION,
+        "id": id,
+        "kind": "baseline",
+        "text": text,
+        "states": states,
+        "units": selected.iter().take(MAX_LISTED).map(|f| unit_fields(f)).collect::<Vec<_>>(),
+        "units_left_out": selected.len().saturating_sub(MAX_LISTED),
+        "run_id": run_id,
+    })
+    .to_string()
+}
+
+fn unit_fields(finding: &Finding) -> Value {
+    json!({
+        "part_number": finding.unit.0,
+        "serial_number": finding.serial_number(),
+        "tail_number": finding.tail_number,
+        "position": finding.position,
+        "quantity": finding.quantity,
+        "state": word(finding.state),
+        "reason": finding.reason,
+        "since_utc": finding.since_utc,
+        "as_of_utc": finding.as_of_utc,
+        "gap_m": finding.gap_m,
+        "limit_m": finding.limit_m,
+        "not_before_utc": finding.not_before_utc,
+        "likely_utc": finding.likely_utc,
+        "work_request": finding.work_request,
+    })
+}
+
+fn merge(message: &mut Value, more: Value) {
+    if let (Value::Object(message), Value::Object(more)) = (message, more) {
+        message.extend(more);
+    }
+}
+
+/// One line for people.
+fn change_text(from: Option<&str>, to: &Finding) -> String {
+    let place = match (&to.tail_number, &to.position) {
+        (Some(tail), Some(position)) => format!(" on {tail} {position}"),
+        (Some(tail), None) => format!(" on {tail}"),
+        _ => String::new(),
+    };
+    let quantity = if to.quantity == GAP { String::new() } else { format!("{} ", to.quantity) };
+    let reason = to.reason.as_deref().map(|reason| format!(" ({reason})")).unwrap_or_default();
+    let gap = match (to.gap_m, to.limit_m) {
+        (Some(gap), Some(limit)) => format!("; gap {:.1} µm, limit {:.1} µm", gap * 1e6, limit * 1e6),
+        _ => String::new(),
+    };
+    let name = match (to.serial_number(), &to.tail_number) {
+        (Some(serial), _) => format!("{}{place}", unit_text(to.unit.0.as_deref(), serial)),
+        (None, Some(tail)) => format!("all of {tail}"),
+        (None, None) => format!("all of {}", to.unit.0.as_deref().unwrap_or_default()),
+    };
+    let cause = to.cause.as_deref().map(|cause| format!("; cause: {cause}")).unwrap_or_default();
+    let text = format!("{name}: {quantity}{} → {}{reason}{gap}{cause}", word(from), word(to.state));
+    escape_cell(&text).into_owned()
+}

@@ -1,0 +1,103 @@
+//! Finding: the state of one quantity of one unit after a run, or a change that a tail or a part made, as alerts and
+//! work requests need it.
+
+use jiff::Timestamp;
+use records::{QuantityChange, QuantityRow, TrendRow};
+
+use crate::fleet::histories::UnitKey;
+
+/// Quantity of the free play.
+pub const GAP: &str = "gap";
+
+/// State of a quantity other than the gap that has not changed.
+pub(crate) const UNCHANGED: &str = "normal";
+
+/// State of one quantity of one unit, or a change that a tail or a part made.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub struct Finding {
+    /// Without a serial number for a tail or a part.
+    pub unit: UnitKey,
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+    /// Name of the quantity, [`GAP`] for the free play.
+    pub quantity: &'static str,
+    /// `None` of a unit that is not assessed or was removed.
+    pub state: Option<&'static str>,
+    pub reason: Option<String>,
+    /// First flight of a change that a tail or a part made; none for a unit's state.
+    pub since_utc: Option<Timestamp>,
+    pub as_of_utc: Timestamp,
+    /// Departure of the unit's latest flight.
+    pub latest_flight_utc: Option<Timestamp>,
+    pub gap_m: Option<f64>,
+    pub limit_m: Option<f64>,
+    pub not_before_utc: Option<Timestamp>,
+    pub likely_utc: Option<Timestamp>,
+    /// The open work request about it.
+    pub work_request: Option<String>,
+    /// Why the state is another one than after the run before, where it is.
+    pub cause: Option<String>,
+}
+
+impl Finding {
+    /// Findings about the followed quantities of units, each `normal` where it has no state of its own.
+    pub fn of_quantities(rows: &[QuantityRow]) -> impl Iterator<Item = Self> {
+        rows.iter().map(|row| Self {
+            unit: row.unit(),
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+            quantity: row.quantity,
+            state: Some(row.state.unwrap_or(UNCHANGED)),
+            reason: row.reason.clone(),
+            since_utc: None,
+            as_of_utc: row.as_of_utc,
+            ..Self::default()
+        })
+    }
+
+    /// Findings about changes that tails or parts made.
+    pub fn of_common_changes(changes: &[QuantityChange], as_of_utc: Timestamp) -> impl Iterator<Item = Self> {
+        changes.iter().filter(|change| change.serial_number.is_none()).map(move |change| Self {
+            unit: (change.part_number.clone(), String::new()),
+            tail_number: change.tail_number.clone(),
+            position: None,
+            quantity: change.quantity,
+            state: change.state,
+            reason: Some(change.evidence.clone()),
+            since_utc: Some(change.since_utc),
+            as_of_utc,
+            ..Self::default()
+        })
+    }
+
+    /// Serial number of a unit.
+    pub fn serial_number(&self) -> Option<&str> {
+        Some(self.unit.1.as_str()).filter(|_| self.since_utc.is_none())
+    }
+
+    /// Whether the state is worth a row where none was known: every state of a gap, and other quantities that changed.
+    pub(crate) fn is_noteworthy(&self) -> bool {
+        if self.quantity == GAP { self.state.is_some() } else { self.state != Some(UNCHANGED) }
+    }
+
+    /// The finding about a unit's gap.
+    pub fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
+        Self {
+            unit: row.unit(),
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+            quantity: GAP,
+            state: row.state,
+            reason: row.reason.clone(),
+            since_utc: None,
+            as_of_utc: row.as_of_utc,
+            latest_flight_utc,
+            gap_m: row.gap_m,
+            limit_m: row.limit_m,
+            not_before_utc: row.not_before_utc,
+            likely_utc: row.likely_utc,
+            ..Self::default()
+        }
+    }
+}

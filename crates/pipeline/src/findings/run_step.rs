@@ -1,0 +1,198 @@
+//! Last step of a run: work requests and alerts are brought up to date. Its errors never lose the run's result.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use jiff::Timestamp;
+use job::Config;
+use records::{AlertRecord, AlertStatus, Diagnostic, Installations, WorkEventKind, WorkRequest};
+use store::Writer;
+
+use crate::error::Error;
+use crate::findings::alert_changes::{self, Channels};
+use crate::findings::channel;
+use crate::findings::delivery::{self, Attempt, Courier, Delivery};
+use crate::findings::finding::Finding;
+use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
+use crate::findings::work_requests::{requests, unit};
+use crate::findings::work_update::{self, Tables};
+use crate::fleet::bookkeeping::maintenance_log::{self, MaintenanceLog};
+
+/// Inputs of the step.
+pub(crate) struct FollowUp<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) installations: &'a Installations,
+    pub(crate) run_id: &'a str,
+    /// Whether the run left logs for later: its states are not those of the whole history.
+    pub(crate) is_partial: bool,
+    pub(crate) stop: &'a AtomicBool,
+}
+
+impl FollowUp<'_> {
+    /// Updates work requests, detects changes of state, and sends what is due.
+    pub(crate) fn run(&self, findings: Vec<Finding>, writer: &mut Writer) -> FollowUpSummary {
+        let mut summary = FollowUpSummary::default();
+        if let Err(error) = self.try_run(findings, writer, &mut summary) {
+            let what = format!("work requests and alerts are not up to date: {error}");
+            let hint = "the results of the run are stored; the next run tries again";
+            summary.errors.push(Diagnostic::new("follow_up_failed", what).hint(hint));
+        }
+        summary
+    }
+
+    fn try_run(
+        &self,
+        mut findings: Vec<Finding>,
+        writer: &mut Writer,
+        summary: &mut FollowUpSummary,
+    ) -> Result<(), Error> {
+        let now = Timestamp::now();
+        self.update_work(&mut findings, writer, &mut summary.work_requests, now)?;
+        let channels = &self.config.document.alerts;
+        if !channels.values().any(|channel| channel.enabled) {
+            return Ok(());
+        }
+        let alerts = summary.alerts.insert(AlertSummary::default());
+        let rows = self.detect(&findings, channels, writer, alerts, now)?;
+        let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
+        let delivery = delivery::deliver(rows, channels, self.run_id, &mut courier)?;
+        alerts.add(&delivery);
+        summary.errors.extend(diagnostics(&delivery));
+        Ok(())
+    }
+
+    fn update_work(
+        &self,
+        findings: &mut [Finding],
+        writer: &mut Writer,
+        summary: &mut WorkSummary,
+        now: Timestamp,
+    ) -> Result<(), Error> {
+        let mut events = writer.store().work_events()?;
+        let mut added = Vec::new();
+        if !self.is_partial {
+            let maintenance = match &self.config.document.logs.maintenance {
+                Some(file) => maintenance_log::read(&self.config.path(file))?,
+                None => MaintenanceLog::new(),
+            };
+            let newest = findings.iter().map(|finding| finding.as_of_utc).max();
+            let tables = Tables::new(self.installations, &maintenance, newest.map_or(now, |at| at.max(now)));
+            added = work_update::update(&events, findings, &tables, self.run_id, now);
+            writer.add_work_events(&added)?;
+        }
+        events.extend(added.iter().cloned());
+        let requests = requests(&events, now);
+        let count = |status: &str| requests.iter().filter(|request| request.status == status).count();
+        let with = |kinds: &[WorkEventKind]| -> Vec<WorkRequest> {
+            let ids = added.iter().filter(|event| kinds.contains(&event.event));
+            let ids: Vec<&str> = ids.map(|event| event.request_id.as_str()).collect();
+            requests.iter().filter(|request| ids.contains(&request.request_id.as_str())).cloned().collect()
+        };
+        let open: BTreeMap<_, _> = requests
+            .iter()
+            .filter(|request| request.is_open())
+            .map(|request| ((unit(request), request.quantity.as_str()), &request.request_id))
+            .collect();
+        for finding in findings {
+            finding.work_request =
+                open.get(&(finding.unit.clone(), finding.quantity)).map(|id| (*id).clone());
+        }
+        *summary = WorkSummary {
+            open: count("open"),
+            acknowledged: count("acknowledged"),
+            deferred: count("deferred"),
+            new: with(&[WorkEventKind::Opened, WorkEventKind::Reopened]),
+            returned: with(&[WorkEventKind::Returned]),
+            moved: with(&[WorkEventKind::Moved]),
+            closed: with(&[WorkEventKind::Removed, WorkEventKind::Maintained]),
+        };
+        Ok(())
+    }
+
+    /// Writes the changes of this run; returns every row, with the messages of earlier runs.
+    fn detect(
+        &self,
+        findings: &[Finding],
+        channels: &Channels,
+        writer: &mut Writer,
+        summary: &mut AlertSummary,
+        now: Timestamp,
+    ) -> Result<Vec<AlertRecord>, Error> {
+        let mut rows = writer.store().alerts()?;
+        summary.is_held = self.is_partial;
+        if self.is_partial {
+            return Ok(rows);
+        }
+        let found = alert_changes::detect(&rows, findings, channels, self.run_id, now);
+        let changes = found.iter().filter(|row| row.status == AlertStatus::Recorded).count();
+        summary.is_baseline = rows.is_empty() && changes > 0;
+        summary.changes = if summary.is_baseline { 0 } else { changes };
+        // One commit: a killed run leaves the changes with their messages, or neither.
+        writer.write_alerts(&found)?;
+        rows.extend(found);
+        Ok(rows)
+    }
+}
+
+impl AlertSummary {
+    fn add(&mut self, delivery: &Delivery) {
+        self.sent = delivery.sent;
+        self.failed = delivery.failed.len();
+        self.unconfirmed = delivery.unconfirmed.len();
+        self.unconfirmed_before = delivery.unconfirmed_before;
+        self.waiting = delivery.waiting;
+        self.without_channel.clone_from(&delivery.without_channel);
+    }
+}
+
+/// One diagnostic for each channel and kind of failure.
+fn diagnostics(delivery: &Delivery) -> Vec<Diagnostic> {
+    let kinds = [
+        ("alert_not_sent", "not sent", &delivery.failed, "the next run sends them again"),
+        (
+            "alert_unconfirmed",
+            "perhaps not received",
+            &delivery.unconfirmed,
+            "compare `freeplay store alerts` with the receiver; `--resend ID` sends one again",
+        ),
+    ];
+    let mut found = Vec::new();
+    for (code, what, rows, hint) in kinds {
+        let mut by_channel = BTreeMap::<&str, Vec<&AlertRecord>>::new();
+        for row in rows {
+            by_channel.entry(&row.channel).or_default().push(row);
+        }
+        for (channel, rows) in by_channel {
+            let why = rows[0].error.as_deref().unwrap_or("no reason is known");
+            let what = format!("alerts `{channel}`: {} {what}: {why}", rows.len());
+            found.push(Diagnostic::new(code, what).hint(hint));
+        }
+    }
+    found
+}
+
+/// Courier of a run: rows go to the store, messages to the configured channels.
+struct StoreCourier<'a> {
+    config: &'a Config,
+    writer: &'a mut Writer,
+    stop: &'a AtomicBool,
+}
+
+impl Courier for StoreCourier<'_> {
+    type Error = store::Error;
+
+    fn write(&mut self, rows: &[AlertRecord]) -> Result<(), store::Error> {
+        self.writer.write_alerts(rows)
+    }
+
+    fn send(&mut self, row: &AlertRecord) -> Attempt {
+        match self.config.document.alerts.get(&row.channel) {
+            Some(settings) => channel::send(self.config, settings, row),
+            None => Attempt::NotSent("the channel is not configured".to_owned()),
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

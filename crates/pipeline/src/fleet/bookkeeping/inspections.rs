@@ -1,0 +1,148 @@
+//! Inspections table: free play measured in the hangar.
+
+use std::collections::HashMap;
+
+use ingest::tables::{Table, name, number, utc};
+use jiff::Timestamp;
+use job::Config;
+use job::config::limits::PLAUSIBLE_LIMIT_M;
+use records::time::days_between;
+use records::{Installation, SerialNumber};
+
+use crate::error::Error;
+use crate::fleet::flight_row::FlightRow;
+use crate::fleet::histories::UnitKey;
+
+/// Estimates compared with an inspection: at most this many, from at most this many days before it.
+const MAX_COMPARED: usize = 10;
+const MAX_COMPARED_DAYS: f64 = 30.0;
+/// An inspection and the estimates before it contradict each other when they differ by this share of the larger and by this
+/// length, m: joints beside the actuator and the force of the check account for less.
+const CONTRADICTION: (f64, f64) = (0.3, 30e-6);
+
+/// An inspection as the table has it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct InspectionRow {
+    pub(crate) part_number: Option<String>,
+    pub(crate) serial_number: String,
+    pub(crate) date_utc: Timestamp,
+    pub(crate) play_m: f64,
+    pub(crate) instrument: Option<String>,
+    pub(crate) force_n: Option<f64>,
+}
+
+impl InspectionRow {
+    pub(crate) fn is_of(&self, unit: &UnitKey) -> bool {
+        self.serial_number == unit.1 && (self.part_number.is_none() || self.part_number == unit.0)
+    }
+
+    /// Median of the last estimates before it, m, and their number.
+    pub(crate) fn estimate_before(&self, records: &[FlightRow]) -> (Option<f64>, usize) {
+        let near = records
+            .iter()
+            .rev()
+            .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days_between(r.departure_utc(), self.date_utc)));
+        let mut gaps: Vec<f64> = near.filter_map(FlightRow::gap_m).take(MAX_COMPARED).collect();
+        gaps.sort_by(f64::total_cmp);
+        let middle = gaps.len() / 2;
+        let median = gaps
+            .get(middle)
+            .map(|upper| if gaps.len() % 2 == 1 { *upper } else { f64::midpoint(gaps[middle - 1], *upper) });
+        (median, gaps.len())
+    }
+
+    /// What it measured, in words, and what the estimates before it read where they contradict it.
+    pub(crate) fn statement(&self, records: &[FlightRow]) -> (String, bool) {
+        let day = self.date_utc.strftime("%Y-%m-%d");
+        let measured = format!("the hangar check of {day} measured {:.1} µm", self.play_m * 1e6);
+        let contradicts = |gap_m: &f64| {
+            let apart_m = (self.play_m - gap_m).abs();
+            apart_m > CONTRADICTION.0 * self.play_m.max(*gap_m) && apart_m > CONTRADICTION.1
+        };
+        match self.estimate_before(records).0.filter(contradicts) {
+            Some(gap_m) => {
+                let read = gap_m * 1e6;
+                (
+                    format!(
+                        "{measured} where the records before it read {read:.1} µm: find out which is wrong"
+                    ),
+                    true,
+                )
+            }
+            None => (measured, false),
+        }
+    }
+}
+
+/// Inspections by serial number, earliest first.
+#[derive(Debug, Default)]
+pub(crate) struct InspectionIndex(HashMap<String, Vec<InspectionRow>>);
+
+impl InspectionIndex {
+    /// The configured inspections.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub(crate) fn read(config: &Config) -> Result<Self, Error> {
+        let mut rows = read(config)?.unwrap_or_default();
+        rows.sort_by_key(|row| row.date_utc);
+        let mut by_serial = HashMap::<String, Vec<InspectionRow>>::new();
+        for row in rows {
+            by_serial.entry(row.serial_number.clone()).or_default().push(row);
+        }
+        Ok(Self(by_serial))
+    }
+
+    /// The latest inspection of a unit until a date, in the installation that it is in then and after its last renewal.
+    pub(crate) fn latest(
+        &self,
+        unit: &UnitKey,
+        installed: &Installation,
+        renewed: Option<Timestamp>,
+        as_of: Timestamp,
+    ) -> Option<&InspectionRow> {
+        let is_of_now = |inspection: &&InspectionRow| {
+            inspection.is_of(unit)
+                && (installed.installed_utc..=as_of).contains(&inspection.date_utc)
+                && renewed.is_none_or(|renewed| renewed < inspection.date_utc)
+        };
+        self.0.get(&unit.1)?.iter().rev().find(is_of_now)
+    }
+}
+
+/// A measured play, m.
+fn plausible_play(text: &str) -> Result<f64, String> {
+    let (least, most) = (0.0, PLAUSIBLE_LIMIT_M.1);
+    let play_m = number(text)?;
+    if (least..=most).contains(&play_m) {
+        return Ok(play_m);
+    }
+    Err(format!("`{text}` is not between {least} and {most} m: 64 µm are 64e-6"))
+}
+
+/// The configured table of inspections; none where none is configured.
+///
+/// # Errors
+/// When the table cannot be read, lacks a column, or holds a cell that cannot be right.
+pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
+    let Some(file) = &config.document.logs.inspections else { return Ok(None) };
+    let bad = |e: ingest::Error| Error::refused(e.diagnostic());
+    let table = Table::read(&config.path(file)).map_err(bad)?;
+    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
+    let date = table.column(&["date_utc", "date"]).map_err(bad)?;
+    let play = table.column(&["play_m"]).map_err(bad)?;
+    let [part, instrument, force] =
+        ["part_number", "instrument", "force_n"].map(|column| table.find(&[column]));
+    let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
+    let check = |row| {
+        Ok(InspectionRow {
+            part_number: text(row, part),
+            serial_number: table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
+            date_utc: table.required(row, date, utc).map_err(bad)?,
+            play_m: table.required(row, play, plausible_play).map_err(bad)?,
+            instrument: text(row, instrument),
+            force_n: table.optional(row, force, number).map_err(bad)?,
+        })
+    };
+    (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)
+}

@@ -1,0 +1,135 @@
+//! The installations table, unit by unit.
+
+use std::collections::HashMap;
+
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use records::time::days_between;
+use records::{Installation, Installations};
+use serde::Serialize;
+
+use crate::fleet::histories::UnitKey;
+
+/// Installations by unit, earliest first.
+pub(crate) struct InstallationIndex<'a>(HashMap<&'a str, Vec<&'a Installation>>);
+
+impl<'a> InstallationIndex<'a> {
+    pub(crate) fn new(installations: &'a Installations) -> Self {
+        let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
+        for installation in installations.iter() {
+            by_serial.entry(installation.unit().1.as_str()).or_default().push(installation);
+        }
+        by_serial
+            .values_mut()
+            .for_each(|installations| installations.sort_by_key(|installation| installation.installed_utc));
+        Self(by_serial)
+    }
+
+    /// The last installation of a unit that is in none on a date; nothing of a unit without installations before it.
+    pub(crate) fn removal(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
+        let mut before = self.of(name);
+        before.retain(|installation| installation.installed_utc <= as_of);
+        let is_open = |i: &&Installation| i.removed_utc.is_none_or(|removed| removed > as_of);
+        if before.iter().any(is_open) { None } else { before.into_iter().max_by_key(|i| i.removed_utc) }
+    }
+
+    /// The installation that a unit is in on a date.
+    pub(crate) fn installed(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
+        self.of(name).into_iter().find(|installation| installation.covers(as_of))
+    }
+
+    /// A unit's installations; where its part number is unknown, by its serial number.
+    pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
+        let is_of = |installation: &&&Installation| {
+            part.as_deref().is_none_or(|part| installation.unit().0.as_str() == part)
+        };
+        self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
+    }
+}
+/// A date of the installations table that is still to come.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct DateAhead {
+    pub part_number: String,
+    pub serial_number: String,
+    /// `installed_utc` or `removed_utc`.
+    pub column: &'static str,
+    pub date: Timestamp,
+    /// The same date with day and month exchanged, if that is past.
+    pub exchanged: Option<Timestamp>,
+}
+
+/// Part, serial number, column and date, and what may be wrong with it.
+impl std::fmt::Display for DateAhead {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { part_number, serial_number, column, date, exchanged } = self;
+        let day = |at: &Timestamp| at.strftime("%Y-%m-%d");
+        write!(f, "{part_number} / {serial_number}: `{column}` is {}, a date to come", day(date))?;
+        match exchanged {
+            Some(past) => write!(f, "; day and month may be exchanged ({})", day(past)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The dates of the installations table that are more than a day ahead of `now`.
+pub fn dates_ahead(installations: &Installations, now: Timestamp) -> Vec<DateAhead> {
+    let dates = |i: &Installation| {
+        let columns = [("installed_utc", Some(i.installed_utc)), ("removed_utc", i.removed_utc)];
+        let ahead = columns.into_iter().filter_map(|(column, date)| Some((column, date?)));
+        let ahead = ahead.filter(|(_, date)| days_between(now, *date) > 1.0);
+        let row = |(column, date)| DateAhead {
+            part_number: i.part_number.to_string(),
+            serial_number: i.serial_number.to_string(),
+            column,
+            date,
+            exchanged: exchanged(date).filter(|other| *other <= now),
+        };
+        ahead.map(row).collect::<Vec<_>>()
+    };
+    installations.iter().flat_map(dates).collect()
+}
+
+/// A date with day and month exchanged, if there is one.
+fn exchanged(at: Timestamp) -> Option<Timestamp> {
+    let there = at.to_zoned(TimeZone::UTC).datetime();
+    let (month, day) = (there.month(), there.day());
+    if month == day {
+        return None;
+    }
+    there.with().month(day).day(month).build().ok()?.to_zoned(TimeZone::UTC).ok().map(|z| z.timestamp())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use records::{PartNumber, Position, SerialNumber, TailNumber};
+
+    use super::*;
+
+    #[test]
+    fn a_date_ahead_whose_day_and_month_exchanged_are_past_names_that_date() {
+        let installation = Installation {
+            tail_number: TailNumber::new("N1").unwrap(),
+            position: Position::new("left").unwrap(),
+            part_number: PartNumber::new("P").unwrap(),
+            serial_number: SerialNumber::new("S").unwrap(),
+            installed_utc: "2026-08-24T00:00:00Z".parse().unwrap(),
+            removed_utc: Some("2026-12-10T06:00:00Z".parse().unwrap()),
+            unit_hours_at_install: None,
+            tail_hours_at_install: None,
+            today: None,
+        };
+        let table = Installations::new(vec![installation]).unwrap();
+        let named = |now: &str| {
+            let found = dates_ahead(&table, now.parse().unwrap());
+            found.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let likely =
+            "P / S: `removed_utc` is 2026-12-10, a date to come; day and month may be exchanged (2026-10-12)";
+        assert_eq!(named("2026-11-23T00:00:00Z"), [likely]);
+        // Before the exchanged date, nothing hints at an exchange; at the date itself, it has come.
+        assert_eq!(named("2026-10-01T00:00:00Z"), [likely.split(';').next().unwrap()]);
+        assert!(named("2026-12-10T00:00:00Z").is_empty());
+    }
+}

@@ -1,0 +1,346 @@
+//! Bookkeeping: which unit flew, and how many hours, joined to stored records from the operator's tables.
+//!
+//! A gap belongs to a tail, a position and a departure. The serial number that was there and the hours that it had are
+//! corrected later, often after the log is gone. So every reader of the store joins them here, and each run writes them into
+//! the columns that other programs read.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use arrow::array::{
+    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
+};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float64Type, Int32Type, TimestampMicrosecondType};
+use arrow::error::ArrowError;
+use ingest::Flights;
+use jiff::Timestamp;
+use job::Config;
+use records::{Installation, Installations};
+use store::{Join, Store, Writer};
+
+use crate::error::Error;
+use crate::fleet::histories::UnitKey;
+
+/// Columns that the join reads or supplies, for [`Writer::rewrite`].
+const COLUMNS: [&str; 10] = [
+    "tail_number",
+    "position",
+    "departure_utc",
+    "flight_id",
+    "part_number",
+    "serial_number",
+    "unit_hours",
+    "flight_hours",
+    "tail_hours_end",
+    "log_path",
+];
+
+/// The operator's tables, as they are joined to records.
+#[derive(Debug, Clone)]
+pub struct Bookkeeping {
+    installations: Arc<Installations>,
+    flights: Arc<Flights>,
+    /// Configured parts: a misspelt part number takes no record away from its unit.
+    parts: Arc<BTreeSet<String>>,
+    /// Digest of the tables.
+    digest: String,
+}
+
+/// Flights of one place that a corrected table gave to another unit.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct MovedFlights {
+    pub tail_number: String,
+    pub position: String,
+    pub from_part_number: String,
+    pub from_serial_number: String,
+    pub part_number: String,
+    pub serial_number: String,
+    /// Number of records.
+    pub flights: usize,
+    pub first_departure_utc: Timestamp,
+    pub last_departure_utc: Timestamp,
+}
+
+impl MovedFlights {
+    /// The unit that lost the flights.
+    pub(crate) fn former_unit(&self) -> UnitKey {
+        (Some(self.from_part_number.clone()), self.from_serial_number.clone())
+    }
+
+    /// The unit that has them now.
+    pub(crate) fn present_unit(&self) -> UnitKey {
+        (Some(self.part_number.clone()), self.serial_number.clone())
+    }
+}
+
+/// How many flights of which place went from which unit to which.
+impl std::fmt::Display for MovedFlights {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { tail_number, position, part_number, serial_number, flights, .. } = self;
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
+        write!(
+            f,
+            "{flights} flight{} of {tail_number} {position} ({} to {}) moved from {} / {} to {part_number} / {serial_number}",
+            if *flights == 1 { "" } else { "s" },
+            day(self.first_departure_utc),
+            day(self.last_departure_utc),
+            self.from_part_number,
+            self.from_serial_number,
+        )
+    }
+}
+
+/// What a rewrite of the bookkeeping columns changed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Rebooked {
+    /// Rows of which any bookkeeping column changed.
+    pub rows: usize,
+    /// Flights that another unit has now.
+    pub moved: Vec<MovedFlights>,
+}
+
+impl Bookkeeping {
+    /// The tables of a configuration.
+    pub fn new(config: &Config, installations: &Installations) -> Self {
+        let parts = config.parts.keys().map(ToString::to_string).collect();
+        let mut hash = blake3::Hasher::new();
+        let mut add = |row: Result<String, serde_json::Error>| {
+            hash.update(row.unwrap_or_default().as_bytes());
+            hash.update(b"\n");
+        };
+        installations.iter().for_each(|row| add(serde_json::to_string(row)));
+        config.parts.keys().for_each(|part| add(serde_json::to_string(part)));
+        hash.update(config.flights.digest().as_bytes());
+        Self {
+            installations: Arc::new(installations.clone()),
+            flights: Arc::clone(&config.flights),
+            parts: Arc::new(parts),
+            digest: hash.finalize().to_hex().to_string(),
+        }
+    }
+
+    /// Digest of the tables: where a run that ended has the same one, the stored columns are those of the tables.
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// The store, with the tables joined to every record that is read.
+    ///
+    /// # Errors
+    /// When the runs of the store cannot be read.
+    pub fn join_to(&self, store: Store) -> Result<Store, Error> {
+        if self.is_written(&store)? {
+            return Ok(store);
+        }
+        let own = self.clone();
+        Ok(store.joined(Join::new(move |batch| own.join(batch))))
+    }
+
+    /// Whether the latest run wrote these tables into all records, and ended.
+    fn is_written(&self, store: &Store) -> Result<bool, Error> {
+        Ok(store.tables_digest()?.as_deref() == Some(self.digest.as_str()))
+    }
+
+    /// Writes the tables into all records of the store, and the new paths of renamed logs.
+    ///
+    /// # Errors
+    /// As [`Writer::rewrite`].
+    pub fn write(&self, writer: &mut Writer, renamed: &BTreeMap<String, String>) -> Result<Rebooked, Error> {
+        if renamed.is_empty() && self.is_written(writer.store())? {
+            return Ok(Rebooked::default());
+        }
+        let moved = Mutex::new(MovedByPlace::new());
+        let change = |batch: &RecordBatch| {
+            let joined = with_new_paths(&self.join(batch)?, renamed)?;
+            add_moved(batch, &joined, &mut moved.lock().unwrap_or_else(PoisonError::into_inner))?;
+            Ok(joined)
+        };
+        let rows = writer.rewrite(&COLUMNS, &change)?;
+        let moved = moved.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Rebooked { rows, moved: moved.into_values().collect() })
+    }
+
+    /// A batch of records with the columns that the tables supply. A record that they do not know keeps what is stored.
+    fn join(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+        let schema = batch.schema();
+        let text =
+            |name: &str| -> Result<Coded, ArrowError> { Coded::of(batch.column(schema.index_of(name)?)) };
+        let (tails, positions) = (text("tail_number")?, text("position")?);
+        let (mut parts, mut serials) = (text("part_number")?, text("serial_number")?);
+        let flights = if self.flights.is_empty() { None } else { Some(text("flight_id")?) };
+        let departures = batch.column(schema.index_of("departure_utc")?).clone();
+        let departures = departures.as_primitive::<TimestampMicrosecondType>();
+        let numbers = |name: &str| batch.column_by_name(name).map(numbers);
+        let [mut hours, mut flown, mut meters] =
+            ["unit_hours", "flight_hours", "tail_hours_end"].map(numbers);
+        let mut places: HashMap<(i32, i32), &[Installation]> = HashMap::new();
+        let mut names: HashMap<*const Installation, (i32, i32)> = HashMap::new();
+        for row in 0..batch.num_rows() {
+            let Ok(at) = Timestamp::from_microsecond(departures.value(row)) else { continue };
+            let tail = tails.text(row);
+            if let Some(flight) =
+                flights.as_ref().and_then(|flights| self.flights.of(tail, flights.text(row), at))
+            {
+                set(flown.as_mut(), row, flight.flight_hours);
+                set(meters.as_mut(), row, flight.tail_hours_end);
+            }
+            let place = (tails.keys[row], positions.keys[row]);
+            let installations = places
+                .entry(place)
+                .or_insert_with(|| self.installations.of_position(tail, positions.text(row)));
+            let Some(installation) = installations.iter().find(|installation| installation.covers(at)) else {
+                continue;
+            };
+            if !self.parts.contains(installation.part_number.as_str()) {
+                continue;
+            }
+            let (part, serial) = *names.entry(std::ptr::from_ref(installation)).or_insert_with(|| {
+                let (part, serial) = installation.unit();
+                (parts.code(part.as_str()), serials.code(serial.as_str()))
+            });
+            (parts.keys[row], serials.keys[row]) = (part, serial);
+            if let Some(hours) = &mut hours {
+                hours[row] = installation.unit_hours(meters.as_ref().and_then(|meters| meters[row]));
+            }
+        }
+        let mut columns = batch.columns().to_vec();
+        let mut put = |name: &str, column: ArrayRef| -> Result<(), ArrowError> {
+            if let Ok(place) = schema.index_of(name) {
+                columns[place] = cast(&column, schema.field(place).data_type())?;
+            }
+            Ok(())
+        };
+        put("part_number", parts.array()?)?;
+        put("serial_number", serials.array()?)?;
+        for (name, values) in [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)] {
+            if let Some(values) = values {
+                put(name, Arc::new(Float64Array::from(values)))?;
+            }
+        }
+        RecordBatch::try_new(schema, columns)
+    }
+}
+
+fn numbers(column: &ArrayRef) -> Vec<Option<f64>> {
+    column.as_primitive::<Float64Type>().iter().collect()
+}
+
+fn set(values: Option<&mut Vec<Option<f64>>>, row: usize, value: Option<f64>) {
+    if let (Some(values), Some(_)) = (values, value) {
+        values[row] = value;
+    }
+}
+
+/// A column of texts as codes, to which texts can be added.
+struct Coded {
+    keys: Vec<i32>,
+    texts: StringArray,
+    /// Texts that were added, and the codes of all; filled by the first one that is asked for.
+    added: Vec<String>,
+    codes: HashMap<String, i32>,
+}
+
+impl Coded {
+    fn of(column: &ArrayRef) -> Result<Self, ArrowError> {
+        let coded = cast(column, &DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)))?;
+        let coded = coded.as_dictionary::<Int32Type>();
+        let (keys, texts) = (coded.keys().values().to_vec(), coded.values().as_string::<i32>().clone());
+        Ok(Self { keys, texts, added: Vec::new(), codes: HashMap::new() })
+    }
+
+    /// The stored text of a row.
+    fn text(&self, row: usize) -> &str {
+        self.texts.value(self.keys[row] as usize)
+    }
+
+    /// The code of a text.
+    fn code(&mut self, text: &str) -> i32 {
+        if self.codes.is_empty() {
+            let stored = self.texts.iter().map(|text| text.unwrap_or_default().to_owned());
+            self.codes = stored.zip(0..).collect();
+        }
+        if let Some(code) = self.codes.get(text) {
+            return *code;
+        }
+        let code = (self.texts.len() + self.added.len()) as i32;
+        self.added.push(text.to_owned());
+        self.codes.insert(text.to_owned(), code);
+        code
+    }
+
+    fn array(self) -> Result<ArrayRef, ArrowError> {
+        let added = self.added.iter().map(|text| Some(text.as_str()));
+        let texts: StringArray = self.texts.iter().chain(added).collect();
+        Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(Int32Array::from(self.keys), Arc::new(texts))?))
+    }
+}
+
+/// A batch with the new paths of renamed logs.
+fn with_new_paths(
+    batch: &RecordBatch,
+    renamed: &BTreeMap<String, String>,
+) -> Result<RecordBatch, ArrowError> {
+    if renamed.is_empty() {
+        return Ok(batch.clone());
+    }
+    let place = batch.schema_ref().index_of("log_path")?;
+    let paths = batch.column(place).as_string::<i32>();
+    let new = paths.iter().map(|path| path.map(|path| renamed.get(path).map_or(path, String::as_str)));
+    let paths: StringArray = new.collect();
+    let mut columns = batch.columns().to_vec();
+    columns[place] = Arc::new(paths);
+    RecordBatch::try_new(batch.schema(), columns)
+}
+
+/// Moved flights by place and units.
+type MovedByPlace = BTreeMap<[String; 6], MovedFlights>;
+
+/// Counts the rows that have another unit in `after` than in `before`.
+fn add_moved(before: &RecordBatch, after: &RecordBatch, moved: &mut MovedByPlace) -> Result<(), ArrowError> {
+    let text = |batch: &RecordBatch, name: &str| {
+        Ok::<_, ArrowError>(batch.column(batch.schema_ref().index_of(name)?).as_string::<i32>().clone())
+    };
+    let [tails, positions, from_parts, from_serials] =
+        ["tail_number", "position", "part_number", "serial_number"].map(|name| text(before, name));
+    let (tails, positions, from_parts, from_serials) = (tails?, positions?, from_parts?, from_serials?);
+    let (parts, serials) = (text(after, "part_number")?, text(after, "serial_number")?);
+    let departures = before.column(before.schema_ref().index_of("departure_utc")?);
+    let departures = departures.as_primitive::<TimestampMicrosecondType>();
+    for row in 0..before.num_rows() {
+        if (from_parts.value(row), from_serials.value(row)) == (parts.value(row), serials.value(row)) {
+            continue;
+        }
+        let texts = [&tails, &positions, &from_parts, &from_serials, &parts, &serials];
+        let key = texts.map(|texts| texts.value(row).to_owned());
+        let at = Timestamp::from_microsecond(departures.value(row)).unwrap_or_default();
+        let entry = moved.entry(key).or_insert_with_key(|key| {
+            let [tail_number, position, from_part_number, from_serial_number, part_number, serial_number] =
+                key.clone();
+            MovedFlights {
+                tail_number,
+                position,
+                from_part_number,
+                from_serial_number,
+                part_number,
+                serial_number,
+                flights: 0,
+                first_departure_utc: at,
+                last_departure_utc: at,
+            }
+        });
+        entry.flights += 1;
+        entry.first_departure_utc = entry.first_departure_utc.min(at);
+        entry.last_departure_utc = entry.last_departure_utc.max(at);
+    }
+    Ok(())
+}
+
+/// Opens the store of a configuration for reading, with the operator's tables joined to its records.
+///
+/// # Errors
+/// As [`Store::open`].
+pub fn open_store(config: &Config, installations: &Installations) -> Result<Store, Error> {
+    Bookkeeping::new(config, installations).join_to(Store::open(config.store())?)
+}

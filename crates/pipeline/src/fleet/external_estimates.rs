@@ -1,0 +1,81 @@
+//! External tables: estimates to be assessed, and the dates of the assessments.
+
+use std::path::Path;
+
+use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
+
+use crate::error::Error;
+use crate::fleet::builder::HistoryBuilder;
+use crate::fleet::histories::Histories;
+use crate::fleet::merge::of_parts;
+use crate::fleet::row_keys::KeyColumns;
+use jiff::Timestamp;
+
+/// A unit and a day.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AsOfQuery {
+    /// The part number, where the table has it.
+    pub part_number: Option<String>,
+    /// The unit.
+    pub serial_number: String,
+    /// The date of the assessment; later data are ignored.
+    pub as_of_utc: Timestamp,
+}
+
+/// Reads an estimates table: `serial_number` (or `serial`), `departure_utc`, `gap_m`, and what else the
+/// contract allows.
+///
+/// # Errors
+/// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
+pub fn read(file: &Path) -> Result<Histories, Error> {
+    let table = TableSplits::open(file, Some(&HistoryBuilder::COLUMNS), &KeyColumns::COLUMNS).map_err(bad)?;
+    of_parts(table.len(), false, |gathering, some| {
+        let mut chunks = table.batches(some).map_err(bad)?;
+        chunks.try_for_each(|chunk| gathering.add(&chunk?)).map_err(bad)
+    })
+}
+
+/// The histories of an estimates table in memory.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
+    of_parts(chunks.len(), false, |gathering, some| {
+        chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
+    })
+}
+
+/// Reads a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.
+///
+/// # Errors
+/// As [`read`].
+pub fn queries(file: &Path) -> Result<Vec<AsOfQuery>, Error> {
+    queries_of(&Table::read(file).map_err(bad)?)
+}
+
+/// The units and days of a table of queries.
+///
+/// # Errors
+/// As [`read`].
+pub fn queries_of(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
+    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
+    let as_of = table.column(&["as_of_utc"]).map_err(bad)?;
+    let part = table.find(&["part_number"]);
+    (0..table.len())
+        .map(|row| {
+            Ok(AsOfQuery {
+                part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),
+                serial_number: table
+                    .required(row, serial, name::<records::SerialNumber>)
+                    .map_err(bad)?
+                    .to_string(),
+                as_of_utc: table.required(row, as_of, utc).map_err(bad)?,
+            })
+        })
+        .collect()
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "it is what `map_err` hands over")]
+fn bad(error: ingest::Error) -> Error {
+    Error::refused(error.diagnostic())
+}

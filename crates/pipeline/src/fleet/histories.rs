@@ -1,0 +1,258 @@
+//! Every unit's flights as statements need them.
+//!
+//! A fleet's store holds tens of millions of records of some fifty columns; of each flight this keeps what a
+//! trend is made from, and names once for each unit.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use records::Installation;
+
+use crate::fleet::extras::UnitExtras;
+use crate::fleet::flight_row::{FlightExtras, FlightRow};
+use crate::fleet::settings_counts::SettingsCounts;
+
+/// Part number where known, and serial number.
+pub type UnitKey = (Option<String>, String);
+
+/// Position of a unit, as far as its rows hold it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct TailPosition {
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+}
+
+impl TailPosition {
+    /// Tail and position of an installation.
+    pub(crate) fn of(installation: &Installation) -> Self {
+        Self {
+            tail_number: Some(installation.tail_number.to_string()),
+            position: Some(installation.position.to_string()),
+        }
+    }
+
+    fn is(&self, tail_number: Option<&str>, position: Option<&str>) -> bool {
+        self.tail_number.as_deref() == tail_number && self.position.as_deref() == position
+    }
+}
+
+/// A unit's places, as they come.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Positions(Vec<TailPosition>);
+
+impl Positions {
+    /// The place with a number.
+    pub(crate) fn get(&self, number: u32) -> &TailPosition {
+        &self.0[number as usize]
+    }
+
+    /// The number of a place.
+    pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
+        // A unit sits where it sat in the row before, or in one of a handful of places.
+        let known = self.0.iter().rposition(|place| place.is(tail_number, position));
+        let at = known.unwrap_or_else(|| {
+            let owned = |name: Option<&str>| name.map(str::to_owned);
+            self.0.push(TailPosition { tail_number: owned(tail_number), position: owned(position) });
+            self.0.len() - 1
+        });
+        at as u32
+    }
+
+    /// The numbers of others.
+    pub(crate) fn numbers(&mut self, others: &Self) -> Vec<u32> {
+        let number =
+            |place: &TailPosition| self.number(place.tail_number.as_deref(), place.position.as_deref());
+        others.0.iter().map(number).collect()
+    }
+}
+
+/// A unit's flights, by departure.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    places: Vec<TailPosition>,
+    flights: Vec<FlightRow>,
+    /// Their secondary columns; empty once they were [dropped](History::drop_secondary).
+    extras: UnitExtras,
+    /// The flights' names, one after the other.
+    names: String,
+    /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
+    disputed_us: Vec<i64>,
+    settings: SettingsCounts,
+}
+
+impl History {
+    /// The flights, by departure.
+    pub fn flights(&self) -> &[FlightRow] {
+        &self.flights
+    }
+
+    /// The tails it was flown on.
+    pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
+        self.places.iter().filter_map(|place| place.tail_number.as_deref())
+    }
+
+    /// Those that departed at or before a time.
+    pub(crate) fn until(&self, as_of: Timestamp) -> &[FlightRow] {
+        &self.flights[..self.flights.partition_point(|f| f.departure_utc() <= as_of)]
+    }
+
+    /// Of the latest gaps at a time, how many have estimators that disagree, and how many there are.
+    pub(crate) fn disputed(&self, as_of: Timestamp, latest: usize) -> (usize, usize) {
+        let gaps = self.until(as_of).iter().rev().filter(|flown| flown.gap_m().is_some()).take(latest);
+        gaps.fold((0, 0), |(disputed, count), flown| {
+            let is_disputed = self.disputed_us.binary_search(&flown.departure_us()).is_ok();
+            (disputed + usize::from(is_disputed), count + 1)
+        })
+    }
+
+    /// Number of gaps by other settings of the estimate than the latest gap, the departure of the last of them, and the number
+    /// of all gaps; none where all are by the same.
+    pub(crate) fn other_settings(&self) -> Option<(usize, Timestamp, usize)> {
+        self.settings.others()
+    }
+
+    /// The one that departed then.
+    pub(crate) fn at(&self, departure_utc: Timestamp) -> Option<&FlightRow> {
+        let first = self.flights.partition_point(|f| f.departure_utc() < departure_utc);
+        self.flights.get(first).filter(|f| f.departure_utc() == departure_utc)
+    }
+
+    /// The name of one of them.
+    pub fn flight_id(&self, flown: &FlightRow) -> Option<&str> {
+        flown.name_in(&self.names)
+    }
+
+    /// Secondary columns of one of them.
+    pub fn extras(&self, flown: &FlightRow) -> FlightExtras {
+        self.extras.row(flown.row)
+    }
+
+    /// Frees the secondary columns, which are not needed from now on.
+    pub(crate) fn drop_secondary(&mut self) {
+        self.extras = UnitExtras::default();
+    }
+
+    /// Where one of them was flown.
+    pub fn place(&self, flown: &FlightRow) -> &TailPosition {
+        &self.places[flown.place as usize]
+    }
+
+    /// The installation, of those of the unit, that a flight belongs to.
+    pub(crate) fn installation<'a>(
+        &self,
+        flown: &FlightRow,
+        installations: &[&'a Installation],
+    ) -> Option<&'a Installation> {
+        let TailPosition { tail_number, position } = self.place(flown);
+        let is_here = |installation: &&&Installation| {
+            tail_number.as_deref() == Some(installation.tail_number.as_str())
+                && position.as_deref() == Some(installation.position.as_str())
+                && installation.covers(flown.departure_utc())
+        };
+        installations.iter().find(is_here).copied()
+    }
+
+    /// One with positions, and capacity for a number of flights and bytes of their names.
+    pub(crate) fn with_capacity(
+        places: Positions,
+        flights: usize,
+        names: usize,
+        settings: SettingsCounts,
+    ) -> Self {
+        Self {
+            places: places.0,
+            flights: Vec::with_capacity(flights),
+            extras: UnitExtras::default(),
+            names: String::with_capacity(names),
+            disputed_us: Vec::new(),
+            settings,
+        }
+    }
+
+    /// Appends a flight.
+    pub(crate) fn put(&mut self, flown: FlightRow, name: &str) {
+        self.flights.push(flown.named(name, &mut self.names));
+    }
+
+    /// Adds the secondary columns, and sorts the rows, so that the result does not depend on their order of arrival.
+    pub(crate) fn finish(mut self, extras: UnitExtras) -> Self {
+        self.extras = extras;
+        let (places, names) = (&self.places, &self.names);
+        let place = |flown: &FlightRow| &places[flown.place as usize];
+        let order = |a: &FlightRow, b: &FlightRow| {
+            let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(names).cmp(&b.name_in(names)));
+            a.departure_us().cmp(&b.departure_us()).then_with(rest)
+        };
+        if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
+            self.flights.sort_by(order);
+        }
+        let is_disputed = |flown: &&FlightRow| self.extras(flown).is_disputed();
+        self.disputed_us = self.flights.iter().filter(is_disputed).map(FlightRow::departure_us).collect();
+        self
+    }
+}
+
+/// All units' flights.
+#[derive(Debug, Clone, Default)]
+pub struct Histories {
+    units: BTreeMap<UnitKey, History>,
+    is_booked: bool,
+}
+
+impl Histories {
+    pub(crate) fn new(units: BTreeMap<UnitKey, History>, is_booked: bool) -> Self {
+        Self { units, is_booked }
+    }
+
+    /// Whether these are the store's own, whose flights belong to rows of the installations table.
+    ///
+    /// Those of a table made elsewhere may be of other aircraft under the same names.
+    pub(crate) fn is_booked(&self) -> bool {
+        self.is_booked
+    }
+
+    /// Every unit and its flights, by name, to be changed.
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (&UnitKey, &mut History)> {
+        self.units.iter_mut()
+    }
+
+    /// Every unit and its flights, by name.
+    pub fn iter(&self) -> impl Iterator<Item = (&UnitKey, &History)> {
+        self.units.iter()
+    }
+
+    /// Every unit.
+    pub fn names(&self) -> impl Iterator<Item = &UnitKey> {
+        self.units.keys()
+    }
+
+    /// The tails of all flights; a tail may come several times.
+    pub fn tails(&self) -> impl Iterator<Item = &str> {
+        self.units.values().flat_map(History::tails)
+    }
+
+    /// The positions of all flights; a position may come several times.
+    pub fn positions(&self) -> impl Iterator<Item = &str> {
+        let places = self.units.values().flat_map(|history| &history.places);
+        places.filter_map(|place| place.position.as_deref())
+    }
+
+    /// A unit's flights.
+    pub fn get(&self, name: &UnitKey) -> Option<&History> {
+        self.units.get(name)
+    }
+
+    /// The last departure of all, but no later than now: a record dated ahead must not make all others stale.
+    pub fn newest_utc(&self) -> Option<Timestamp> {
+        let last = self.units.values().filter_map(|history| history.flights.last());
+        Some(last.map(FlightRow::departure_utc).max()?.min(Timestamp::now()))
+    }
+
+    /// The first departure of all.
+    pub fn oldest_utc(&self) -> Option<Timestamp> {
+        let first = self.units.values().filter_map(|history| history.flights.first());
+        first.map(FlightRow::departure_utc).min()
+    }
+}

@@ -1,0 +1,204 @@
+//! One stored estimate with its settings, recomputed from its log.
+
+use ingest::ActuatorChannels;
+use job::flight_log::{FlightLog, catch_panic};
+use job::{Config, estimate};
+use records::{Diagnostic, GapEstimate, GapRecord, Installations, Status};
+use serde_json::{Value, json};
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::logs::discover;
+
+/// Which record to explain.
+#[derive(Debug, Clone)]
+pub struct RecordKey {
+    /// Flight of the record.
+    pub flight_id: String,
+    /// Position of the actuator.
+    pub position: String,
+    /// Tail number, if several aircraft have a flight of this name.
+    pub tail_number: Option<String>,
+}
+
+/// A record, and its recomputation.
+#[derive(Debug)]
+pub struct Explanation {
+    /// The stored record.
+    pub record: GapRecord,
+    /// The recomputation, or why there is none.
+    pub replayed: Result<Recomputation, Diagnostic>,
+    /// Whether the record is reproduced.
+    pub verdict: ReplayVerdict,
+    config_digest: String,
+}
+
+impl Explanation {
+    /// Whether the stored number is that of its log and settings, as far as both still exist.
+    pub fn is_sound(&self) -> bool {
+        matches!(self.verdict, ReplayVerdict::Same | ReplayVerdict::OtherSettings)
+    }
+
+    /// Whether the settings of the record are those of the configuration.
+    pub fn has_current_settings(&self) -> bool {
+        self.config_digest == self.record.provenance.config_digest
+    }
+
+    /// Record, remedy, settings and result of the recomputation, SI.
+    pub fn to_json(&self, config: &Config) -> Value {
+        let digest = self.config_digest.as_str();
+        let is_current = self.has_current_settings();
+        let part = config.document.part.get(self.record.part_number.as_str());
+        json!({
+            "record": self.record,
+            "remedy": remedy(&self.record.estimate),
+            "settings": { "part": part, "config_digest": digest, "is_current": is_current },
+            "replay": { "verdict": self.verdict.code(), "says": self.verdict.to_string() },
+        })
+    }
+}
+
+/// Remedy of a rejected estimate.
+pub fn remedy(estimate: &GapEstimate) -> Option<&'static str> {
+    let code = estimate.reason.as_deref().filter(|_| estimate.status == Status::Refused);
+    code.and_then(job::rejection::remedy)
+}
+
+/// Explains one record of a store.
+///
+/// # Errors
+/// When the store cannot be read, or holds no such record.
+pub fn explain(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    key: &RecordKey,
+) -> Result<Explanation, Error> {
+    let record = find(key, store)?;
+    let replayed = replay(&record, config, installations);
+    let flight = &record.flight;
+    let installed = installations.installed_at(&flight.tail_number, &record.position, flight.departure_utc);
+    let part = installed.map_or(&record.part_number, |installation| &installation.part_number);
+    let config_digest = config.digest(&flight.tail_number, part).to_string();
+    let verdict = ReplayVerdict::of(&record, &replayed, &config_digest);
+    Ok(Explanation { record, replayed, verdict, config_digest })
+}
+
+fn find(key: &RecordKey, store: &Store) -> Result<GapRecord, Error> {
+    let query = Query {
+        tail_number: key.tail_number.clone(),
+        flight_id: Some(key.flight_id.clone()),
+        position: Some(key.position.clone()),
+        ..Query::default()
+    };
+    let mut found = store.records(&query)?;
+    let (what, hint) = match found.len() {
+        1 => return Ok(found.remove(0)),
+        0 => (
+            format!(
+                "no record of {} in flight {}{}",
+                key.position,
+                key.flight_id,
+                key.tail_number.as_ref().map(|tail| format!(" of tail {tail}")).unwrap_or_default()
+            ),
+            format!("list its records with `freeplay query flight {}`", key.flight_id),
+        ),
+        _ => {
+            let tails: Vec<String> = found.iter().map(|r| r.flight.tail_number.to_string()).collect();
+            let what = format!("flight {} exists for several tails: {}", key.flight_id, tails.join(", "));
+            (what, "select one with `--tail`".to_owned())
+        }
+    };
+    Err(Error::refused(Diagnostic::new("no_such_record", what).hint(hint)))
+}
+
+/// Result of recomputing a record.
+#[derive(Debug)]
+pub struct Recomputation {
+    digest: String,
+    /// Channels of the actuator; `None` when the log lacks one.
+    pub channels: Option<ActuatorChannels>,
+    estimate: GapEstimate,
+}
+
+fn replay(
+    record: &GapRecord,
+    config: &Config,
+    installations: &Installations,
+) -> Result<Recomputation, Diagnostic> {
+    let log_path = &record.provenance.log_path;
+    let files = discover::stored_log(config, log_path);
+    catch_panic(log_path, || {
+        let opened = FlightLog::open(&files, log_path, config, installations)?;
+        let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
+            Diagnostic::new("no_position", format!("the log has no position {} any more", record.position))
+                .in_file(log_path)
+        })?;
+        let (_, part) = opened.unit(at, config, installations)?;
+        if !at.lacking.is_empty() {
+            let estimate = opened.estimate(at, part, config)?;
+            return Ok(Recomputation { digest: opened.digest.clone(), channels: None, estimate });
+        }
+        let channels = opened.channels(at, part)?;
+        let estimate = estimate::estimate(&channels, part, &config.document.estimate)?;
+        Ok(Recomputation { digest: opened.digest.clone(), channels: Some(channels), estimate })
+    })
+}
+
+/// Whether a record is reproduced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReplayVerdict {
+    /// The estimate is the same, bitwise.
+    Same,
+    /// The settings differ from those of the record.
+    OtherSettings,
+    /// The log has changed since.
+    OtherLog,
+    /// Same log and settings, but another number.
+    OtherNumber,
+    /// The log cannot be read.
+    NotReplayed,
+}
+
+impl ReplayVerdict {
+    fn of(record: &GapRecord, replayed: &Result<Recomputation, Diagnostic>, digest: &str) -> Self {
+        let Ok(replayed) = replayed else { return Self::NotReplayed };
+        if replayed.digest != record.provenance.log_digest {
+            Self::OtherLog
+        } else if digest != record.provenance.config_digest {
+            Self::OtherSettings
+        } else if in_bits(&replayed.estimate) == in_bits(&record.estimate) {
+            Self::Same
+        } else {
+            Self::OtherNumber
+        }
+    }
+
+    /// Stable word for scripts.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::Same => "same",
+            Self::OtherSettings => "other_settings",
+            Self::OtherLog => "other_log",
+            Self::OtherNumber => "other_number",
+            Self::NotReplayed => "not_replayed",
+        }
+    }
+}
+
+impl std::fmt::Display for ReplayVerdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Same => "recomputed: bit-identical",
+            Self::OtherSettings => "settings changed since; `freeplay run` will recompute it",
+            Self::OtherLog => "the log changed since; `freeplay run` will recompute it",
+            Self::OtherNumber => "recomputed value differs: please report this with the log",
+            Self::NotReplayed => "the log can no longer be read",
+        })
+    }
+}
+
+/// JSON form of an estimate, for bitwise comparison: numbers are written so that they read back unchanged.
+fn in_bits(estimate: &GapEstimate) -> Value {
+    serde_json::to_value(estimate).unwrap_or_default()
+}

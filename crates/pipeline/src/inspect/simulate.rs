@@ -1,0 +1,421 @@
+//! Simulated fleets on disk: logs, installations, the truth, and a configuration that reads them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use ingest::parquet::writer::{Column, write_parquet};
+use jiff::Timestamp;
+use rayon::prelude::*;
+use records::Diagnostic;
+use simulator::{
+    ActuatorLog, ChannelUnit, LogState, MotorLogFormat, Plan, PlannedFlight, ScrewLogUnit, Spec,
+};
+
+use crate::error::Error;
+use crate::run::event::Event;
+
+/// Reads a spec, or takes the sample fleet's.
+///
+/// # Errors
+/// [`Error::Refused`] when it cannot be read or cannot be flown.
+pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
+    let shown = file.map_or_else(|| "the built-in spec".to_owned(), |f| f.display().to_string());
+    let text = match file {
+        None => simulator::SAMPLE_SPEC.to_owned(),
+        Some(file) => std::fs::read_to_string(file).map_err(|e| {
+            let what = format!("the spec cannot be read: {e}");
+            Error::refused(Diagnostic::new("spec_unreadable", what).in_file(&shown))
+        })?,
+    };
+    let mut spec: Spec = toml::from_str(&text).map_err(|e| {
+        Error::refused(
+            Diagnostic::new("bad_spec", e.message())
+                .in_file(&shown)
+                .hint("docs/simulator.md lists every key"),
+        )
+    })?;
+    spec.seed = seed.unwrap_or(spec.seed);
+    Ok(spec)
+}
+
+/// Simulates a fleet and writes its data and a `pipeline.toml` that reads them. Returns the number of logs.
+///
+/// The same spec and seed give the same files, whatever the number of workers.
+///
+/// # Errors
+/// [`Error::Refused`] when the spec cannot be flown or a file cannot be written.
+pub fn simulate(
+    spec: &Spec,
+    folder: &Path,
+    jobs: Option<usize>,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<usize, Error> {
+    let logs = write_data(spec, folder, jobs, watch)?;
+    text(&folder.join("pipeline.toml"), &configuration(spec, &Tables::of(spec)))?;
+    Ok(logs)
+}
+
+/// Configuration of the sample fleet, whose data lie in the folder [`SAMPLE_FOLDER`] next to it.
+const SAMPLE_CONFIGURATION: &str = include_str!("../../templates/sample.toml");
+
+/// Folder of the sample fleet's data.
+pub const SAMPLE_FOLDER: &str = "sample-data";
+
+/// Writes the sample fleet: `pipeline.toml` and the folder [`SAMPLE_FOLDER`]. Returns the number of logs.
+///
+/// # Errors
+/// [`Error::Refused`] when a file cannot be written.
+pub fn write_sample(folder: &Path, watch: &(dyn Fn(Event) + Sync)) -> Result<usize, Error> {
+    let logs = write_data(&spec(None, None)?, &folder.join(SAMPLE_FOLDER), None, watch)?;
+    text(&folder.join("pipeline.toml"), SAMPLE_CONFIGURATION)?;
+    Ok(logs)
+}
+
+/// Flies every flight that has a log and writes logs, tables and `truth.parquet`.
+fn write_data(
+    spec: &Spec,
+    folder: &Path,
+    jobs: Option<usize>,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<usize, Error> {
+    let plan = Plan::new(spec).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
+    let logged: Vec<usize> =
+        (0..plan.flights.len()).filter(|&index| plan.flights[index].log != LogState::Absent).collect();
+    watch(Event::Planned { logs: logged.len(), bytes: 0 });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
+    pool.install(|| {
+        logged.par_iter().try_for_each(|&index| {
+            let name = write_flight(&plan, index, folder)?;
+            watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, diagnostics: Vec::new() });
+            Ok::<(), Error>(())
+        })
+    })?;
+    let tables = Tables::of(spec);
+    text(&folder.join("installations.csv"), &installations(&plan))?;
+    if tables.flights {
+        text(&folder.join("flights.csv"), &flights(&plan))?;
+    }
+    if tables.maintenance {
+        text(&folder.join("maintenance.csv"), &maintenance(&plan))?;
+    }
+    if tables.inspections {
+        text(&folder.join("inspections.csv"), &inspections(&plan))?;
+    }
+    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])
+        .map_err(|e| Error::refused(e.diagnostic()))?;
+    Ok(logged.len())
+}
+
+/// The tables of a fleet that are not always there.
+struct Tables {
+    flights: bool,
+    maintenance: bool,
+    inspections: bool,
+}
+
+impl Tables {
+    fn of(spec: &Spec) -> Self {
+        Self {
+            flights: spec.flights_per_log > 1,
+            maintenance: spec.reshims.iter().any(|shim| shim.is_recorded),
+            inspections: !spec.play_checks.is_empty(),
+        }
+    }
+}
+
+/// Flies one flight and writes its log: a column for each channel of each actuator.
+fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
+    let planned = &plan.flights[index];
+    let flight = plan.simulate_flight(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
+    let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
+    for actuator in flight.actuators {
+        columns.extend(channels(actuator));
+    }
+    let name = log_name(planned);
+    let logs = folder.join(if planned.log == LogState::Truncated { "arrives-later" } else { "logs" });
+    let file = logs.join(&name);
+    write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.diagnostic()))?;
+    match planned.log {
+        LogState::Duplicate => copy(&file)?,
+        LogState::Truncated => truncate(&file)?,
+        LogState::Sound | LogState::Absent => {}
+    }
+    Ok(name)
+}
+
+/// A second file with the same content.
+fn copy(file: &Path) -> Result<(), Error> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let second = file.with_file_name(format!("{name}_copy.parquet"));
+    std::fs::copy(file, &second).map(|_| ()).map_err(|e| not_written(&second, &e))
+}
+
+/// Keeps the first quarter of a file, as after a transfer that stopped.
+fn truncate(file: &Path) -> Result<(), Error> {
+    let cut = || {
+        let open = std::fs::OpenOptions::new().write(true).open(file)?;
+        open.set_len(open.metadata()?.len() / 4)
+    };
+    cut().map_err(|e| not_written(file, &e))
+}
+
+/// `N412FP/20260907T061500Z_FP0001.parquet`.
+fn log_name(flight: &PlannedFlight) -> String {
+    let departure = instant(flight.departure_us).strftime("%Y%m%dT%H%M%SZ");
+    format!("{}/{departure}_{}.parquet", flight.tail_number, flight.flight_id)
+}
+
+fn facts(flight: &PlannedFlight) -> Vec<(String, String)> {
+    vec![
+        ("tail_number".to_owned(), flight.tail_number.clone()),
+        ("flight_id".to_owned(), flight.flight_id.clone()),
+        ("departure_utc".to_owned(), instant(flight.departure_us).to_string()),
+        ("flight_hours".to_owned(), flight.flight_hours.to_string()),
+        ("tail_hours_end".to_owned(), flight.tail_hours_end.to_string()),
+    ]
+}
+
+/// The channels in the units of a recorder: degrees, millimetres, newtons or newton metres.
+fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
+    let named = |channel: &str, unit: ChannelUnit, values: Vec<f64>| {
+        let (suffix, factor) = recorded(unit);
+        (
+            format!("{}_{channel}_{suffix}", actuator.position),
+            Column::Single(values.into_iter().map(|v| v * factor).collect()),
+        )
+    };
+    [
+        named("motor", actuator.motor_unit, actuator.motor),
+        named("screw", actuator.screw_unit, actuator.screw),
+        named("load", actuator.load_unit, actuator.load),
+    ]
+}
+
+fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
+    match unit {
+        ChannelUnit::Metre => ("mm", 1e3),
+        ChannelUnit::Micrometre => ("um", 1.0),
+        ChannelUnit::Radian => ("deg", 180.0 / std::f64::consts::PI),
+        ChannelUnit::Newton => ("n", 1.0),
+        ChannelUnit::NewtonMetre => ("nm", 1.0),
+    }
+}
+
+fn installations(plan: &Plan) -> String {
+    let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n".to_owned();
+    for installation in &plan.installations {
+        let removed = installation.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{removed},{:.1},{:.1}",
+            installation.tail_number,
+            installation.position,
+            installation.part_number,
+            installation.serial_number,
+            instant(installation.installed_us),
+            installation.unit_hours_at_install,
+            installation.tail_hours_at_install
+        );
+    }
+    text
+}
+
+/// Every flight, with and without a log.
+fn flights(plan: &Plan) -> String {
+    let mut text = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned();
+    for flight in &plan.flights {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:.2},{:.2}",
+            flight.tail_number,
+            flight.flight_id,
+            instant(flight.departure_us),
+            flight.flight_hours,
+            flight.tail_hours_end
+        );
+    }
+    text
+}
+
+fn maintenance(plan: &Plan) -> String {
+    let mut text = "part_number,serial_number,utc,kind\n".to_owned();
+    for row in &plan.maintenance {
+        let _ = writeln!(text, "{},{},{},reshim", row.part_number, row.serial_number, instant(row.at_us));
+    }
+    text
+}
+
+fn inspections(plan: &Plan) -> String {
+    let mut text = "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned();
+    for row in &plan.inspections {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:e},{},{}",
+            row.part_number,
+            row.serial_number,
+            instant(row.at_us),
+            row.play_m,
+            row.instrument,
+            row.force_n
+        );
+    }
+    text
+}
+
+/// The contract's columns of a truth table: actuators of the flights whose logs are whole.
+fn truth(plan: &Plan) -> Vec<(String, Column)> {
+    let all = || {
+        let whole = |flight: &&PlannedFlight| matches!(flight.log, LogState::Sound | LogState::Duplicate);
+        let flights = plan.flights.iter().filter(whole);
+        flights.flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)))
+    };
+    let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| {
+        Column::Text(all().map(|(f, a)| of(f, a)).collect())
+    };
+    let real =
+        |of: &dyn Fn(&simulator::ActuatorTruth) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
+    [
+        ("tail_number", text(&|f, _| f.tail_number.clone())),
+        ("flight_id", text(&|f, _| f.flight_id.clone())),
+        ("position", text(&|_, a| a.position.clone())),
+        ("part_number", text(&|_, a| a.part_number.clone())),
+        ("serial_number", text(&|_, a| a.serial_number.clone())),
+        ("departure_utc", Column::Instant(all().map(|(f, _)| instant(f.departure_us)).collect())),
+        ("gap_m", real(&|a| a.gap_m)),
+        ("stiffness_n_per_m", real(&|a| a.stiffness_n_per_m)),
+        ("skew_s", real(&|a| a.skew_s)),
+        ("expected", text(&|_, a| a.expected.as_str().to_owned())),
+    ]
+    .map(|(name, column)| (name.to_owned(), column))
+    .into()
+}
+
+/// A configuration that reads these logs: nominal parts, the sensors' own facts.
+fn configuration(spec: &Spec, tables: &Tables) -> String {
+    let named = |is_there: bool, name: &str| {
+        if is_there { format!("\n{name} = \"{name}.csv\"") } else { String::new() }
+    };
+    let tables = [
+        named(tables.flights, "flights"),
+        named(tables.maintenance, "maintenance"),
+        named(tables.inspections, "inspections"),
+    ];
+    let installations = "installations = \"installations.csv\"";
+    let mut text = HEAD.replace(installations, &format!("{installations}{}", tables.concat()));
+    let Some(first) = spec.parts.first() else { return text };
+    text += &channel_tables(first, "channel");
+    for part in &spec.parts[1..] {
+        // Parts that are logged in other units are read by other columns.
+        let (own, usual) =
+            (channel_tables(part, "override.channel"), channel_tables(first, "override.channel"));
+        if own != usual {
+            let _ = write!(text, "\n[[override]]\nparts = [\"{}\"]\n{own}", part.part_number);
+        }
+    }
+    for part in &spec.parts {
+        part_table(&mut text, part, spec);
+    }
+    text
+}
+
+const HEAD: &str = r#"# Written with the simulated logs beside it: `freeplay run --config` on this file reads them.
+
+[logs]
+files = ["logs/**/*.parquet"]
+installations = "installations.csv"
+
+[store]
+path = "results"
+
+[identity]
+metadata = { tail_number = "tail_number", flight_id = "flight_id", departure_utc = "departure_utc", flight_hours = "flight_hours", tail_hours_end = "tail_hours_end" }
+
+[clock]
+column = "time_s"
+unit = "s"
+"#;
+
+/// How the logs of a part name and measure its channels.
+fn channel_tables(part: &simulator::Part, above: &str) -> String {
+    let rotary = part.reference_radius_m.is_some();
+    let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
+    let motor = unit(rotary || part.motor_log != MotorLogFormat::Position);
+    let screw =
+        if !rotary && part.screw_log == ScrewLogUnit::Micrometre { ("um", "um") } else { unit(rotary) };
+    let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
+    let mut text = String::new();
+    for (channel, column, (suffix, unit)) in
+        [("motor_position", "motor", motor), ("screw_position", "screw", screw), ("load", "load", load)]
+    {
+        let _ = writeln!(
+            text,
+            "\n[{above}.{channel}]\ncolumn = \"{{position}}_{column}_{suffix}\"\nunit = \"{unit}\""
+        );
+        if column == "motor" && part.motor_log == MotorLogFormat::WrappedAngle {
+            let _ = writeln!(text, "wraps_at = 360.0");
+        }
+        if let (Some(radius_m), "motor") = (part.reference_radius_m, column) {
+            // A motor turns so often for one turn of the part.
+            let _ = writeln!(text, "gear_ratio = {}", std::f64::consts::TAU * radius_m / part.lead_m);
+        }
+    }
+    text
+}
+
+fn part_table(text: &mut String, part: &simulator::Part, spec: &Spec) {
+    let (plant, name) = (&part.plant, &part.part_number);
+    let (screw, motor) = (&spec.sensors.screw, &spec.sensors.motor);
+    // Friction that the filter does not know is of the order of a fortieth of the load.
+    let unknown_n = spec.profile.load_n / 40.0;
+    let _ = write!(text, "\n[part.\"{name}\"]\n");
+    if let Some(r) = part.reference_radius_m {
+        let square = r * r;
+        let _ = writeln!(
+            text,
+            "kind = \"rotary\"\nreference_radius_m = {r}\nstiffness_nm_per_rad = {}\ndamping_nm_s_per_rad = {}\ninertia_kg_m2 = {}\nlimit_m = {}",
+            plant.contact.stiffness_n_per_m * square,
+            plant.contact.damping_n_s_per_m * square,
+            plant.screw_mass_kg * square,
+            part.limit_m
+        );
+        let _ = writeln!(
+            text,
+            "\n[part.\"{name}\".noise]\nscrew_rms_rad = {:e}\nscrew_resolution_rad = {:e}\nmotor_rms_rad = {:e}\nmotor_resolution_rad = {:e}\nunknown_torque_nm = {}\nbandwidth_hz = 10.0",
+            screw.noise_rms / r,
+            screw.resolution / r,
+            motor.noise_rms / r,
+            motor.resolution / r,
+            unknown_n * r
+        );
+        return;
+    }
+    let _ = writeln!(
+        text,
+        "stiffness_n_per_m = {:e}\ndamping_n_s_per_m = {}\nscrew_mass_kg = {}\nlead_m_per_rev = {}\nlimit_m = {:e}\nwatch_m = {:e}",
+        plant.contact.stiffness_n_per_m,
+        plant.contact.damping_n_s_per_m,
+        plant.screw_mass_kg,
+        part.lead_m,
+        part.limit_m,
+        part.limit_m * 0.75
+    );
+    let _ = writeln!(
+        text,
+        "\n[part.\"{name}\".noise]\nscrew_rms_m = {:e}\nscrew_resolution_m = {:e}\nmotor_rms_m = {:e}\nmotor_resolution_m = {:e}\nunknown_force_n = {unknown_n}\nbandwidth_hz = 10.0",
+        screw.noise_rms, screw.resolution, motor.noise_rms, motor.resolution
+    );
+}
+
+/// A planned instant always lies within the calendar.
+fn instant(us: i64) -> Timestamp {
+    Timestamp::from_microsecond(us).unwrap_or(Timestamp::UNIX_EPOCH)
+}
+
+fn text(file: &Path, text: &str) -> Result<(), Error> {
+    std::fs::write(file, text).map_err(|e| not_written(file, &e))
+}
+
+fn not_written(file: &Path, error: &std::io::Error) -> Error {
+    let what = format!("the file cannot be written: {error}");
+    Error::refused(Diagnostic::new("output_failed", what).in_file(file.display()))
+}

@@ -1,0 +1,356 @@
+//! Log discovery: usually one file per log; with groups or pieces, the files of one flight.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+use ingest::LogFiles;
+use jiff::Timestamp;
+use job::Config;
+use job::flight_log::{MAX_BETWEEN_PIECES, identify, identify_companion};
+use rayon::prelude::*;
+use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
+
+use crate::error::{Error, is_passing};
+use crate::logs::discover_remote::{self};
+use crate::logs::file_stat::SeenObjects;
+use crate::logs::local_files;
+use crate::logs::table_folders::{TableFolders, TableMembership};
+use crate::logs::temporary_files::{is_temporary, parts_written_out};
+
+/// The logs that fit the patterns.
+#[derive(Debug, Clone, Default)]
+pub struct DiscoveredLogs {
+    /// Their files, by the name of the first.
+    pub logs: BTreeMap<String, LogFiles>,
+    /// Files of groups that cannot be read, and why.
+    pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+    /// File status of objects from listings, by address.
+    pub(crate) seen: SeenObjects,
+}
+
+/// Every log that fits the patterns, by the shown name of its first file.
+///
+/// # Errors
+/// [`Error::Refused`] when a pattern fits no file, or is no pattern.
+pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
+    let mut seen = SeenObjects::new();
+    let mut unlisted = BTreeMap::new();
+    let main = matching(config, &config.document.logs.files, &mut seen, &mut unlisted)?;
+    let mut companions = Vec::new();
+    for (name, group) in &config.document.group {
+        let files = matching(config, &group.files, &mut seen, &mut unlisted)?;
+        companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
+    }
+    let mut found = if companions.is_empty() && !config.document.logs.has_pieces() {
+        let logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
+        DiscoveredLogs { logs, ..DiscoveredLogs::default() }
+    } else {
+        group_files(config, main, companions)
+    };
+    found.faulty.append(&mut unlisted);
+    Ok(DiscoveredLogs { seen, ..found })
+}
+
+/// The whole log that a file given by hand belongs to.
+///
+/// # Errors
+/// As [`discover`], where groups or pieces must be searched.
+pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
+    if config.document.group.is_empty() && !config.document.logs.has_pieces() {
+        return Ok(LogFiles::one(path));
+    }
+    let same = |other: &PathBuf| {
+        let whole = |path: &Path| std::fs::canonicalize(path).ok();
+        other == path || whole(other).is_some_and(|other| Some(other) == whole(path))
+    };
+    let found = discover(config)?.logs.into_values().find(|files| files.all().any(same));
+    Ok(found.unwrap_or_else(|| LogFiles::one(path)))
+}
+
+/// The whole log of a stored record; its first file alone where the search for the others fails.
+pub(crate) fn stored_log(config: &Config, log_path: &str) -> LogFiles {
+    let path = config.path(log_path);
+    log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path))
+}
+
+type FlightIdentity = (Flight, Option<Position>);
+
+/// A file of the main logs, with the flight it belongs to or why that is unknown.
+type IdentifiedFile = (Result<FlightIdentity, Diagnostic>, String, PathBuf);
+
+/// Gives pieces that name one flight the identity of its first piece, and puts them in order of departure.
+fn join_pieces(known: &mut [IdentifiedFile]) {
+    let departure = |file: &IdentifiedFile| file.0.as_ref().ok().map(|(flight, _)| flight.departure_utc);
+    known.sort_by(|a, b| departure(a).cmp(&departure(b)).then_with(|| a.1.cmp(&b.1)));
+    // The first piece of each flight, and when the latest one departed.
+    let mut flights: HashMap<(TailNumber, FlightId, Option<Position>), (FlightIdentity, Timestamp)> =
+        HashMap::new();
+    for who in known.iter_mut().filter_map(|(who, ..)| who.as_mut().ok()) {
+        let (flight, position) = &*who;
+        let departed = flight.departure_utc;
+        let key = (flight.tail_number.clone(), flight.flight_id.clone(), position.clone());
+        match flights.get_mut(&key) {
+            Some((first, latest)) if departed.duration_since(*latest) <= MAX_BETWEEN_PIECES => {
+                *latest = departed;
+                *who = first.clone();
+            }
+            _ => drop(flights.insert(key, (who.clone(), departed))),
+        }
+    }
+}
+
+/// Who the logs are, tail by tail, each with the name that its files go by.
+type IdentityIndex = HashMap<TailNumber, Vec<(FlightIdentity, String)>>;
+
+fn group_files(
+    config: &Config,
+    main: Vec<(String, PathBuf)>,
+    companions: Vec<(&str, (String, PathBuf))>,
+) -> DiscoveredLogs {
+    let mut known: Vec<IdentifiedFile> = main
+        .into_par_iter()
+        .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
+        .collect();
+    if config.document.logs.has_pieces() {
+        join_pieces(&mut known);
+    }
+    let mut found = DiscoveredLogs::default();
+    let mut whose = IdentityIndex::new();
+    for (who, log_path, path) in known {
+        let who = match who {
+            Ok(who) => who,
+            // Without its companions it would be an error of another kind, which no run would try again.
+            Err(diagnostic) if is_passing(&diagnostic.code) => {
+                found.faulty.insert(log_path, (path, diagnostic));
+                continue;
+            }
+            Err(_) => {
+                found.logs.insert(log_path, LogFiles::one(path));
+                continue;
+            }
+        };
+        let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
+        let is_piece =
+            |(other, _): &&(FlightIdentity, String)| config.document.logs.has_pieces() && *other == who;
+        match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
+            Some(files) => files.main.push(path),
+            None => {
+                on_tail.push((who, log_path.clone()));
+                found.logs.insert(log_path, LogFiles::one(path));
+            }
+        }
+    }
+    let identified: Vec<_> = companions
+        .into_par_iter()
+        .map(|(group, (log_path, path))| {
+            (identify_companion(&path, group, &log_path, config), group, log_path, path)
+        })
+        .collect();
+    for (who, group, log_path, path) in identified {
+        match who {
+            Err(diagnostic) => drop(found.faulty.insert(log_path, (path, diagnostic))),
+            Ok(who) => attach_companions(&mut found, &whose, &who, group, log_path, &path),
+        }
+    }
+    found
+}
+
+/// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
+fn attach_companions(
+    found: &mut DiscoveredLogs,
+    whose: &IdentityIndex,
+    who: &FlightIdentity,
+    group: &str,
+    log_path: String,
+    path: &Path,
+) {
+    let mut is_stray = true;
+    let on_tail = whose.get(&who.0.tail_number).map_or(&[][..], Vec::as_slice);
+    for (_, first) in on_tail.iter().filter(|(main, _)| is_same_flight(who, main)) {
+        if let Some(files) = found.logs.get_mut(first) {
+            files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
+            is_stray = false;
+        }
+    }
+    if is_stray {
+        found.strays.push(log_path);
+    }
+}
+
+fn is_same_flight((flight, position): &FlightIdentity, (main, main_position): &FlightIdentity) -> bool {
+    let same_flight = flight.flight_id == main.flight_id || flight.departure_utc == main.departure_utc;
+    let same_place = match (position, main_position) {
+        (Some(position), Some(main)) => position == main,
+        _ => true,
+    };
+    same_flight && same_place
+}
+
+/// Files that fit some patterns, each by its shown name, in order of it.
+fn matching(
+    config: &Config,
+    patterns: &[String],
+    seen: &mut SeenObjects,
+    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+) -> Result<Vec<(String, PathBuf)>, Error> {
+    let mut found = BTreeMap::new();
+    let (mut silent, mut tables) = (BTreeSet::new(), TableFolders::default());
+    // `**` reaches our own results and tables, which are no logs.
+    let logs = &config.document.logs;
+    let user_tables: Vec<PathBuf> = std::iter::once(&logs.installations)
+        .chain(&logs.flights)
+        .chain(&logs.aliases)
+        .map(|table| config.path(table))
+        .collect();
+    let store = config.store();
+    let ours = |path: &PathBuf| path.starts_with(&store) || user_tables.contains(path);
+    let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
+        let what = format!("`{pattern}` is not a valid file pattern: {e}");
+        Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
+    };
+    for pattern in patterns {
+        if object_io::is_address(pattern) {
+            let (mut tables, mut objects) = (TableFolders::default(), Vec::new());
+            let listed = discover_remote::each(pattern, &mut tables, |entry| {
+                if !ours(&entry.path) && !is_temporary(&entry.path, Path::new(pattern)) {
+                    objects.push(entry);
+                }
+            })?;
+            listed.map_err(|e| invalid(pattern, &e))?;
+            let faults = unlisted.len();
+            objects.retain(|entry| is_log(config, &entry.path, tables.object(&entry.path), unlisted));
+            if objects.is_empty() && unlisted.len() == faults {
+                silent.insert(pattern.as_str());
+            }
+            for entry in objects {
+                found.insert(log_path(config, &entry.path), entry.path.clone());
+                seen.insert(entry.path.clone(), entry.into());
+            }
+            continue;
+        }
+        let local = local_files::matching(&config.folder, pattern).map_err(|e| invalid(pattern, &e.msg))?;
+        let written = config.folder.join(pattern);
+        let mut files = Vec::new();
+        let faults = unlisted.len();
+        let faulty = local.faults.into_iter().map(Err);
+        for found in local.paths.into_iter().map(Ok).chain(faulty) {
+            let checked = found.and_then(|path| match is_file(&path) {
+                Ok(is_file) => Ok((path, is_file)),
+                Err(e) => Err((path, e)),
+            });
+            match checked {
+                Ok((path, is_file)) => {
+                    let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
+                    files.extend(is_kept.then_some(path));
+                }
+                Err((path, e)) => {
+                    let log_path = log_path(config, &path);
+                    unlisted.insert(log_path.clone(), (path.clone(), unreadable(&path, &log_path, &e)));
+                }
+            }
+        }
+        let written_out = folder_written_out(&written);
+        files.retain(|path| is_log(config, path, tables.local(path, &written_out), unlisted));
+        if files.is_empty() && unlisted.len() == faults {
+            silent.insert(pattern.as_str());
+        }
+        found.extend(files.into_iter().map(|path| (log_path(config, &path), path)));
+    }
+    // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
+    if silent.is_empty() {
+        Ok(found.into_iter().collect())
+    } else {
+        Err(Error::refused(no_log(config, &silent)))
+    }
+}
+
+/// The folder of a pattern before its first wildcard.
+fn folder_written_out(pattern: &Path) -> PathBuf {
+    let folder = pattern.parent().unwrap_or(pattern);
+    folder.components().take(parts_written_out(folder)).collect()
+}
+
+/// Whether a file is a log, by the table in whose folder it lies; a table that cannot be used is a fault.
+fn is_log(
+    config: &Config,
+    path: &Path,
+    membership: TableMembership,
+    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+) -> bool {
+    if let TableMembership::Fault(at, diagnostic) = membership {
+        debug_assert!(path.starts_with(&at), "the fault of another table");
+        let shown = log_path(config, &at);
+        unlisted.insert(shown.clone(), (at, diagnostic.in_file(&shown)));
+        return false;
+    }
+    matches!(membership, TableMembership::Log)
+}
+
+/// Whether a path is a file; links that lead nowhere, pipes and devices are errors, files that were deleted meanwhile
+/// are none.
+fn is_file(path: &Path) -> std::io::Result<bool> {
+    match std::fs::metadata(path) {
+        Ok(data) if data.is_file() || data.is_dir() => Ok(data.is_file()),
+        Ok(_) => Err(std::io::Error::other("it is a pipe, a socket or a device, not a file")),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound && path.symlink_metadata().is_err() => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// A folder that cannot be listed may hold any number of logs: it is an error and not an empty folder.
+fn unreadable(path: &Path, log_path: &str, error: &std::io::Error) -> Diagnostic {
+    let (code, kind) =
+        if path.is_dir() { ("folder_unreadable", "folder") } else { ("file_unreadable", "file") };
+    Diagnostic::new(code, format!("the {kind} {log_path} cannot be listed: {error}"))
+        .in_file(log_path)
+        .hint("check its owner and mode, or the link; then `freeplay run --retry`")
+}
+
+fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
+    let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
+    let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
+    // Other files are passed over, so that a broad pattern may match notes and tables too.
+    let others = silent.iter().filter_map(|p| local_files::matching(&config.folder, p).ok());
+    let what = match others.flat_map(|found| found.paths).find(|path| path.is_file()) {
+        Some(other) => format!("{patterns} matches no Parquet file, but `{}`", log_path(config, &other)),
+        None => format!("no log matches {patterns}"),
+    };
+    let diagnostic = Diagnostic::new("no_log_matched", what).hint(format!(
+        "patterns are relative to {}; check that the logs are present and end in `.parquet`",
+        folder.display()
+    ));
+    config.at(silent.first().copied().unwrap_or_default(), diagnostic)
+}
+
+fn log_path(config: &Config, path: &Path) -> String {
+    path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// A link to itself cannot be listed, even by root.
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_listed_is_an_error_and_not_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("logs")).unwrap();
+        std::fs::write(folder.path().join("logs/a.parquet"), "").unwrap();
+        std::os::unix::fs::symlink("b.parquet", folder.path().join("logs/b.parquet")).unwrap();
+        let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
+            .replace("logs/**/*.parquet", "logs/*.parquet");
+        let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
+        let (mut seen, mut unlisted) = (SeenObjects::new(), BTreeMap::new());
+        let found = matching(&config, &["logs/*.parquet".to_owned()], &mut seen, &mut unlisted).unwrap();
+        assert_eq!(
+            found.iter().map(|(log_path, _)| log_path.as_str()).collect::<Vec<_>>(),
+            ["logs/a.parquet"]
+        );
+        let (path, error) = &unlisted["logs/b.parquet"];
+        assert_eq!((error.code.as_str(), path.ends_with("b.parquet")), ("file_unreadable", true));
+    }
+}

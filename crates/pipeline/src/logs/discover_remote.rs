@@ -1,0 +1,75 @@
+//! Log discovery in object stores: keys that match a pattern, with the metadata of the listing.
+
+use std::path::Path;
+
+use object_io::{Address, ListEntry};
+
+use crate::error::Error;
+use crate::logs::table_folders::TableFolders;
+
+/// Keys are matched as files are: `*` stays within a folder, `**` does not.
+const AS_FILES: glob::MatchOptions = glob::MatchOptions {
+    case_sensitive: true,
+    require_literal_separator: true,
+    require_literal_leading_dot: false,
+};
+
+/// Objects of a folder by which a table is recognised; their names sort before those of data files.
+const MOST_NOTED: usize = 1000;
+
+/// Hands over every object that fits a pattern, and notes the tables that are met. Only the folder before its first
+/// wildcard is listed, and what does not fit is not kept.
+///
+/// # Errors
+/// [`Error::Objects`] when the store is not reachable; the text of an error in the pattern.
+pub(crate) fn each(
+    pattern: &str,
+    tables: &mut TableFolders,
+    mut take: impl FnMut(ListEntry),
+) -> Result<Result<(), String>, Error> {
+    let address = Address::parse_required(pattern)?;
+    let wanted = match glob::Pattern::new(address.key()) {
+        Ok(wanted) => wanted,
+        Err(e) => return Ok(Err(e.to_string())),
+    };
+    let Some(first) = address.key().find(['*', '?', '[']) else {
+        note_tables_above(&address, address.key(), tables)?;
+        return match object_io::head(Path::new(pattern)) {
+            Ok(entry) => {
+                take(entry);
+                Ok(Ok(()))
+            }
+            Err(object_io::Error::Missing { .. }) => Ok(Ok(())),
+            Err(error) => Err(error.into()),
+        };
+    };
+    let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
+    let root = address.bucket_url();
+    note_tables_above(&address, folder, tables)?;
+    object_io::list(&address.with_key(folder), |entry| {
+        tables.note(&entry.path);
+        let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
+        if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
+            take(entry);
+        }
+    })?;
+    Ok(Ok(()))
+}
+
+/// Notes the tables whose folders lie above a key: a pattern may name a partition of a table. Folders that these
+/// credentials may not list are none.
+fn note_tables_above(address: &Address, key: &str, tables: &mut TableFolders) -> Result<(), Error> {
+    let mut above = key;
+    while !above.is_empty() {
+        above = above.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let separator = if above.is_empty() { "" } else { "/" };
+        for name in TableFolders::LOGS {
+            let log = address.with_key(&format!("{above}{separator}{name}"));
+            match object_io::list_first(&log, MOST_NOTED, |entry| tables.note(&entry.path)) {
+                Ok(()) | Err(object_io::Error::Denied { .. } | object_io::Error::Missing { .. }) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+    Ok(())
+}

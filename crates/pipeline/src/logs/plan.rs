@@ -1,0 +1,399 @@
+//! Plan of a run: the logs found, those already processed, and the reason to process each of the others.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::PathBuf;
+
+use ingest::LogFiles;
+use jiff::Timestamp;
+use job::Config;
+use rayon::prelude::*;
+use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
+use store::{LogOutcome, LogRecord, RecordKey};
+
+use crate::error::{is_passing, is_unlisted};
+use crate::logs::discover::DiscoveredLogs;
+use crate::logs::file_stat::FileStat;
+use crate::logs::file_stat::SeenObjects;
+
+/// Options of a run.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// Departures at or after this time.
+    pub since_utc: Option<Timestamp>,
+    /// Departures before this time.
+    pub until_utc: Option<Timestamp>,
+    /// One aircraft only.
+    pub tail_number: Option<TailNumber>,
+    /// This unit only.
+    pub serial_number: Option<SerialNumber>,
+    /// Process at most this number of logs.
+    pub limit: Option<usize>,
+    /// Number of workers; one per core when not given.
+    pub jobs: Option<usize>,
+    /// Process failed logs again.
+    pub retry: bool,
+    /// Process every log again.
+    pub redo: bool,
+    /// Compare the content of known logs, even if their files have not changed.
+    pub verify_content: bool,
+}
+
+impl Request {
+    /// Whether the options select less than all flights.
+    fn is_narrow(&self) -> bool {
+        self.since_utc.is_some()
+            || self.until_utc.is_some()
+            || self.tail_number.is_some()
+            || self.serial_number.is_some()
+    }
+
+    /// Whether a flight is selected.
+    pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
+        let at = flight.departure_utc;
+        let flew = |serial: &SerialNumber| {
+            installations
+                .units_on_tail(&flight.tail_number, at)
+                .any(|installation| installation.serial_number == *serial)
+        };
+        self.since_utc.is_none_or(|since| since <= at)
+            && self.until_utc.is_none_or(|until| at < until)
+            && self.tail_number.as_ref().is_none_or(|tail| *tail == flight.tail_number)
+            && self.serial_number.as_ref().is_none_or(flew)
+    }
+}
+
+/// Reason to process a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum WorkReason {
+    /// The log is new.
+    New,
+    /// The file has changed.
+    ContentChanged,
+    /// A setting that affects it, or an installation, has changed.
+    SettingChanged,
+    /// The log it had yielded its flight to no longer owns it.
+    OwnerGone,
+    /// It failed before, and `--retry` is set.
+    Retry,
+    /// It failed in an earlier run for a cause that may pass: a read, a time limit, a wrong clock.
+    Unfetched,
+    /// It cannot be listed.
+    Unlisted,
+    /// `--redo` is set.
+    Asked,
+    /// `--verify-content` is set.
+    Verify,
+}
+
+impl WorkReason {
+    /// Reason as text.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::New => "new",
+            Self::ContentChanged => "content changed",
+            Self::SettingChanged => "setting changed",
+            Self::OwnerGone => "its flight has no other log now",
+            Self::Retry => "in error, asked again",
+            Self::Unfetched => "failed before for a passing cause",
+            Self::Unlisted => "cannot be listed",
+            Self::Asked => "asked again",
+            Self::Verify => "content to be compared",
+        }
+    }
+}
+
+/// One log to be processed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkItem {
+    /// Its files.
+    pub files: LogFiles,
+    /// Error that is known already, e.g. an unreadable folder.
+    pub fault: Option<Diagnostic>,
+    /// Its path in records and messages: relative to the configuration's folder where it is inside it.
+    pub log_path: String,
+    /// File status; none when the file vanished since it was found.
+    pub stat: Option<FileStat>,
+    /// Reason to process it.
+    pub why: WorkReason,
+    /// Status of an earlier log of this path.
+    pub before: Option<LogRecord>,
+}
+
+impl WorkItem {
+    /// Whether an earlier run ended with an error of this log.
+    pub(crate) fn failed_before(&self) -> bool {
+        self.before.as_ref().is_some_and(|before| before.outcome == LogOutcome::Error)
+    }
+}
+
+/// Plan of a run.
+#[derive(Debug, Clone, Default)]
+pub struct Plan {
+    /// Number of logs that match the patterns.
+    pub found: usize,
+    /// Number of logs already processed.
+    pub known: usize,
+    /// Logs to be processed, largest first; those that failed before come last.
+    pub work: Vec<WorkItem>,
+    /// Log records, by path, of the logs that still exist.
+    pub accounts: BTreeMap<String, LogRecord>,
+    /// Existing logs by their digests; empty without work.
+    pub here: HashMap<Digests, String>,
+    /// Deleted logs by the digest of their content: a log may have been renamed.
+    pub gone: HashMap<String, Vec<LogRecord>>,
+    /// Number of logs with stored records that were deleted, or that no pattern matches any more, and that lie nowhere else.
+    pub absent: usize,
+    /// Number of logs excluded by the selection.
+    pub not_asked: usize,
+    /// Logs left for later by `--limit`.
+    pub left: usize,
+    /// Failed logs of earlier runs that are not processed again, by path.
+    pub standing_errors: Vec<StandingError>,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+    /// Digest of the settings of a log without an identity.
+    pub unidentified: String,
+}
+
+/// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct StandingError {
+    /// The log.
+    pub log: String,
+    /// Code of its first error.
+    pub code: String,
+    /// All errors as text.
+    pub detail: String,
+    /// The run in which it failed.
+    pub run_id: String,
+    /// Whether `logs.acknowledged_errors` names the log, so that it no longer makes the exit code 1.
+    pub is_acknowledged: bool,
+}
+
+impl StandingError {
+    fn of(account: &LogRecord, acknowledged: &[glob::Pattern]) -> Self {
+        Self {
+            is_acknowledged: acknowledged.iter().any(|pattern| pattern.matches(&account.log_path)),
+            log: account.log_path.clone(),
+            code: account.error_code.clone().unwrap_or_default(),
+            detail: account.error_detail.clone().unwrap_or_default(),
+            run_id: account.run_id.clone(),
+        }
+    }
+}
+
+/// Digests of a log's content and of the settings that affect it.
+pub type Digests = (String, String);
+
+/// Plans a run from the logs found and the status of earlier ones.
+pub fn plan(
+    config: &Config,
+    installations: &Installations,
+    found: DiscoveredLogs,
+    accounts: Vec<LogRecord>,
+    request: &Request,
+) -> Plan {
+    let (strays, seen) = (found.strays, found.seen);
+    let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
+        found.logs.into_iter().map(|(log_path, files)| (log_path, (files, None))).collect();
+    let faulty = |(log_path, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
+        (log_path, (LogFiles::one(path), Some(diagnostic)))
+    };
+    logs.extend(found.faulty.into_iter().map(faulty));
+    let found = logs;
+    let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
+    let contents: HashSet<&String> = here.iter().filter_map(|a| a.log_digest.as_ref()).collect();
+    let lies_elsewhere =
+        |a: &&LogRecord| a.log_digest.as_ref().is_some_and(|digest| contents.contains(digest));
+    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0 && !lies_elsewhere(a)).count();
+    let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
+    // Names and digests of a hundred thousand logs are made only where they decide something.
+    let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
+        accounts.values().flat_map(LogRecord::record_keys).collect()
+    } else {
+        HashSet::new()
+    };
+    let unidentified = job::flight_log::digest_without_identity(config, installations);
+    let planner =
+        Planner { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
+    let verdicts: Vec<Verdict> = found
+        .par_iter()
+        .map(|(log_path, log)| planner.plan_log(log_path, log, accounts.get(log_path)))
+        .collect();
+    let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
+    let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
+    let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
+    work.sort_by(|a, b| {
+        let by_size = || size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path));
+        a.failed_before().cmp(&b.failed_before()).then_with(by_size)
+    });
+    let wanted = work.len();
+    work.truncate(request.limit.unwrap_or(usize::MAX));
+    let left = wanted - work.len();
+    let known = found.len() - wanted - not_asked;
+    let to_do: HashSet<&str> = work.iter().map(|work| work.log_path.as_str()).collect();
+    let patterns = config.document.logs.acknowledged_errors.iter();
+    let acknowledged: Vec<_> = patterns.filter_map(|text| glob::Pattern::new(text).ok()).collect();
+    let standing_errors = accounts
+        .values()
+        .filter(|account| account.outcome == LogOutcome::Error && !to_do.contains(account.log_path.as_str()))
+        .map(|account| StandingError::of(account, &acknowledged))
+        .collect();
+    drop(to_do);
+    let mut plan = Plan {
+        unidentified,
+        found: found.len(),
+        known,
+        work,
+        accounts,
+        absent,
+        not_asked,
+        left,
+        strays,
+        standing_errors,
+        ..Plan::default()
+    };
+    if !plan.work.is_empty() {
+        let here = |account: &LogRecord| Some((digests(account)?, account.log_path.clone()));
+        // Of copies, the one with records comes last and is kept.
+        let mut all: Vec<&LogRecord> = plan.accounts.values().collect();
+        all.sort_by_key(|account| account.estimated + account.refused);
+        plan.here = all.into_iter().filter_map(here).collect();
+        for account in gone.into_iter().filter(|account| digests(account).is_some()) {
+            plan.gone.entry(account.log_digest.clone().unwrap_or_default()).or_default().push(account);
+        }
+    }
+    plan
+}
+
+/// Digests of a log that was processed without an error.
+pub fn digests(account: &LogRecord) -> Option<(String, String)> {
+    account
+        .outcome
+        .is_success()
+        .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
+        .flatten()
+}
+
+/// Whether two logs are of one flight, by tail, flight id and departure.
+pub fn is_same_flight(one: &LogRecord, other: &LogRecord) -> bool {
+    (&one.tail_number, &one.flight_id, one.departure_utc)
+        == (&other.tail_number, &other.flight_id, other.departure_utc)
+}
+
+/// Flight of a log record, where its log was identified.
+pub fn flight_of(account: &LogRecord) -> Option<Flight> {
+    Some(Flight {
+        tail_number: TailNumber::new(account.tail_number.as_ref()?).ok()?,
+        flight_id: FlightId::new(account.flight_id.as_ref()?).ok()?,
+        departure_utc: account.departure_utc?,
+        flight_hours: None,
+        tail_hours_end: None,
+    })
+}
+
+/// Decision about one log in this run.
+enum Verdict {
+    Known,
+    NotAsked,
+    Process(Box<WorkItem>),
+}
+
+impl Verdict {
+    fn work(self) -> Option<WorkItem> {
+        match self {
+            Self::Process(work) => Some(*work),
+            Self::Known | Self::NotAsked => None,
+        }
+    }
+}
+
+/// Inputs of the decision about a log.
+struct Planner<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    request: &'a Request,
+    owned: &'a HashSet<RecordKey>,
+    unidentified: &'a str,
+    seen: &'a SeenObjects,
+}
+
+impl Planner<'_> {
+    fn plan_log(
+        &self,
+        log_path: &str,
+        (files, fault): &(LogFiles, Option<Diagnostic>),
+        before: Option<&LogRecord>,
+    ) -> Verdict {
+        let stat = FileStat::of_log(files, self.seen);
+        let is_unlisted = fault.as_ref().is_some_and(|fault| is_unlisted(&fault.code));
+        let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
+        let Some(why) = why else { return Verdict::Known };
+        // A log that cannot be identified is always processed, or its error would never be reported.
+        let flight = || {
+            before
+                .and_then(flight_of)
+                .or_else(|| Some(job::flight_log::identify(files, log_path, self.config).ok()?.0))
+        };
+        let asked =
+            !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
+        if !asked {
+            return Verdict::NotAsked;
+        }
+        let (files, fault, log_path) = (files.clone(), fault.clone(), log_path.to_owned());
+        Verdict::Process(Box::new(WorkItem { files, fault, log_path, stat, why, before: before.cloned() }))
+    }
+
+    /// Why this log is processed in this run, or nothing when it is up to date.
+    fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
+        let Some(account) = account else { return Some(WorkReason::New) };
+        let settings = flight_of(account).map_or_else(
+            || self.unidentified.to_owned(),
+            |flight| {
+                job::flight_log::config_digest(
+                    self.config,
+                    self.installations,
+                    &flight,
+                    &positions_of(account),
+                )
+            },
+        );
+        if self.request.redo {
+            Some(WorkReason::Asked)
+        } else if !stat.is_some_and(|stat| stat.is_of(account)) {
+            Some(WorkReason::ContentChanged)
+        } else if account.config_digest.as_deref() != Some(&settings) {
+            Some(WorkReason::SettingChanged)
+        } else if self.is_orphan(account) {
+            Some(WorkReason::OwnerGone)
+        } else if account.error_code.as_deref().is_some_and(is_passing) {
+            Some(WorkReason::Unfetched)
+        } else if self.config.document.logs.pieces.is_some()
+            && account.error_code.as_deref() == Some("pieces_undeclared")
+        {
+            Some(WorkReason::SettingChanged)
+        } else if self.request.retry && account.outcome == LogOutcome::Error {
+            Some(WorkReason::Retry)
+        } else if self.request.verify_content && account.outcome.is_success() {
+            Some(WorkReason::Verify)
+        } else {
+            None
+        }
+    }
+
+    /// A log that yielded its flight to another log, which no longer owns it.
+    fn is_orphan(&self, account: &LogRecord) -> bool {
+        let keys = if is_silent(account) { account.keys() } else { Vec::new() };
+        !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
+    }
+}
+
+/// Whether a sound log has no record of its own.
+fn is_silent(account: &LogRecord) -> bool {
+    let sound = account.outcome.is_success() || account.error_code.as_deref() == Some("duplicate_flight");
+    sound && account.estimated + account.refused == 0
+}
+
+fn positions_of(account: &LogRecord) -> Vec<Position> {
+    account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
+}
