@@ -4,6 +4,7 @@ use crate::data::series::{DAY_US, Flight, Series};
 use crate::error::Error;
 use crate::math::distributions::{self, NORMAL_95};
 use crate::measured::exceedance::Exceedance;
+use crate::measured::level::MeasuredLevel;
 use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
@@ -46,7 +47,7 @@ pub fn assess(
     let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
     });
-    let forecast = Forecasts::of(&unit, flights, settings);
+    let forecast = Forecasts::of(&unit, flights, settings, elapsed_hours);
     let earliest = forecast.crossing.and_then(|crossing| crossing.p05_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
     let growth_probability = rises.or(forecast.growth_probability).unwrap_or_default();
@@ -78,6 +79,8 @@ pub fn assess(
         method: forecast.method,
         elapsed_hours,
         check_probability: forecast.check_probability,
+        over_limit_probability: over_limit(unit.measured.level, prior.bias_sd_m, settings.limit_m)
+            .map(|measured| measured.max(forecast.over_limit_probability.unwrap_or_default())),
         utilization,
         outliers_us: unit.outliers_us(flights),
         noise_factor: unit.history.noise_factor,
@@ -99,13 +102,14 @@ struct Forecasts {
     wear: WearStatus,
     growth_probability: Option<f64>,
     check_probability: Option<f64>,
+    over_limit_probability: Option<f64>,
 }
 
 impl Forecasts {
-    fn of(unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
+    fn of(unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings, elapsed_hours: f64) -> Self {
         let mut forecasts = match (&unit.fit, unit.rise_now(flights)) {
             (Some(fit), rise) => {
-                let mut forecasts = Self::by_laws(fit, unit, flights, settings);
+                let mut forecasts = Self::by_laws(fit, unit, flights, settings, elapsed_hours);
                 if let (Some(crossing), Some(rise)) = (&mut forecasts.crossing, rise) {
                     *crossing = not_after(*crossing, rise.p05_hours);
                 }
@@ -122,6 +126,7 @@ impl Forecasts {
                 wear: WearStatus::Wearing,
                 growth_probability: Some(1.0),
                 check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
+                over_limit_probability: Some(chance_by(elapsed_hours, &rise)).filter(|_| elapsed_hours > 0.0),
             },
             (None, None) => Self::default(),
         };
@@ -136,7 +141,13 @@ impl Forecasts {
         forecasts
     }
 
-    fn by_laws(fit: &Fit<'_>, unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
+    fn by_laws(
+        fit: &Fit<'_>,
+        unit: &UnitFit<'_>,
+        flights: &[Flight],
+        settings: &Settings,
+        elapsed_hours: f64,
+    ) -> Self {
         let ratio = hours_per_usage(flights, &fit.prior);
         // A rise that was taken off for the law is still there.
         let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
@@ -151,8 +162,16 @@ impl Forecasts {
             wear: wear_status(growth_probability),
             growth_probability: Some(growth_probability),
             check_probability: Some(remaining.within(settings.check_interval_hours)),
+            over_limit_probability: Some(remaining.within(elapsed_hours)),
         }
     }
+}
+
+/// Probability that a measured level, with the spread that its installation adds, is at or above the limit.
+fn over_limit(level: Option<MeasuredLevel>, installation_sd_m: f64, limit_m: f64) -> Option<f64> {
+    let level = level?;
+    let error_m = level.se_m.hypot(installation_sd_m).max(f64::MIN_POSITIVE);
+    Some(distributions::cdf((level.gap_m - limit_m) / error_m))
 }
 
 /// The crossing with an earliest time that is not after that of the line through the last records.

@@ -48,6 +48,11 @@ pub(crate) fn row(
     let (state, cause) =
         if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
     let utc = |us: i64| Timestamp::from_microsecond(us).ok();
+    let mut caveats = Vec::new();
+    if removal.is_none() {
+        caveats.extend(caveats_of(cause, trend, history, as_of, fault));
+        caveats.extend(row_faults(series, history, as_of));
+    }
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -88,6 +93,7 @@ pub(crate) fn row(
         not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
         forecast_method: trend.method.filter(|_| is_judged).map(ForecastMethod::as_str),
         check_probability: trend.check_probability.filter(|_| is_judged),
+        over_limit_probability: trend.over_limit_probability.filter(|_| is_judged),
         hours_per_day: use_now.map(|u| u.hours_per_day),
         hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
         flights_per_day: use_now.map(|u| u.flights_per_day),
@@ -99,15 +105,15 @@ pub(crate) fn row(
         reason_code: removal.is_none().then(|| cause.code()),
         reason: Some(match removal {
             Some(installation) => removed(installation),
-            None => {
-                let reason = reason(cause, trend, history, wide, as_of, fault);
-                row_faults(series, history, as_of).fold(reason, |all, fault| format!("{all}; {fault}"))
-            }
+            None => caveats
+                .iter()
+                .fold(reason_of_state(cause, trend, history, wide), |all, caveat| format!("{all}; {caveat}")),
         }),
         conditions: Vec::new(),
         action: None,
         due_utc: None,
         elapsed_hours: NoColumn(trend.elapsed_hours),
+        caveats: NoColumn(caveats),
         sketch_m: sketched(&gaps_m),
     }
 }
@@ -157,37 +163,32 @@ fn removed(last: &Installation) -> String {
     format!("removed from {} of {} on {date}", last.position, last.tail_number)
 }
 
-/// Why a state, and how old it is where no estimate has followed.
-fn reason(
+/// What limits the trust in a state: wrong mappings, other settings, flags, and age.
+fn caveats_of(
     cause: Reason,
     trend: &Assessment,
     history: &History,
-    wide: &TailWide,
     as_of: Timestamp,
     fault: Option<&MappingFault>,
-) -> String {
+) -> impl Iterator<Item = String> {
     const LATEST: usize = 12;
-    let mut reason = reason_of_state(cause, trend, history, wide);
-    if let Some(fault) = fault {
-        reason = format!("{reason}; {} of {}", fault.evidence(), fault.scope());
-    }
-    if let Some((others, last, all)) = history.other_settings() {
-        reason = format!(
-            "{reason}; {others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
+    let mapping = fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
+    let settings = history.other_settings().map(|(others, last, all)| {
+        format!(
+            "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
             last.strftime("%Y-%m-%d")
-        );
-    }
-    if let (disputed @ 1.., gaps) = history.disputed(as_of, LATEST) {
-        reason = format!(
-            "{reason}; {disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
-        );
-    }
-    match trend.stale_days {
-        Some(days) if !matches!(cause, Reason::Stale { .. }) => {
-            format!("{reason}; no sound record for {days:.0} days")
-        }
-        _ => reason,
-    }
+        )
+    });
+    let (disputed, gaps) = history.disputed(as_of, LATEST);
+    let flagged = (disputed > 0).then(|| {
+        format!(
+            "{disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
+        )
+    });
+    let is_said = matches!(cause, Reason::Stale { .. });
+    let age = trend.stale_days.filter(|_| !is_said);
+    let age = age.map(|days| format!("no sound record for {days:.0} days"));
+    [mapping, settings, flagged, age].into_iter().flatten()
 }
 
 /// Why a state; a change that the tail's other units made as well is named for what it is.

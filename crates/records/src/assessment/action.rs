@@ -3,6 +3,7 @@
 use jiff::Timestamp;
 
 use crate::assessment::trend_row::TrendRow;
+use crate::time::days_between;
 
 /// What a unit's state asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,18 +72,18 @@ impl TrendRow {
         self
     }
 
-    /// The date until when, for readers: `now`, `2026-12-28`, `348 FH` where no usage is known, or nothing.
+    /// The date until when, for readers: `now`, `28 Dec`, `348 FH` where no usage is known, or nothing.
     pub fn due_text(&self) -> Option<String> {
         let is_now = self.due_utc.is_some_and(|due| due <= self.as_of_utc);
         match (self.action?, self.due_utc, self.crossing_hours_p05) {
             _ if is_now => Some("now".to_owned()),
-            (_, Some(due), _) => Some(day(due)),
+            (_, Some(due), _) => Some(self.day(due)),
             ("inspect", None, Some(hours)) => Some(format!("{hours:.0} FH")),
             _ => None,
         }
     }
 
-    /// What to do, for readers: `replace now`, `inspect before 2026-12-28`, `inspect`.
+    /// What to do, for readers: `replace now`, `inspect before 28 Dec`, `inspect`.
     pub fn action_text(&self) -> Option<String> {
         let action = self.action?.replace('_', " ");
         Some(match self.due_text() {
@@ -93,8 +94,8 @@ impl TrendRow {
         })
     }
 
-    /// Order of urgency: by state, then by the hours to the limit.
-    pub fn urgency(&self) -> (u8, f64) {
+    /// Order of urgency: by state, then by the date until when, then by the hours to the limit.
+    pub fn urgency(&self) -> (u8, f64, f64, &str) {
         let rank = match self.state {
             Some("act") => 0,
             Some("plan") => 1,
@@ -104,10 +105,13 @@ impl TrendRow {
             Some(_) => 5,
             None => 6,
         };
-        (rank, self.crossing_hours_p05.unwrap_or(f64::INFINITY))
+        let due = self.due_utc.map_or(f64::INFINITY, |due| due.as_second() as f64);
+        (rank, due, self.crossing_hours_p05.unwrap_or(f64::INFINITY), &self.serial_number)
     }
-}
 
-fn day(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d").to_string()
+    /// A date for readers: `28 Dec`, with its year where it is more than 300 days from `as_of_utc`.
+    pub fn day(&self, at: Timestamp) -> String {
+        let is_near = days_between(self.as_of_utc, at).abs() <= 300.0;
+        at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
+    }
 }

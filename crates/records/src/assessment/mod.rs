@@ -3,5 +3,6 @@
 pub mod action;
 pub mod quantity_row;
 pub mod report_rows;
+pub mod statement;
 pub mod trend_row;
 pub mod unit_state;

@@ -30,7 +30,7 @@ row! {
 
 row! {
     /// Assessment of one unit at a date.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct TrendRow {
         /// Part number of the unit.
         pub part_number: Option<String>,
@@ -113,6 +113,8 @@ row! {
         pub forecast_method: Option<&'static str>,
         /// Probability of reaching the limit within `next_check_hours`, from the curves alone.
         pub check_probability: Option<f64>,
+        /// Probability that the gap is at or above `limit_m` on `as_of_utc`.
+        pub over_limit_probability: Option<f64>,
         /// Flight hours per day in the last ninety days; dates, the report's chart and its removals use it.
         pub hours_per_day: Option<f64>,
         /// Standard error of `hours_per_day`.
@@ -148,6 +150,9 @@ row! {
         /// Flight hours since the last flight, at the unit's own rate.
         #[serde(skip)]
         pub elapsed_hours: NoColumn<f64>,
+        /// What limits the trust in the state, part of `reason`: other settings, flags, age, rows that cannot be right.
+        #[serde(skip)]
+        pub caveats: NoColumn<Vec<String>>,
         /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: for a sparkline.
         #[serde(skip)]
         pub sketch_m: NoColumn<Vec<f64>>,

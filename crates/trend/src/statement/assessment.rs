@@ -41,6 +41,9 @@ pub struct Assessment {
     pub elapsed_hours: f64,
     /// Probability that it is met before the next check ([`crate::Settings::check_interval_hours`]).
     pub check_probability: Option<f64>,
+    /// Probability that the gap is at or above the limit on the date of the assessment: by the measured level with what
+    /// its installation adds, or by the forecast with the usage since, whichever is more.
+    pub over_limit_probability: Option<f64>,
     /// How the unit is used now, to turn hours into flights and days.
     pub utilization: Option<Utilization>,
     /// Flights whose gap was left out as an outlier, by departure.

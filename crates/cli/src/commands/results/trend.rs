@@ -1,5 +1,7 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
+use std::cmp::Ordering;
+
 use job::Config;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
 use pipeline::findings::monitoring::mapping_faults::MappingFault;
@@ -199,10 +201,7 @@ fn page(
 
 /// Units by urgency, with action and date.
 pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
-    units.sort_by(|a, b| {
-        let ((a, a_hours), (b, b_hours)) = (a.urgency(), b.urgency());
-        a.cmp(&b).then(a_hours.total_cmp(&b_hours))
-    });
+    units.sort_by(|a, b| a.urgency().partial_cmp(&b.urgency()).unwrap_or(Ordering::Equal));
     let columns = [
         text("state", 0),
         text("tail", 0),
