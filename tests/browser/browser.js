@@ -4,8 +4,9 @@ import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
 
-export const DESKTOP = { width: 1280, height: 900 };
-export const PHONE = { width: 390, height: 844 };
+/** Telephone, tablet, small and large screen, px. */
+export const WIDTHS = [390, 768, 1024, 1600];
+const DESKTOP = { width: 1280, height: 900 };
 
 const shots = process.env.SHOTS ?? join(import.meta.dirname ?? ".", "shots");
 const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";

@@ -46,7 +46,8 @@ pub(crate) fn rate(m_per_hour: f64) -> String {
     tenths(m_per_hour * 1e9)
 }
 
-/// HTML of a text whose dates and serial numbers do not break at their hyphens; one wider than a phone does.
+/// HTML of a text whose dates and serial numbers do not break at their hyphens, nor numbers before their units; a word wider
+/// than a phone does.
 pub(crate) fn unbroken(text: &str) -> String {
     const MAX_CHARS: usize = 24;
     let word = |word: &str| {
@@ -54,15 +55,19 @@ pub(crate) fn unbroken(text: &str) -> String {
         let is_short = word.contains('-') && word.chars().count() <= MAX_CHARS;
         if is_short { format!("<span class=\"d\">{safe}</span>") } else { safe.to_string() }
     };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+    let units = ["%", "µm", "FH", "×"].map(|unit| (format!(" {unit}"), format!("\u{a0}{unit}")));
+    let text = text.split(' ').map(word).collect::<Vec<_>>().join(" ");
+    units.iter().fold(text, |text, (apart, joined)| text.replace(apart, joined))
+}
+
+/// HTML of a list of chances, each of which stays on one line.
+pub(crate) fn whole_dates(text: &str) -> String {
+    let whole = |part: &str| format!("<span class=\"d\">{}</span>", unbroken(part));
+    text.split(", ").map(whole).collect::<Vec<_>>().join(", ")
 }
 
 pub(crate) fn date(t: Timestamp) -> String {
     t.strftime("%Y-%m-%d").to_string()
-}
-
-pub(crate) fn date_or(t: Option<Timestamp>) -> String {
-    or_no_data(t, date)
 }
 
 pub(crate) fn minute(t: Timestamp) -> String {
@@ -92,20 +97,11 @@ pub(crate) fn hours(h: f64) -> String {
     count(h.max(0.0).round() as usize)
 }
 
-pub(crate) fn percent(share: f64) -> String {
-    format!("{:.0} %", 100.0 * share)
-}
-
 /// First instant of the month `months` after that of `from`.
 pub(crate) fn month(from: Timestamp, months: i32) -> Option<Timestamp> {
     let day = from.to_zoned(TimeZone::UTC).date().first_of_month();
     let day = day.checked_add(jiff::Span::new().months(months)).ok()?;
     day.to_zoned(TimeZone::UTC).ok().map(|z| z.timestamp())
-}
-
-/// `2026-11`.
-pub(crate) fn month_name(t: Timestamp) -> String {
-    t.strftime("%Y-%m").to_string()
 }
 
 #[cfg(test)]
@@ -135,7 +131,7 @@ mod tests {
     #[test]
     fn months_follow_the_calendar_across_the_year() {
         let t: Timestamp = "2026-11-30T23:59:00Z".parse().unwrap();
-        assert_eq!(month_name(month(t, 0).unwrap()), "2026-11");
-        assert_eq!(month_name(month(t, 2).unwrap()), "2027-01");
+        let day = |months| date(month(t, months).unwrap());
+        assert_eq!((day(0), day(2)), ("2026-11-01".to_owned(), "2027-01-01".to_owned()));
     }
 }

@@ -1,7 +1,7 @@
 //! HTML report of a fleet: a fleet page, a page per part, per tail and per unit.
 //!
 //! A [`Report`] is rendered to [`Page`]s; this crate reads and writes no files and estimates nothing. Every
-//! number is in the page as text; scripts only add hover and zoom. Templates escape every external string.
+//! number is in the page as text; scripts only magnify. Templates escape every external string.
 
 mod assets;
 mod charts;
@@ -16,8 +16,7 @@ mod stats;
 pub use assets::assets;
 pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
 pub use model::{
-    Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
-    QuantityView, Report, Tail, TimedInterval, UnitView,
+    Event, FleetPriorView, FlightRow, Installation, Quality, QuantityView, Report, TimedInterval, UnitView,
 };
 pub use page::{Error, Page, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
@@ -25,5 +24,5 @@ pub use pages::part::part_pages;
 pub use pages::tail::tail_page;
 pub use pages::unit::unit_page;
 pub use state_badge::StateBadge;
-pub use stats::rate_spread::RateSpreads;
-pub use stats::removal_forecast::{Month, removal_forecast};
+pub use stats::peers::Peers;
+pub use stats::removal_forecast::removal_forecast;

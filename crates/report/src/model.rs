@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use records::WorkRequest;
-use records::{QuantityChange, QuantityRow, TrendRow};
-use serde::Serialize;
+use records::report_rows::{ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow};
+use records::{QuantityChange, QuantityRow, TrendRow, WorkRequest};
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
-use crate::format::{level, or_no_data, percent};
+use crate::format::{level, or_no_data};
 use crate::state_badge::StateBadge;
 
 /// Content of a report. Serialised, it is `report.json`; field names there follow the first version.
@@ -24,12 +25,10 @@ pub struct Report {
     pub as_of_utc: Option<Timestamp>,
     pub newest_departure_utc: Option<Timestamp>,
     pub logs_known: usize,
-    /// Hours until the next check, for the probability of reaching the limit before it.
-    pub check_interval_hours: f64,
     #[serde(rename = "log_faults")]
-    pub log_errors: Vec<LogError>,
+    pub log_errors: Vec<ReportLogErrorRow>,
     pub priors: Vec<FleetPriorView>,
-    pub tails: Vec<Tail>,
+    pub tails: Vec<ReportTailRow>,
     pub units: Vec<UnitView>,
     /// Changes of quantities other than the gap, of units, tails and parts; the newest first.
     pub quantity_changes: Vec<QuantityChange>,
@@ -41,9 +40,6 @@ pub struct Report {
     pub inspections_given: bool,
     /// Inspections of units without records.
     pub inspections_unmatched: usize,
-    /// Trends of the units, in their order; written as a table, not part of `report.json`.
-    #[serde(skip)]
-    pub trend_rows: Vec<TrendRow>,
 }
 
 /// Fleet prior of a part number, as learned before a cut-off date.
@@ -71,53 +67,27 @@ pub struct TimedInterval {
     pub p95_m: f64,
 }
 
-/// A log that could not be read.
-#[derive(Debug, Clone, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds")]
-pub struct LogError {
-    pub log_path: String,
-    pub tail_number: Option<String>,
-    pub code: String,
-    pub processed_utc: Timestamp,
-}
-
-/// Data of one aircraft.
-#[derive(Debug, Clone, Default, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Tail {
-    pub tail_number: String,
-    pub flights: usize,
-    pub records: usize,
-    pub refused: usize,
-    pub logs_in_error: usize,
-    pub last_departure_utc: Option<Timestamp>,
-    pub last_estimate_utc: Option<Timestamp>,
-}
-
 /// One unit: its assessment and the data behind it.
 #[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct UnitView {
-    pub part_number: Option<String>,
-    pub serial_number: String,
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-    #[serde(rename = "statement")]
-    pub assessment: Assessment,
+    /// In `report.json` under `statement`, with the unit's names and place beside it.
+    #[serde(flatten, serialize_with = "statement")]
+    pub row: TrendRow,
+    pub watch_m: Option<f64>,
+    /// State one day earlier; `None` where the unit was not assessed then, the inner `None` of a removed unit.
+    pub state_day_before: Option<Option<String>>,
     pub quality: Quality,
     pub events: Vec<Event>,
     #[serde(rename = "stays")]
     pub installations: Vec<Installation>,
     #[serde(rename = "past")]
-    pub past_forecasts: Vec<PastForecast>,
-    pub inspections: Vec<Inspection>,
+    pub past_forecasts: Vec<ReportPastForecastRow>,
+    pub inspections: Vec<ReportInspectionRow>,
     /// Work requests about the unit, earliest first.
     pub work_requests: Vec<WorkRequest>,
     /// Followed quantities other than the gap.
     pub quantities: Vec<QuantityView>,
-    /// Gaps in order of flights, at most a hundred means of neighbours, m; drawn, not part of `report.json`.
-    #[serde(skip)]
-    pub sketch_m: Vec<f64>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
     pub level: Vec<TimedInterval>,
@@ -129,6 +99,17 @@ pub struct UnitView {
     pub flights: Vec<FlightRow>,
 }
 
+/// Writes an assessment as `statement`, and the names and the place of its unit.
+fn statement<S: Serializer>(row: &TrendRow, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut unit = serializer.serialize_struct("Unit", 5)?;
+    unit.serialize_field("part_number", &row.part_number)?;
+    unit.serialize_field("serial_number", &row.serial_number)?;
+    unit.serialize_field("tail_number", &row.tail_number)?;
+    unit.serialize_field("position", &row.position)?;
+    unit.serialize_field("statement", row)?;
+    unit.end()
+}
+
 /// A followed quantity of a unit.
 #[derive(Debug, Clone, Serialize)]
 pub struct QuantityView {
@@ -138,53 +119,6 @@ pub struct QuantityView {
     /// Value in each of the unit's flights, NaN for none; plotted, not part of `report.json`.
     #[serde(skip)]
     pub values: Vec<f32>,
-}
-
-/// Assessment of a unit on the date of the report.
-#[derive(Debug, Clone, Default, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Assessment {
-    pub state: Option<String>,
-    pub reason: Option<String>,
-    /// What the state asks for, and until when.
-    pub action: Option<String>,
-    pub due_utc: Option<Timestamp>,
-    /// Both in words.
-    pub action_text: Option<String>,
-    pub flights: usize,
-    pub unit_hours: Option<f64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-    /// Records that the gap rests on.
-    pub gap_records: Option<i64>,
-    /// The latest record.
-    pub latest_utc: Option<Timestamp>,
-    pub latest_gap_m: Option<f64>,
-    pub latest_gap_se_m: Option<f64>,
-    /// What an installation may add to every gap measured in it, standard deviation.
-    pub installation_sd_m: Option<f64>,
-    pub limit_m: Option<f64>,
-    pub watch_m: Option<f64>,
-    pub rate_m_per_hour: Option<f64>,
-    pub rate_p05_m_per_hour: Option<f64>,
-    pub rate_p95_m_per_hour: Option<f64>,
-    pub trend: String,
-    pub crossing_hours_p05: Option<f64>,
-    pub crossing_hours_p50: Option<f64>,
-    pub crossing_hours_p95: Option<f64>,
-    pub forecast_method: Option<String>,
-    pub not_before_utc: Option<Timestamp>,
-    pub likely_utc: Option<Timestamp>,
-    pub not_after_utc: Option<Timestamp>,
-    /// Recent utilisation.
-    pub hours_per_day: Option<f64>,
-    pub hours_per_flight: Option<f64>,
-    /// Probability of reaching the limit before the next check.
-    pub check_probability: Option<f64>,
-    pub law: Option<String>,
-    pub axis: Option<String>,
-    /// State one day earlier; the outer `None` if the unit had no record then.
-    pub state_day_before: Option<Option<String>>,
 }
 
 /// Quality of the data behind an assessment.
@@ -221,6 +155,22 @@ pub struct Event {
     pub is_tail_wide: bool,
 }
 
+impl Event {
+    /// What happened, for readers.
+    pub(crate) fn word(&self) -> &'static str {
+        match self.kind.as_str() {
+            "recorded" => "maintenance",
+            "reset" if self.step_m < 0.0 => "gap fell",
+            "reset" => "gap rose",
+            "onset" => "wear began",
+            "exceedance" => "over the limit",
+            "exceedance_not_confirmed" => "once over the limit",
+            _ if self.is_tail_wide => "sensor of the tail moved",
+            _ => "measurement moved",
+        }
+    }
+}
+
 /// An installation of the unit on a tail.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
@@ -229,57 +179,6 @@ pub struct Installation {
     pub position: String,
     pub installed_utc: Timestamp,
     pub removed_utc: Option<Timestamp>,
-}
-
-/// A past forecast and the level found later.
-#[derive(Debug, Clone, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct PastForecast {
-    pub as_of_utc: Timestamp,
-    pub days_ago: i64,
-    pub state: Option<String>,
-    pub gap_m: f64,
-    /// Forecast for the date of the report, with its 90 % interval.
-    #[serde(rename = "foreseen_low_m")]
-    pub predicted_low_m: f64,
-    #[serde(rename = "foreseen_m")]
-    pub predicted_m: f64,
-    #[serde(rename = "foreseen_high_m")]
-    pub predicted_high_m: f64,
-    /// Level found on the date of the report.
-    pub found_m: f64,
-}
-
-impl PastForecast {
-    /// State to show.
-    pub(crate) fn badge(&self) -> StateBadge {
-        StateBadge::from_state(self.state.as_deref())
-    }
-
-    /// Whether the level found lies within the forecast interval.
-    pub fn held(&self) -> bool {
-        (self.predicted_low_m..=self.predicted_high_m).contains(&self.found_m)
-    }
-}
-
-/// A hangar inspection and the estimate to compare with it.
-#[derive(Debug, Clone, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Inspection {
-    pub date_utc: Timestamp,
-    pub play_m: f64,
-    pub instrument: Option<String>,
-    pub force_n: Option<f64>,
-    /// Median of the last estimates before the inspection; `None` if there is no recent one.
-    pub estimate_m: Option<f64>,
-    pub estimates: usize,
-}
-
-impl Inspection {
-    /// Estimate less inspection, m.
-    pub(crate) fn difference_m(&self) -> Option<f64> {
-        self.estimate_m.map(|estimate_m| estimate_m - self.play_m)
-    }
 }
 
 /// One flight of a unit; a report holds those of the whole fleet.
@@ -295,6 +194,8 @@ pub struct FlightRow {
     pub gap_p05_m: Option<f64>,
     pub gap_p95_m: Option<f64>,
     pub gap_midrange_m: Option<f64>,
+    /// Largest gap along the stroke, where the gap varies.
+    pub gap_largest_m: Option<f64>,
     pub load_reversals: Option<u64>,
     pub load_p05_n: Option<f64>,
     pub load_p95_n: Option<f64>,
@@ -315,42 +216,51 @@ impl Report {
     pub(crate) fn by_part(&self) -> BTreeMap<&str, Vec<&UnitView>> {
         let mut parts: BTreeMap<&str, Vec<&UnitView>> = BTreeMap::new();
         for unit in &self.units {
-            parts.entry(unit.part_number.as_deref().unwrap_or("–")).or_default().push(unit);
+            parts.entry(unit.row.part_number.as_deref().unwrap_or("–")).or_default().push(unit);
         }
         parts
+    }
+
+    /// What is wrong or missing in the data: mappings first. `tail` selects what names that tail first.
+    pub(crate) fn warnings(&self, tail: Option<&str>) -> Vec<&str> {
+        let all = self.mapping_faults.iter().chain(&self.notes).map(String::as_str);
+        let names = |text: &&str| {
+            tail.is_none_or(|tail| text.strip_prefix(tail).is_some_and(|rest| rest.starts_with([':', ' '])))
+        };
+        all.filter(names).collect()
     }
 }
 
 impl UnitView {
     /// Tail and position.
     pub(crate) fn place(&self) -> String {
-        let words = [self.tail_number.as_deref(), self.position.as_deref()];
+        let words = [self.row.tail_number.as_deref(), self.row.position.as_deref()];
         words.into_iter().flatten().collect::<Vec<_>>().join(" ")
     }
 
     /// Gap divided by limit.
     pub(crate) fn share(&self) -> Option<f64> {
-        Some(self.assessment.gap_m? / self.assessment.limit_m?)
+        Some(self.row.gap_m? / self.row.limit_m?)
     }
 
     /// Gap divided by limit, as text.
     pub(crate) fn share_text(&self) -> String {
-        or_no_data(self.share(), percent)
+        or_no_data(self.share(), |share| format!("{:.0} %", 100.0 * share))
     }
 
     /// Gap with its 90 % interval, as text.
     pub(crate) fn gap_text(&self) -> String {
-        level(self.assessment.gap_m, self.assessment.gap_se_m)
-    }
-
-    /// Number of flights with an estimate.
-    pub(crate) fn estimates(&self) -> usize {
-        self.flights.iter().filter(|flight| flight.gap_m.is_some()).count()
+        level(self.row.gap_m, self.row.gap_se_m)
     }
 
     /// State to show.
     pub fn badge(&self) -> StateBadge {
-        StateBadge::from_state(self.assessment.state.as_deref())
+        StateBadge::from_state(self.row.state)
+    }
+
+    /// Whether the unit belongs on the work list.
+    pub(crate) fn needs_work(&self) -> bool {
+        self.row.action.is_some() || self.open_request().is_some()
     }
 
     /// The latest work request that is not closed.
@@ -360,9 +270,9 @@ impl UnitView {
 
     /// Part and serial number, `PART / SERIAL`.
     pub fn name(&self) -> String {
-        match &self.part_number {
-            Some(part) => format!("{part} / {}", self.serial_number),
-            None => self.serial_number.clone(),
+        match &self.row.part_number {
+            Some(part) => format!("{part} / {}", self.row.serial_number),
+            None => self.row.serial_number.clone(),
         }
     }
 }

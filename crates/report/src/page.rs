@@ -29,15 +29,12 @@ pub enum Error {
     /// The data of a plot could not be serialised.
     #[error("the data of a plot cannot be written: {0}")]
     Json(#[from] serde_json::Error),
-    /// A plot could not be drawn.
-    #[error("a picture cannot be drawn: {0}")]
-    Plot(#[from] plotters::drawing::DrawingAreaErrorKind<std::io::Error>),
 }
 
 /// Path of a unit's page, relative to the report folder.
 pub fn unit_path(unit: &UnitView) -> String {
-    let part = unit.part_number.as_deref().unwrap_or("");
-    format!("serial/{}.html", file_stem("unit", &[part, &unit.serial_number]))
+    let part = unit.row.part_number.as_deref().unwrap_or("");
+    format!("serial/{}.html", file_stem("unit", &[part, &unit.row.serial_number]))
 }
 
 /// Path of the page with the diagnostic plot of an actuator in a flight, relative to the report folder.

@@ -1,5 +1,6 @@
 //! State badge: word, shape and colour of a unit's state, so that no reader depends on colour.
 
+use records::assessment::action::state_rank;
 use trend::State;
 
 /// State of a unit as readers see it; a removed unit has none. An unknown word must never be read as normal.
@@ -7,19 +8,6 @@ use trend::State;
 pub struct StateBadge(Option<State>);
 
 impl StateBadge {
-    /// No action.
-    pub(crate) const NORMAL: Self = Self(Some(State::Normal));
-
-    /// All states, in the order of the counts at the top of the fleet page.
-    pub const ALL: [Self; 6] = [
-        Self(Some(State::Act)),
-        Self(Some(State::Plan)),
-        Self(Some(State::Unassessed)),
-        Self(Some(State::Watch)),
-        Self::NORMAL,
-        Self(None),
-    ];
-
     /// Parses the `state` of an assessment; `None` is a removed unit, an unknown word an unassessed one.
     pub fn from_state(word: Option<&str>) -> Self {
         Self(word.map(|word| State::from_word(word).unwrap_or(State::Unassessed)))
@@ -27,7 +15,7 @@ impl StateBadge {
 
     /// Rank by urgency, the most urgent first; a removed unit last.
     pub fn rank(self) -> u8 {
-        Self::ALL.iter().position(|badge| *badge == self).map_or(u8::MAX, |rank| rank as u8)
+        state_rank(self.0.map(State::as_str))
     }
 
     /// Word shown to readers.
@@ -53,11 +41,6 @@ impl StateBadge {
             None | Some(State::Unassessed) => "unstated",
             Some(state) => state.as_str(),
         }
-    }
-
-    /// Whether the unit belongs on the work list.
-    pub fn needs_action(self) -> bool {
-        self.0.is_some_and(|state| state > State::Normal)
     }
 }
 

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ::report::{
-    Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
-    QuantityView, Report, Tail, TimedInterval, UnitView,
+    Event, FleetPriorView, FlightRow, Installation, Quality, QuantityView, Report, TimedInterval, UnitView,
 };
 use jiff::Timestamp;
 use job::Config;
@@ -21,6 +20,7 @@ use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::flight_row::FlightRow as FlownRow;
 use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::report::flight_columns::{FlightExtras, StoreContents};
+use records::report_rows::{ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow};
 use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow, WorkRequest};
 
@@ -54,7 +54,7 @@ pub fn compose(
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
     let requests = requests_by_unit(work_requests::requests(&store.work_events()?, made_utc));
-    let mut tails = tails(&histories);
+    let mut tails = tails(&histories, config, as_of_utc);
     let compose = ReportComposer {
         config,
         before: &by_name(before),
@@ -64,13 +64,13 @@ pub fn compose(
         quantities: by_unit(&followed.rows),
         requests: &requests,
     };
-    let unit = |(row, drawn): (&TrendRow, &Forecast)| {
-        let name = name_of(row);
+    let unit = |(row, drawn): (TrendRow, &Forecast)| {
+        let name = row.unit();
         let extras = extras.remove(&name).unwrap_or_default();
         compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &extras)
     };
-    let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
-    let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
+    let units: Vec<UnitView> = now.into_iter().zip(&drawn).map(unit).collect();
+    let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.row.tail_number.as_deref()).collect();
     let scope = scope(ask);
     let narrowed = scope.is_some();
     attribute_by_path(&mut logs.faults, &tails, installations);
@@ -86,7 +86,6 @@ pub fn compose(
         as_of_utc,
         newest_departure_utc,
         logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
-        check_interval_hours: config.document.trend.next_check_hours,
         log_errors: logs.faults,
         priors: priors.into_iter().map(prior).collect(),
         tails,
@@ -96,7 +95,6 @@ pub fn compose(
         quantity_changes: followed.changes,
         notes,
         mapping_faults: mapping_faults.iter().map(ToString::to_string).collect(),
-        trend_rows: now,
     })
 }
 
@@ -127,7 +125,7 @@ fn scope(ask: &UnitSelection) -> Option<String> {
 /// Logs: number by tail, and those in error.
 struct Logs {
     known: BTreeMap<Option<String>, usize>,
-    faults: Vec<LogError>,
+    faults: Vec<ReportLogErrorRow>,
 }
 
 impl Logs {
@@ -136,10 +134,10 @@ impl Logs {
         for account in store.accounts()? {
             *known.entry(account.tail_number.clone()).or_default() += 1;
             if account.outcome == LogOutcome::Error {
-                faults.push(LogError {
+                faults.push(ReportLogErrorRow {
                     log_path: account.log_path,
                     tail_number: account.tail_number,
-                    code: account.error_code.unwrap_or_default(),
+                    error_code: account.error_code.unwrap_or_default(),
                     processed_utc: account.processed_utc,
                 });
             }
@@ -148,16 +146,12 @@ impl Logs {
     }
 }
 
-fn name_of(row: &TrendRow) -> Name {
-    (row.part_number.clone(), row.serial_number.clone())
-}
-
 /// The statements of one and of more days before, by days; of units that had flown by then.
 type PastAssessments = BTreeMap<i64, BTreeMap<Name, TrendRow>>;
 
 fn by_name(before: BTreeMap<i64, Vec<TrendRow>>) -> PastAssessments {
     let named = |rows: Vec<TrendRow>| {
-        rows.into_iter().filter(|row| row.flights > 0).map(|row| (name_of(&row), row)).collect()
+        rows.into_iter().filter(|row| row.flights > 0).map(|row| (row.unit(), row)).collect()
     };
     before.into_iter().map(|(days, rows)| (days, named(rows))).collect()
 }
@@ -174,77 +168,33 @@ struct ReportComposer<'a> {
 }
 
 impl ReportComposer<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, extras: &[FlightExtras]) -> UnitView {
-        let flown = history.flights();
-        let name = name_of(row);
+    fn unit(&self, row: TrendRow, drawn: &Forecast, history: &History, extras: &[FlightExtras]) -> UnitView {
+        let name = row.unit();
         let installations: Vec<Installation> =
             self.installations.of(&name).into_iter().map(installation).collect();
+        let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
+        let before = self.before.get(&1).and_then(|units| units.get(&name));
+        let checks = self.checks.iter().filter(|check| check.is_of(&name));
         UnitView {
             level: drawn
                 .past
                 .iter()
                 .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
-            forecast: forecast(drawn, row),
-            sketch_m: row.sketch_m.0.clone(),
-            assessment: self.statement(row, history, &name),
-            quality: quality(history, extras, row),
-            events: events(row, &installations),
-            past_forecasts: self.past(row, &name),
-            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| compared(c, flown)).collect(),
+            forecast: forecast(drawn, &row),
+            watch_m: part.and_then(|part| self.config.parts.get(&part)?.watch_m),
+            state_day_before: before
+                .filter(|row| row.gap_m.is_some())
+                .map(|row| row.state.map(str::to_owned)),
+            quality: quality(history, extras, &row),
+            events: events(&row, &installations),
+            past_forecasts: self.past(&row, &name),
+            inspections: checks.map(|check| compared(check, &row, history.flights())).collect(),
             flights: flights(history, extras),
             quantities: self.quantities(&name, history, extras),
             installations,
             work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
-            part_number: name.0,
-            serial_number: name.1,
-            tail_number: row.tail_number.clone(),
-            position: row.position.clone(),
-        }
-    }
-
-    fn statement(&self, row: &TrendRow, history: &History, name: &Name) -> Assessment {
-        let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
-        let part = part.and_then(|part| self.config.parts.get(&part));
-        let records = history.flights();
-        Assessment {
-            state: row.state.map(str::to_owned),
-            reason: row.reason.clone(),
-            action: row.action.map(str::to_owned),
-            due_utc: row.due_utc,
-            action_text: row.action_text(),
-            flights: records.len(),
-            unit_hours: row.unit_hours,
-            gap_m: row.gap_m,
-            gap_se_m: row.gap_se_m,
-            gap_records: row.gap_records,
-            latest_utc: row.latest_utc,
-            latest_gap_m: row.latest_gap_m,
-            latest_gap_se_m: row.latest_gap_se_m,
-            installation_sd_m: row.installation_sd_m,
-            limit_m: row.limit_m,
-            watch_m: part.and_then(|p| p.watch_m),
-            rate_m_per_hour: row.rate_m_per_hour,
-            rate_p05_m_per_hour: row.rate_p05_m_per_hour,
-            rate_p95_m_per_hour: row.rate_p95_m_per_hour,
-            trend: row.trend.to_owned(),
-            crossing_hours_p05: row.crossing_hours_p05,
-            crossing_hours_p50: row.crossing_hours_p50,
-            crossing_hours_p95: row.crossing_hours_p95,
-            forecast_method: row.forecast_method.map(str::to_owned),
-            not_before_utc: row.not_before_utc,
-            likely_utc: row.likely_utc,
-            not_after_utc: row.not_after_utc,
-            hours_per_day: row.hours_per_day,
-            hours_per_flight: row.hours_per_flight,
-            check_probability: row.check_probability,
-            law: row.wear_law.clone(),
-            axis: row.usage_axis.clone(),
-            state_day_before: self
-                .before
-                .get(&1)
-                .and_then(|d| d.get(name))
-                .map(|r| r.state.map(str::to_owned)),
+            row,
         }
     }
 
@@ -260,18 +210,20 @@ impl ReportComposer<'_> {
     }
 
     /// The forecasts that were made for the date of the report, and the level found.
-    fn past(&self, row: &TrendRow, name: &Name) -> Vec<PastForecast> {
+    fn past(&self, row: &TrendRow, name: &Name) -> Vec<ReportPastForecastRow> {
         let of_day = |days: &i64| {
             let then = self.before.get(days)?.get(name)?;
             let forecast = self.past.get(days)?.get(name)?;
-            Some(PastForecast {
+            Some(ReportPastForecastRow {
+                part_number: row.part_number.clone(),
+                serial_number: row.serial_number.clone(),
                 as_of_utc: then.as_of_utc,
                 days_ago: *days,
                 state: then.state.map(str::to_owned),
                 gap_m: then.gap_m?,
-                predicted_low_m: forecast.p05_m,
+                predicted_p05_m: forecast.p05_m,
                 predicted_m: forecast.m,
-                predicted_high_m: forecast.p95_m,
+                predicted_p95_m: forecast.p95_m,
                 found_m: row.gap_m?,
             })
         };
@@ -318,22 +270,28 @@ fn prior(
     }
 }
 
+/// The changes of a unit. One that an entry of maintenance explains is shown with that entry.
 fn events(row: &TrendRow, installations: &[Installation]) -> Vec<Event> {
+    let is_near = |a: Timestamp, b: Timestamp| days_between(a, b).abs() <= BOOKED_WITHIN_DAYS;
     let booked = |at: Timestamp| {
-        installations.iter().any(|s| {
-            let ends = [Some(s.installed_utc), s.removed_utc];
-            ends.into_iter().flatten().any(|end| days_between(end, at).abs() <= BOOKED_WITHIN_DAYS)
-        })
+        let ends = installations.iter().flat_map(|s| [Some(s.installed_utc), s.removed_utc]);
+        ends.flatten().any(|end| is_near(end, at))
     };
+    let explained = |by: &ChangePoint, of: &ChangePoint| {
+        by.kind == "recorded"
+            && matches!(of.kind, "reset" | "step")
+            && is_near(by.departure_utc, of.departure_utc)
+    };
+    let changes = &row.change_points;
     let event = |c: &ChangePoint| Event {
         departure_utc: c.departure_utc,
         kind: c.kind.to_owned(),
-        step_m: c.step_m,
+        step_m: changes.iter().find(|of| explained(c, of)).map_or(c.step_m, |of| of.step_m),
         is_tail_wide: c.tail_wide,
         // Wear that sets in is nothing that maintenance does.
         is_on_record: c.kind == "recorded" || (c.kind != "onset" && booked(c.departure_utc)),
     };
-    row.change_points.iter().map(event).collect()
+    changes.iter().filter(|c| !changes.iter().any(|by| explained(by, c))).map(event).collect()
 }
 
 fn quality(history: &History, extras: &[FlightExtras], row: &TrendRow) -> Quality {
@@ -399,7 +357,8 @@ fn flight(
         None => format!("refused: {reason}"),
         Some(_) => reason.to_owned(),
     });
-    let [unit_hours, gap_p05_m, gap_p95_m, gap_midrange_m, load_p05_n, load_p95_n] = extras.numbers();
+    let [unit_hours, gap_p05_m, gap_p95_m, gap_midrange_m, gap_largest_m, load_p05_n, load_p95_n] =
+        extras.numbers();
     FlightRow {
         departure_utc: flown.departure_utc(),
         flight_id: history.flight_id(flown).unwrap_or_default().into(),
@@ -410,6 +369,7 @@ fn flight(
         gap_p05_m,
         gap_p95_m,
         gap_midrange_m,
+        gap_largest_m,
         load_reversals: history.extras(flown).load_reversals(),
         load_p05_n,
         load_p95_n,
@@ -423,8 +383,12 @@ fn flight(
     }
 }
 
-fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
-    let mut tails: BTreeMap<&str, (Tail, BTreeSet<&str>)> = BTreeMap::new();
+fn tails(
+    histories: &Histories,
+    config: &Config,
+    as_of: Option<Timestamp>,
+) -> BTreeMap<String, ReportTailRow> {
+    let mut tails: BTreeMap<&str, (ReportTailRow, BTreeSet<&str>)> = BTreeMap::new();
     let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(move |f| (h, f)));
     for (history, record) in flown {
         let (Some(name), Some(flight)) =
@@ -432,7 +396,7 @@ fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
         else {
             continue;
         };
-        let (tail, flights) = tails.entry(name).or_insert_with(|| (empty_tail(name), BTreeSet::new()));
+        let (tail, flights) = tails.entry(name).or_default();
         flights.insert(flight);
         tail.records += 1;
         tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc()));
@@ -442,14 +406,24 @@ fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
             tail.refused += 1;
         }
     }
-    let counted = |(name, (tail, flights)): (&str, (Tail, BTreeSet<&str>))| {
-        (name.to_owned(), Tail { flights: flights.len(), ..tail })
+    for flight in config.flights.iter().filter(|f| as_of.is_none_or(|as_of| f.departure_utc <= as_of)) {
+        if let Some((tail, _)) = tails.get_mut(flight.tail_number.as_str()) {
+            *tail.flown.get_or_insert(0) += 1;
+        }
+    }
+    let counted = |(name, (tail, flights)): (&str, (ReportTailRow, BTreeSet<&str>))| {
+        let tail_number = name.to_owned();
+        (tail_number.clone(), ReportTailRow { tail_number, flights: flights.len() as i64, ..tail })
     };
     tails.into_iter().map(counted).collect()
 }
 
 /// Attributes logs that could not be read to the tail that their path names, if it names one known tail.
-fn attribute_by_path(faults: &mut [LogError], tails: &BTreeMap<String, Tail>, installations: &Installations) {
+fn attribute_by_path(
+    faults: &mut [ReportLogErrorRow],
+    tails: &BTreeMap<String, ReportTailRow>,
+    installations: &Installations,
+) {
     let installed = installations.iter().map(|i| i.tail_number.as_str());
     let known: BTreeSet<&str> = tails.keys().map(String::as_str).chain(installed).collect();
     for fault in faults.iter_mut().filter(|fault| fault.tail_number.is_none()) {
@@ -463,34 +437,25 @@ fn attribute_by_path(faults: &mut [LogError], tails: &BTreeMap<String, Tail>, in
 }
 
 /// Adds each tail's logs in error, of tails that never had a good one too.
-fn add_log_errors(tails: &mut BTreeMap<String, Tail>, faults: &[LogError]) {
+fn add_log_errors(tails: &mut BTreeMap<String, ReportTailRow>, faults: &[ReportLogErrorRow]) {
     for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
-        tails.entry(name.to_owned()).or_insert_with(|| empty_tail(name)).logs_in_error += 1;
-    }
-}
-
-fn empty_tail(tail_number: &str) -> Tail {
-    Tail {
-        tail_number: tail_number.to_owned(),
-        flights: 0,
-        records: 0,
-        refused: 0,
-        logs_in_error: 0,
-        last_departure_utc: None,
-        last_estimate_utc: None,
+        let new = || ReportTailRow { tail_number: name.to_owned(), ..ReportTailRow::default() };
+        tails.entry(name.to_owned()).or_insert_with(new).logs_in_error += 1;
     }
 }
 
 /// An inspection with the median of the last estimates before it: later estimates may be of another gap.
-fn compared(inspection: &InspectionRow, records: &[FlownRow]) -> Inspection {
+fn compared(inspection: &InspectionRow, row: &TrendRow, records: &[FlownRow]) -> ReportInspectionRow {
     let (estimate_m, estimates) = inspection.estimate_before(records);
-    Inspection {
+    ReportInspectionRow {
+        part_number: row.part_number.clone(),
+        serial_number: row.serial_number.clone(),
         date_utc: inspection.date_utc,
         play_m: inspection.play_m,
+        estimate_m,
+        estimates: estimates as i64,
         instrument: inspection.instrument.clone(),
         force_n: inspection.force_n,
-        estimate_m,
-        estimates,
     }
 }
 
@@ -501,12 +466,12 @@ mod tests {
 
     #[test]
     fn a_log_in_error_belongs_to_the_one_tail_that_its_path_names() {
-        let tails: BTreeMap<String, Tail> =
-            ["N412FP", "N4", "D-ABCD"].map(|name| (name.to_owned(), empty_tail(name))).into();
+        let tails = ["N412FP", "N4", "D-ABCD"].map(|name| (name.to_owned(), ReportTailRow::default())).into();
         let of = |path: &str| {
             let processed_utc = "2026-11-12T00:00:00Z".parse().unwrap();
-            let code = "not_parquet".to_owned();
-            let mut fault = [LogError { log_path: path.to_owned(), tail_number: None, code, processed_utc }];
+            let error_code = "not_parquet".to_owned();
+            let (log_path, tail_number) = (path.to_owned(), None);
+            let mut fault = [ReportLogErrorRow { log_path, tail_number, error_code, processed_utc }];
             attribute_by_path(&mut fault, &tails, &Installations::default());
             fault[0].tail_number.clone()
         };
@@ -517,5 +482,31 @@ mod tests {
         assert_eq!(of("logs/XN412FP/1.parquet"), None);
         assert_eq!(of("logs/N412FP/N4.parquet"), None);
         assert_eq!(of("logs/1.parquet"), None);
+    }
+
+    /// The re-shim of a table and the fall that it explains, and another fall a month later.
+    #[test]
+    fn a_change_and_the_maintenance_that_explains_it_are_one_event() {
+        let change = |kind, day: &str, step_m| ChangePoint {
+            departure_utc: format!("{day}T06:00:00Z").parse().unwrap(),
+            flight_id: None,
+            kind,
+            step_m,
+            step_se_m: 1e-6,
+            certainty: 1.0,
+            tail_wide: false,
+        };
+        let row = TrendRow {
+            change_points: vec![
+                change("recorded", "2026-10-05", 0.0),
+                change("reset", "2026-10-07", -47e-6),
+                change("reset", "2026-11-07", -5e-6),
+            ],
+            ..TrendRow::default()
+        };
+        let shown = events(&row, &[]);
+        let shown: Vec<_> =
+            shown.iter().map(|e| (e.kind.as_str(), e.is_on_record, (e.step_m * 1e6) as i64)).collect();
+        assert_eq!(shown, [("recorded", true, -47), ("reset", false, -5)]);
     }
 }

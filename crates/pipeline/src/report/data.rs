@@ -2,10 +2,7 @@
 
 use ::report::{Page, Report, TimedInterval, UnitView, removal_forecast};
 use parquet::arrow::ArrowWriter;
-use records::report_rows::{
-    ReportFlightRow, ReportGapRow, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow,
-    ReportRemovalsRow, ReportTailRow,
-};
+use records::report_rows::{ReportFlightRow, ReportGapRow};
 use records::row_schema::{Row, to_nullable_batch};
 
 use crate::error::Error;
@@ -16,25 +13,22 @@ use crate::error::Error;
 /// When a table has more rows than a batch can hold.
 pub fn tables(report: &Report) -> Result<Vec<Page>, Error> {
     let units = &report.units;
-    let changes = &report.quantity_changes;
-    let quantities: Vec<_> = each(units, |unit| unit.quantities.iter().map(|view| view.row.clone()));
-    let requests: Vec<_> = each(units, |unit| unit.work_requests.iter().cloned());
     Ok(vec![
-        table("units", &report.trend_rows)?,
+        table("units", &each(units, |unit| [unit.row.clone()]))?,
         table("flights", &each(units, flights))?,
         table("gaps", &each(units, gaps))?,
-        table("quantities", &quantities)?,
-        table("changes", changes)?,
-        table("work_requests", &requests)?,
-        table("past_forecasts", &each(units, past_forecasts))?,
-        table("inspections", &each(units, inspections))?,
-        table("removals", &removals(report))?,
-        table("tails", &tails(report))?,
-        table("log_errors", &log_errors(report))?,
+        table("quantities", &each(units, |unit| unit.quantities.iter().map(|view| view.row.clone())))?,
+        table("changes", &report.quantity_changes)?,
+        table("work_requests", &each(units, |unit| unit.work_requests.clone()))?,
+        table("past_forecasts", &each(units, |unit| unit.past_forecasts.clone()))?,
+        table("inspections", &each(units, |unit| unit.inspections.clone()))?,
+        table("removals", &removal_forecast(report))?,
+        table("tails", &report.tails)?,
+        table("log_errors", &report.log_errors)?,
     ])
 }
 
-fn each<'a, R, I: Iterator<Item = R>>(units: &'a [UnitView], rows: impl Fn(&'a UnitView) -> I) -> Vec<R> {
+fn each<'a, R, I: IntoIterator<Item = R>>(units: &'a [UnitView], rows: impl Fn(&'a UnitView) -> I) -> Vec<R> {
     units.iter().flat_map(rows).collect()
 }
 
@@ -53,8 +47,8 @@ fn table<R: Row>(name: &str, rows: &[R]) -> Result<Page, Error> {
 
 fn flights(unit: &UnitView) -> impl Iterator<Item = ReportFlightRow> {
     unit.flights.iter().map(|flight| ReportFlightRow {
-        part_number: unit.part_number.clone(),
-        serial_number: unit.serial_number.clone(),
+        part_number: unit.row.part_number.clone(),
+        serial_number: unit.row.serial_number.clone(),
         tail_number: flight.tail_number.to_string(),
         position: flight.position.to_string(),
         flight_id: flight.flight_id.to_string(),
@@ -74,8 +68,8 @@ fn flights(unit: &UnitView) -> impl Iterator<Item = ReportFlightRow> {
 fn gaps(unit: &UnitView) -> impl Iterator<Item = ReportGapRow> {
     let row = move |kind| {
         move |at: &TimedInterval| ReportGapRow {
-            part_number: unit.part_number.clone(),
-            serial_number: unit.serial_number.clone(),
+            part_number: unit.row.part_number.clone(),
+            serial_number: unit.row.serial_number.clone(),
             kind,
             at_utc: at.at_utc,
             gap_m: at.m,
@@ -84,65 +78,4 @@ fn gaps(unit: &UnitView) -> impl Iterator<Item = ReportGapRow> {
         }
     };
     unit.level.iter().map(row("level")).chain(unit.forecast.iter().map(row("forecast")))
-}
-
-fn past_forecasts(unit: &UnitView) -> impl Iterator<Item = ReportPastForecastRow> {
-    unit.past_forecasts.iter().map(|past| ReportPastForecastRow {
-        part_number: unit.part_number.clone(),
-        serial_number: unit.serial_number.clone(),
-        as_of_utc: past.as_of_utc,
-        days_ago: past.days_ago,
-        state: past.state.clone(),
-        gap_m: past.gap_m,
-        predicted_m: past.predicted_m,
-        predicted_p05_m: past.predicted_low_m,
-        predicted_p95_m: past.predicted_high_m,
-        found_m: past.found_m,
-    })
-}
-
-fn inspections(unit: &UnitView) -> impl Iterator<Item = ReportInspectionRow> {
-    unit.inspections.iter().map(|inspection| ReportInspectionRow {
-        part_number: unit.part_number.clone(),
-        serial_number: unit.serial_number.clone(),
-        date_utc: inspection.date_utc,
-        play_m: inspection.play_m,
-        estimate_m: inspection.estimate_m,
-        estimates: inspection.estimates as i64,
-        instrument: inspection.instrument.clone(),
-        force_n: inspection.force_n,
-    })
-}
-
-fn removals(report: &Report) -> Vec<ReportRemovalsRow> {
-    let row = |month: ::report::Month| ReportRemovalsRow {
-        month: month.name,
-        expected: month.expected,
-        low: month.low,
-        high: month.high,
-    };
-    removal_forecast(report).into_iter().map(row).collect()
-}
-
-fn tails(report: &Report) -> Vec<ReportTailRow> {
-    let row = |tail: &::report::Tail| ReportTailRow {
-        tail_number: tail.tail_number.clone(),
-        flights: tail.flights as i64,
-        records: tail.records as i64,
-        refused: tail.refused as i64,
-        logs_in_error: tail.logs_in_error as i64,
-        last_departure_utc: tail.last_departure_utc,
-        last_estimate_utc: tail.last_estimate_utc,
-    };
-    report.tails.iter().map(row).collect()
-}
-
-fn log_errors(report: &Report) -> Vec<ReportLogErrorRow> {
-    let row = |error: &::report::LogError| ReportLogErrorRow {
-        log_path: error.log_path.clone(),
-        tail_number: error.tail_number.clone(),
-        error_code: error.code.clone(),
-        processed_utc: error.processed_utc,
-    };
-    report.log_errors.iter().map(row).collect()
 }

@@ -16,8 +16,8 @@ use crate::fleet::parallel_scan::read_each;
 use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 
 /// Columns of numbers that a page shows and no assessment needs.
-const NUMBERS: [&str; 6] =
-    ["unit_hours", "gap_p05_m", "gap_p95_m", "gap_midrange_m", "load_p05_n", "load_p95_n"];
+const NUMBERS: [&str; 7] =
+    ["unit_hours", "gap_p05_m", "gap_p95_m", "gap_midrange_m", "gap_largest_m", "load_p05_n", "load_p95_n"];
 
 /// All flights of all units.
 pub(super) struct StoreContents {

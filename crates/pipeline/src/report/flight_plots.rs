@@ -96,9 +96,9 @@ pub fn draw(
 /// Indices of the units whose flights are drawn, the most urgent first.
 fn by_urgency(report: &Report) -> Vec<usize> {
     let units = &report.units;
-    let mut chosen: Vec<usize> =
-        (0..units.len()).filter(|k| report.scope.is_some() || units[*k].badge().needs_action()).collect();
-    chosen.sort_by_key(|k| (units[*k].badge().rank(), units[*k].assessment.not_before_utc));
+    let is_wanted = |k: &usize| report.scope.is_some() || units[*k].row.action.is_some();
+    let mut chosen: Vec<usize> = (0..units.len()).filter(is_wanted).collect();
+    chosen.sort_by(|a, b| units[*a].row.by_urgency(&units[*b].row));
     chosen
 }
 
@@ -110,8 +110,8 @@ fn log_paths(
 ) -> Result<BTreeMap<(String, String), String>, Error> {
     let Some(first) = unit.flights.get(first) else { return Ok(BTreeMap::new()) };
     let query = Query {
-        serial_number: Some(unit.serial_number.clone()),
-        part_number: unit.part_number.clone(),
+        serial_number: Some(unit.row.serial_number.clone()),
+        part_number: unit.row.part_number.clone(),
         since_utc: Some(first.departure_utc),
         ..Query::default()
     };

@@ -138,10 +138,11 @@ fn all(
         Ok::<(), Error>(())
     };
     report::assets().into_iter().chain(further).try_for_each(put)?;
-    let spreads = report::RateSpreads::of(report);
-    report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &spreads, unit)?))?;
-    report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, tail)?))?;
-    report::part_pages(report)?.into_iter().chain(report::fleet_pages(report)?).try_for_each(put)?;
+    let peers = report::Peers::of(report);
+    report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &peers, unit)?))?;
+    report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, &peers, tail)?))?;
+    let pages = report::part_pages(report, &peers)?.into_iter().chain(report::fleet_pages(report, &peers)?);
+    pages.into_iter().try_for_each(put)?;
     let json = write_json(report, &dir.join("report.json"))?;
     Ok(PublishSummary { files: files.into_inner() + 1, bytes: bytes.into_inner() + json })
 }
@@ -195,36 +196,13 @@ fn failed(path: &Path, source: std::io::Error) -> Error {
 mod tests {
     use super::*;
 
-    fn empty() -> Report {
-        Report {
-            made_utc: jiff::Timestamp::UNIX_EPOCH,
-            program: "Freeplay".to_owned(),
-            store_version: None,
-            scope: None,
-            as_of_utc: None,
-            newest_departure_utc: None,
-            logs_known: 0,
-            check_interval_hours: 300.0,
-            log_errors: Vec::new(),
-            priors: Vec::new(),
-            tails: Vec::new(),
-            units: Vec::new(),
-            inspections_given: false,
-            inspections_unmatched: 0,
-            quantity_changes: Vec::new(),
-            mapping_faults: Vec::new(),
-            notes: Vec::new(),
-            trend_rows: Vec::new(),
-        }
-    }
-
     #[test]
     fn a_folder_with_someone_elses_work_is_left_alone() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         fs::create_dir(&out).unwrap();
         fs::write(out.join("thesis.txt"), "years").unwrap();
-        assert!(matches!(write(&empty(), Vec::new(), &out, &|_| ()), Err(Error::Refused(_))));
+        assert!(matches!(write(&Report::default(), Vec::new(), &out, &|_| ()), Err(Error::Refused(_))));
         assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "years");
     }
 
@@ -232,11 +210,11 @@ mod tests {
     fn a_report_takes_the_place_of_the_one_before_and_leaves_nothing_beside_it() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
-        let first = write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
+        let first = write(&Report::default(), Vec::new(), &out, &|_| ()).unwrap();
         let gone = Page { path: "serial/unit-GONE.html".to_owned(), body: b"old".to_vec() };
-        write(&empty(), vec![gone], &out, &|_| ()).unwrap();
+        write(&Report::default(), vec![gone], &out, &|_| ()).unwrap();
         assert!(out.join("serial/unit-GONE.html").exists());
-        assert_eq!(write(&empty(), Vec::new(), &out, &|_| ()).unwrap(), first);
+        assert_eq!(write(&Report::default(), Vec::new(), &out, &|_| ()).unwrap(), first);
         assert!(out.join("index.html").exists() && !out.join("serial/unit-GONE.html").exists());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
@@ -246,19 +224,19 @@ mod tests {
     fn notes_beside_a_report_are_named_and_stay() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
-        write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
+        write(&Report::default(), Vec::new(), &out, &|_| ()).unwrap();
         for note in ["notes.txt", "serial/notes.txt", "mine/a.html"] {
             let note = out.join(note);
             fs::create_dir_all(note.parent().unwrap()).unwrap();
             fs::write(&note, "years").unwrap();
-            let refused = write(&empty(), Vec::new(), &out, &|_| ());
+            let refused = write(&Report::default(), Vec::new(), &out, &|_| ());
             assert!(matches!(refused, Err(Error::Refused(_))), "{refused:?}");
             assert_eq!(fs::read_to_string(&note).unwrap(), "years");
             fs::remove_file(&note).unwrap();
             let _ = fs::remove_dir(out.join("mine"));
             let _ = fs::remove_file(out.join(MANIFEST));
         }
-        write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
+        write(&Report::default(), Vec::new(), &out, &|_| ()).unwrap();
         assert!(out.join(MANIFEST).exists());
     }
 }

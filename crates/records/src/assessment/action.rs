@@ -1,8 +1,11 @@
 //! What the state of a unit asks for, and until when: one statement for every table, page and message.
 
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
 use jiff::Timestamp;
 
-use crate::assessment::trend_row::TrendRow;
+use crate::assessment::trend_row::{ChangePoint, TrendRow};
 use crate::time::days_between;
 
 /// What a unit's state asks for.
@@ -72,10 +75,12 @@ impl TrendRow {
         self
     }
 
-    /// The date until when, for readers: `now`, `28 Dec`, `348 FH` where no usage is known, or nothing.
+    /// The date until when, for readers: `now`, `28 Dec`, `348 FH` where no usage is known, `open` where a record is missing,
+    /// or nothing.
     pub fn due_text(&self) -> Option<String> {
         let is_now = self.due_utc.is_some_and(|due| due <= self.as_of_utc);
         match (self.action?, self.due_utc, self.crossing_hours_p05) {
+            _ if self.lacks_record() => Some("open".to_owned()),
             _ if is_now => Some("now".to_owned()),
             (_, Some(due), _) => Some(self.day(due)),
             ("inspect", None, Some(hours)) => Some(format!("{hours:.0} FH")),
@@ -83,35 +88,101 @@ impl TrendRow {
         }
     }
 
-    /// What to do, for readers: `replace now`, `inspect before 28 Dec`, `inspect`.
+    /// What to do, for readers: `replace now`, `inspect before 28 Dec`, `confirm and record the repair`, `inspect`.
     pub fn action_text(&self) -> Option<String> {
-        let action = self.action?.replace('_', " ");
+        let action = self.verb()?;
         Some(match self.due_text() {
             Some(due) if due == "now" => format!("{action} now"),
+            Some(due) if due == "open" => action,
             Some(due) if due.ends_with(" FH") => format!("{action} within {due}"),
             Some(due) => format!("{action} before {due}"),
             None => action,
         })
     }
 
+    /// What to do without its date: `replace`, `inspect`, `check logs`, `set limit`, `confirm and record the repair`.
+    pub fn verb(&self) -> Option<String> {
+        let action = self.action?;
+        Some(if self.lacks_record() {
+            "confirm and record the repair".to_owned()
+        } else {
+            action.replace('_', " ")
+        })
+    }
+
+    /// Whether the gap fell as by a repair, and no table has one.
+    fn lacks_record(&self) -> bool {
+        let fell = |change: &ChangePoint| change.kind == "reset" && change.step_m < 0.0 && !change.tail_wide;
+        self.state == Some("watch")
+            && self.reason_code == Some("changed")
+            && self.unexplained_change().is_some_and(fell)
+    }
+
     /// Order of urgency: by state, then by the date until when, then by the hours to the limit.
     pub fn urgency(&self) -> (u8, f64, f64, &str) {
-        let rank = match self.state {
-            Some("act") => 0,
-            Some("plan") => 1,
-            Some("unassessed") => 2,
-            Some("watch") => 3,
-            Some(_) if self.action.is_some() => 4,
-            Some(_) => 5,
-            None => 6,
+        let rank = match state_rank(self.state) {
+            NORMAL_RANK if self.action.is_some() => NORMAL_RANK - 1,
+            rank => rank,
         };
         let due = self.due_utc.map_or(f64::INFINITY, |due| due.as_second() as f64);
         (rank, due, self.crossing_hours_p05.unwrap_or(f64::INFINITY), &self.serial_number)
     }
 
-    /// A date for readers: `28 Dec`, with its year where it is more than 300 days from `as_of_utc`.
-    pub fn day(&self, at: Timestamp) -> String {
-        let is_near = days_between(self.as_of_utc, at).abs() <= 300.0;
-        at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
+    /// Compares two units for a list with the most urgent first.
+    pub fn by_urgency(&self, other: &Self) -> Ordering {
+        self.urgency().partial_cmp(&other.urgency()).unwrap_or(Ordering::Equal)
     }
+
+    /// A date for readers, as seen on `as_of_utc`.
+    pub fn day(&self, at: Timestamp) -> String {
+        day_text(self.as_of_utc, at)
+    }
+}
+
+/// A date for readers: `28 Dec`, with its year where it is more than 300 days from `now`.
+pub fn day_text(now: Timestamp, at: Timestamp) -> String {
+    let is_near = days_between(now, at).abs() <= 300.0;
+    at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
+}
+
+/// Rank of state `normal`; one less is a normal unit with another quantity to inspect.
+const NORMAL_RANK: u8 = 5;
+
+/// Rank of a state by urgency, the most urgent first; a removed unit, which has none, last.
+pub fn state_rank(state: Option<&str>) -> u8 {
+    match state {
+        Some("act") => 0,
+        Some("plan") => 1,
+        Some("unassessed") => 2,
+        Some("watch") => 3,
+        Some(_) => NORMAL_RANK,
+        None => NORMAL_RANK + 1,
+    }
+}
+
+/// What the installed units ask for, counted, the most urgent first: `1 replace now · 2 inspect, the first before 14 Dec · 8
+/// fine`.
+pub fn counts_text<'a>(rows: impl IntoIterator<Item = &'a TrendRow>) -> String {
+    let mut kinds = BTreeMap::<(u8, String), (usize, Option<&TrendRow>)>::new();
+    for row in rows.into_iter().filter(|row| row.removed_utc.is_none()) {
+        let due = row.due_text().unwrap_or_default();
+        let (rank, kind) = match row.verb() {
+            None => (4, "fine".to_owned()),
+            Some(_) if due == "open" => (2, "record missing".to_owned()),
+            Some(verb) if due == "now" => (0, format!("{verb} now")),
+            Some(verb) if row.due_utc.is_some() => (1, verb),
+            Some(verb) => (3, verb),
+        };
+        let (count, first) = kinds.entry((rank, kind)).or_default();
+        *count += 1;
+        *first = first.iter().copied().chain([row]).min_by_key(|row| row.due_utc);
+    }
+    let text = |((rank, kind), (count, first)): ((u8, String), (usize, Option<&TrendRow>))| match first {
+        Some(row) if rank == 1 => {
+            let which = if count == 1 { "" } else { ", the first" };
+            format!("{count} {kind}{which} before {}", row.due_text().unwrap_or_default())
+        }
+        _ => format!("{count} {kind}"),
+    };
+    kinds.into_iter().map(text).collect::<Vec<_>>().join(" · ")
 }

@@ -1,6 +1,7 @@
 //! Rows of assessments: trend of a unit, followed quantities, inspection intervals, tables of a report.
 
 pub mod action;
+pub mod crossing;
 pub mod quantity_row;
 pub mod report_rows;
 pub mod statement;

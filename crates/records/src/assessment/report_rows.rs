@@ -1,6 +1,7 @@
 //! Rows of the tables that `report --data` writes in addition to trends, quantities, changes, intervals and work requests.
 
 use jiff::Timestamp;
+use serde::Serialize;
 
 use crate::row;
 
@@ -64,10 +65,12 @@ row! {
 
 row! {
     /// One aircraft: its data.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct ReportTailRow {
         /// Tail number.
         pub tail_number: String,
+        /// Flights flown until the date of the report; null without a flights table.
+        pub flown: Option<i64>,
         /// Flights with records.
         pub flights: i64,
         /// Records.
@@ -85,13 +88,14 @@ row! {
 
 row! {
     /// A log that could not be read.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, PartialEq, Serialize)]
     pub struct ReportLogErrorRow {
         /// Path of the log.
         pub log_path: String,
         /// Tail number, as far as the log or its path states it.
         pub tail_number: Option<String>,
         /// Error code.
+        #[serde(rename = "code")]
         pub error_code: String,
         /// Time of the attempt.
         pub processed_utc: Timestamp,
@@ -100,7 +104,7 @@ row! {
 
 row! {
     /// An inspection, and the estimate to compare with it.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, PartialEq, Serialize)]
     pub struct ReportInspectionRow {
         /// Part number of the unit.
         pub part_number: Option<String>,
@@ -121,9 +125,16 @@ row! {
     }
 }
 
+impl ReportInspectionRow {
+    /// Estimate less inspection, m.
+    pub fn difference_m(&self) -> Option<f64> {
+        self.estimate_m.map(|estimate_m| estimate_m - self.play_m)
+    }
+}
+
 row! {
     /// A forecast that was made for the date of the report, and the gap found.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, PartialEq, Serialize)]
     pub struct ReportPastForecastRow {
         /// Part number of the unit.
         pub part_number: Option<String>,
@@ -138,19 +149,29 @@ row! {
         /// Gap at that date, m.
         pub gap_m: f64,
         /// Forecast for the date of the report, m: median.
+        #[serde(rename = "foreseen_m")]
         pub predicted_m: f64,
         /// Its 5 % bound, m.
+        #[serde(rename = "foreseen_low_m")]
         pub predicted_p05_m: f64,
         /// Its 95 % bound, m.
+        #[serde(rename = "foreseen_high_m")]
         pub predicted_p95_m: f64,
         /// Gap found on the date of the report, m.
         pub found_m: f64,
     }
 }
 
+impl ReportPastForecastRow {
+    /// Whether the gap found lies within the interval of the forecast.
+    pub fn held(&self) -> bool {
+        (self.predicted_p05_m..=self.predicted_p95_m).contains(&self.found_m)
+    }
+}
+
 row! {
     /// Expected removals of the fleet in a month.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, PartialEq, Serialize)]
     pub struct ReportRemovalsRow {
         /// Month, `YYYY-MM`.
         pub month: String,

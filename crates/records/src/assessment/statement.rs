@@ -8,6 +8,10 @@ impl TrendRow {
     /// reason with its evidence, [`TrendRow::caveats`] what limits the trust in it.
     pub fn why_text(&self) -> String {
         let whole = || self.reason.clone().unwrap_or_default();
+        if let Some(removed) = self.removed_utc {
+            let last = self.gap_m.map_or_else(String::new, |gap_m| format!("; last {:.1} µm", 1e6 * gap_m));
+            return format!("removed {}{last}", self.day(removed));
+        }
         match self.reason_code {
             Some("above_limit") => self.of_limit(self.over_since_text()),
             Some("limit_held") => self.of_limit(Some("not yet two records below".to_owned())),
@@ -56,7 +60,7 @@ impl TrendRow {
     }
 
     /// The last change of the gap that neither wear nor the books explain.
-    fn unexplained_change(&self) -> Option<&ChangePoint> {
+    pub(crate) fn unexplained_change(&self) -> Option<&ChangePoint> {
         self.change_points.iter().rev().find(|change| matches!(change.kind, "step" | "reset" | "onset"))
     }
 
@@ -112,6 +116,7 @@ mod tests {
     use jiff::Timestamp;
 
     use super::percent;
+    use crate::assessment::action::{Action, counts_text};
     use crate::row_schema::NoColumn;
     use crate::{ChangePoint, TrendRow};
 
@@ -164,7 +169,9 @@ mod tests {
             ..row("watch", "changed")
         };
         let still = TrendRow { rate_m_per_hour: Some(-1e-12), ..row("normal", "clear") };
+        let gone = TrendRow { removed_utc: Some(at("2026-09-29")), state: None, ..still.clone() };
         let cases = [
+            (&gone, "removed 29 Sep; last 159.1 µm", None),
             (&over, "159.1 of 180.0 µm, over since 6 Nov", Some("87 % over now")),
             (
                 &soon,
@@ -179,6 +186,23 @@ mod tests {
         for (row, why, chance) in cases {
             assert_eq!((row.why_text().as_str(), row.chance_text().as_deref()), (why, chance));
         }
+    }
+
+    /// A unit that was removed is never counted.
+    #[test]
+    fn the_installed_units_are_counted_by_what_they_ask_for() {
+        let fell = TrendRow {
+            change_points: vec![change("reset", "2026-10-07", -37.0e-6)],
+            ..row("watch", "changed")
+        };
+        let due = |day: &str| TrendRow { not_before_utc: Some(at(day)), ..row("plan", "crosses_soon") };
+        let removed = TrendRow { state: None, removed_utc: Some(at("2026-09-29")), ..TrendRow::default() };
+        let rows = [due("2026-12-28"), row("normal", "clear"), fell, due("2026-12-14"), removed];
+        let rows = rows.map(|row| row.with_action(Action::Replace));
+        assert_eq!(counts_text(&rows), "2 inspect, the first before 14 Dec · 1 record missing · 1 fine");
+        assert_eq!(rows[2].action_text().as_deref(), Some("confirm and record the repair"));
+        let over = row("act", "above_limit").with_action(Action::Replace);
+        assert_eq!(counts_text([&over, &rows[3]]), "1 replace now · 1 inspect before 14 Dec");
     }
 
     #[test]

@@ -1,22 +1,21 @@
 //! Diagnostic plot of one estimate: measured channels, filter output and the fitted contact flanks.
 
 use askama::Template;
-use plotters::prelude::*;
 
-use crate::charts::axes::{Area, Axes, Chart, DrawError, INK, picture};
+use crate::charts::frame::{Frame, PEER};
 use crate::page::Error;
 
-const FAINT: RGBColor = RGBColor(0x9A, 0xA5, 0xB1);
-const UPPER: RGBColor = RGBColor(0xC8, 0x52, 0x00);
-const LOWER: RGBColor = RGBColor(0x1F, 0x6F, 0xB2);
-const GAP: RGBColor = RGBColor(0x22, 0x22, 0x22);
+const FAINT: &str = "#9AA5B1";
+const UPPER: &str = "#C85200";
+const LOWER: &str = "#1F6FB2";
+const GAP: &str = r##"fill="none" stroke="#222222" stroke-width="2""##;
 
 /// Size of one actuator's plot, pixels.
-const SIZE: (u32, u32) = (1280, 640);
+const SIZE: [f64; 2] = [1280.0, 640.0];
 /// Height of its heading, pixels.
-const HEADING: u32 = 46;
+const HEADING: f64 = 46.0;
 /// Width of the plots against time, pixels.
-const TIME_PLOTS_WIDTH: u32 = 800;
+const TIME_PLOTS_WIDTH: f64 = 800.0;
 /// Maximum number of points of a curve over time: two per pixel.
 const MAX_POINTS: usize = 1400;
 /// Maximum number of contact intervals drawn; above it, every n-th.
@@ -70,22 +69,20 @@ pub struct ContactInterval {
 }
 
 /// Draws all estimates into one SVG, one below the other.
-///
-/// # Errors
-/// If the plot cannot be drawn.
-pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> Result<String, Error> {
-    let count = plots.len().max(1);
-    picture((SIZE.0, SIZE.1 * count as u32), |root| {
-        root.fill(&WHITE)?;
-        root.split_evenly((count, 1)).iter().zip(plots).try_for_each(|(area, plot)| draw_one(area, plot))
-    })
+pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> String {
+    let (width, height) = (SIZE[0], SIZE[1] * plots.len().max(1) as f64);
+    let all = plots.iter().enumerate().map(|(k, plot)| stacked(plot, SIZE[1] * k as f64));
+    format!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}"><rect width="{width}" height="{height}" fill="white"/>{}</svg>"#,
+        all.collect::<String>()
+    )
 }
 
 /// Writes a self-contained HTML page: each plot, and its curves as data to hover over and zoom into. `back` is the
 /// address and the name of the page that leads here.
 ///
 /// # Errors
-/// If a plot cannot be drawn or the page cannot be rendered.
+/// If the page cannot be rendered.
 pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) -> Result<String, Error> {
     let sections = plots
         .iter()
@@ -93,8 +90,8 @@ pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) ->
             Ok(Section {
                 title: &plot.title,
                 summary: &plot.summary,
-                over_time: part_svg(TIME_PLOTS_WIDTH, plot, draw_over_time)?,
-                flanks: part_svg(SIZE.0 - TIME_PLOTS_WIDTH, plot, draw_flanks)?,
+                over_time: over_time(plot),
+                flanks: flanks(plot),
                 data: data(plot)?,
             })
         })
@@ -156,123 +153,101 @@ fn data(plot: &EstimatePlot) -> Result<String, Error> {
     }))?)
 }
 
-fn draw_one(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
-    let (heading, body) = area.split_vertically(HEADING);
-    let line = |text: &str, size: u32, y: i32| {
-        heading.draw(&Text::new(text.to_owned(), (14, y), ("sans-serif", size).into_font().color(&INK)))
-    };
-    line(&plot.title, 17, 8)?;
-    line(&plot.summary, 13, 30)?;
-    let (timed, flanks) = body.split_horizontally(TIME_PLOTS_WIDTH);
-    draw_over_time(&timed, plot)?;
-    draw_flanks(&flanks, plot)
+/// Heading, curves over time and flanks of a plot, `top` px below the upper edge of the picture.
+fn stacked(plot: &EstimatePlot, top: f64) -> String {
+    let mut heading = Frame::new([SIZE[0], SIZE[1]], [HEADING, 0.0, 0.0, 0.0], 0.0..1.0, 0.0..1.0);
+    heading.text((0.0, 1.0), [14.0, -26.0], "start", &plot.title);
+    heading.text((0.0, 1.0), [14.0, -6.0], "start", &plot.summary);
+    heading.put(0.0, HEADING, &over_time(plot));
+    heading.put(TIME_PLOTS_WIDTH, HEADING, &flanks(plot));
+    heading.finish(&format!(r#"y="{top}""#))
 }
 
 /// Draws positions and load, one above the other.
-fn draw_over_time(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
-    let (positions, load) = area.split_vertically((SIZE.1 - HEADING) * 2 / 3);
+fn over_time(plot: &EstimatePlot) -> String {
+    let height = SIZE[1] - HEADING;
     let end_s = plot.time_s(plot.s_m.len() as f64).max(1.0);
-    draw_positions(&positions, plot, end_s)?;
-    draw_load(&load, plot, end_s)
-}
-
-/// One part of a plot as an SVG picture of its own.
-fn part_svg(
-    width: u32,
-    plot: &EstimatePlot,
-    part: fn(&Area<'_>, &EstimatePlot) -> Result<(), DrawError>,
-) -> Result<String, Error> {
-    picture((width, SIZE.1 - HEADING), |root| {
-        root.fill(&WHITE)?;
-        part(root, plot)
-    })
+    let mut both = Frame::new([TIME_PLOTS_WIDTH, height], [0.0; 4], 0.0..1.0, 0.0..1.0);
+    both.put(0.0, 0.0, &positions(plot, end_s, [TIME_PLOTS_WIDTH, height * 2.0 / 3.0]));
+    both.put(0.0, height * 2.0 / 3.0, &load(plot, end_s, [TIME_PLOTS_WIDTH, height / 3.0]));
+    both.finish("")
 }
 
 /// Draws δX, S(t) with both means, and the contact intervals as marks at the lower edge.
-fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<(), DrawError> {
+fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
     let (low, high) = span(plot.dx_m.iter().chain(&plot.s_m).map(|v| to_um(*v)));
     let floor = low - 0.06 * (high - low);
-    let mut chart =
-        axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ["", "backlash S, δX [µm]"])?;
+    let mut frame = axes(size, (0.0, end_s), (floor - 0.04 * (high - low), high));
+    frame.numbers(8, "");
     let curve = |values: &[f64]| curve(values, |at| plot.time_s(at), to_um);
-    for piece in curve(&plot.dx_m) {
-        chart.draw_series(LineSeries::new(piece, FAINT))?;
-    }
-    for piece in curve(&plot.s_m) {
-        chart.draw_series(LineSeries::new(piece, GAP.stroke_width(2)))?;
-    }
+    curve(&plot.dx_m).into_iter().for_each(|piece| frame.line(piece, PEER));
+    curve(&plot.s_m).into_iter().for_each(|piece| frame.line(piece, GAP));
     if let Some((upper, lower)) = plot.bounds_m {
         for (bound, colour) in [(upper, UPPER), (lower, LOWER)] {
-            let ends = [(0.0, to_um(bound)), (end_s, to_um(bound))];
-            chart.draw_series(DashedLineSeries::new(ends, 8, 4, colour.stroke_width(2)))?;
+            let pen = format!(r#"stroke="{colour}" stroke-width="2" stroke-dasharray="8 4""#);
+            frame.line([(0.0, to_um(bound)), (end_s, to_um(bound))], &pen);
         }
     }
-    let marks = downsampled(&plot.contacts).map(|s| {
-        let y = if s.is_upper { floor } else { floor - 0.025 * (high - low) };
-        Circle::new((s.time_s, y), 1, colour(s).filled())
-    });
-    chart.draw_series(marks)?;
-    legend(
-        area,
-        &[("δX", FAINT), ("S(t)", GAP), ("upper mean, contact", UPPER), ("lower mean, contact", LOWER)],
-    )
+    for contact in downsampled(&plot.contacts) {
+        let y = if contact.is_upper { floor } else { floor - 0.025 * (high - low) };
+        frame.dot((contact.time_s, y), 1.0, &format!(r#"fill="{}""#, colour(contact)), "");
+    }
+    let legend = [
+        ("backlash S, δX [µm]:", "#1C2530"),
+        ("δX", FAINT),
+        ("S(t)", "#222222"),
+        ("upper mean, contact", UPPER),
+        ("lower mean, contact", LOWER),
+    ];
+    let mut x = 62.0;
+    for (name, colour) in legend {
+        frame.coloured_text([x, 14.0], colour, name);
+        x += 20.0 + 7.0 * name.chars().count() as f64;
+    }
+    frame.finish("")
 }
 
-fn draw_load(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<(), DrawError> {
+fn load(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let kn = |v: f64| v / 1e3;
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
-    let mut chart = axes(area, (0.0, end_s), (low, high), ["time [s]", "load [kN]"])?;
-    for piece in curve(&plot.load_n, |at| plot.time_s(at), kn) {
-        chart.draw_series(LineSeries::new(piece, INK))?;
-    }
-    Ok(())
+    let mut frame = axes(size, (0.0, end_s), (low, high));
+    frame.numbers(8, "time [s]");
+    let curves = curve(&plot.load_n, |at| plot.time_s(at), kn);
+    curves.into_iter().for_each(|piece| frame.line(piece, r##"fill="none" stroke="#1C2530""##));
+    frame.coloured_text([62.0, 14.0], "#1C2530", "load [kN]");
+    frame.finish("")
 }
 
 /// Draws δX against the coupling force with the fitted flanks; samples that the fit did not use are faint.
-fn draw_flanks(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
+fn flanks(plot: &EstimatePlot) -> String {
     let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
     let (low, high) = span(plot.contacts.iter().map(|s| to_um(s.dx_m)));
     let (left, right) = span(plot.contacts.iter().map(|s| s.force_n / 1e3));
-    let mut chart = axes(area, (left, right), (low, high), ["coupling force [kN]", "corrected δX [µm]"])?;
-    let marks = |is_used: bool| {
-        let which = downsampled(&plot.contacts).filter(move |s| s.is_used == is_used);
-        which.map(move |s| {
-            let style = if s.is_used { colour(s).mix(0.55) } else { FAINT.mix(0.6) };
-            Circle::new((s.force_n / 1e3, to_um(s.dx_m)), 2, style.filled())
-        })
-    };
-    chart.draw_series(marks(false))?;
-    chart.draw_series(marks(true))?;
+    let mut frame = axes([SIZE[0] - TIME_PLOTS_WIDTH, SIZE[1] - HEADING], (left, right), (low, high));
+    frame.numbers(6, "coupling force [kN]");
+    for is_used in [false, true] {
+        for contact in downsampled(&plot.contacts).filter(|contact| contact.is_used == is_used) {
+            let fill = if is_used { colour(contact) } else { FAINT };
+            let fill = format!(r#"fill="{fill}" fill-opacity="0.55""#);
+            frame.dot((contact.force_n / 1e3, to_um(contact.dx_m)), 2.0, &fill, "");
+        }
+    }
     for flank in &plot.flanks {
-        let line = flank.iter().map(|(force_n, dx_m)| (force_n / 1e3, to_um(*dx_m)));
-        chart.draw_series(LineSeries::new(line, GAP.stroke_width(2)))?;
+        frame.line(flank.iter().map(|(force_n, dx_m)| (force_n / 1e3, to_um(*dx_m))), GAP);
     }
-    if plot.contacts.is_empty() {
-        let style = ("sans-serif", 14).into_font().color(&INK);
-        area.draw(&Text::new("no contact found", (150, 240), style))?;
-    }
-    Ok(())
+    let heading = if plot.contacts.is_empty() { "no contact found" } else { "corrected δX [µm]" };
+    frame.coloured_text([62.0, 14.0], "#1C2530", heading);
+    frame.finish("")
 }
 
-fn axes<'a>(area: &Area<'a>, x: (f64, f64), y: (f64, f64), names: [&str; 2]) -> Result<Chart<'a>, DrawError> {
-    // The legend lies above the chart.
-    let area = area.margin(12, 0, 0, 0);
-    Axes { x: x.0..x.1, y: y.0..y.1, names, margins: [10, 36, 62], text_px: 12, dates: None }.draw(&area)
+fn axes(size: [f64; 2], x: (f64, f64), y: (f64, f64)) -> Frame {
+    let mut frame = Frame::new(size, [22.0, 10.0, 26.0, 62.0], x.0..x.1, y.0..y.1);
+    frame.grid(6);
+    frame
 }
 
-/// Draws the legend above the chart.
-fn legend(area: &Area<'_>, entries: &[(&str, RGBColor)]) -> Result<(), DrawError> {
-    let mut x = 76;
-    for (name, colour) in entries {
-        area.draw(&Rectangle::new([(x, 9), (x + 14, 13)], colour.filled()))?;
-        area.draw(&Text::new((*name).to_owned(), (x + 19, 4), ("sans-serif", 12).into_font().color(&INK)))?;
-        x += 40 + 7 * name.chars().count() as i32;
-    }
-    Ok(())
-}
-
-fn colour(contact: &ContactInterval) -> RGBColor {
+fn colour(contact: &ContactInterval) -> &'static str {
     if contact.is_upper { UPPER } else { LOWER }
 }
 
@@ -398,7 +373,7 @@ mod tests {
 
     #[test]
     fn foreign_text_is_never_markup() {
-        for text in [estimate_plot_svg(&[plot()]).unwrap(), estimate_plot_html(&[plot()], None).unwrap()] {
+        for text in [estimate_plot_svg(&[plot()]), estimate_plot_html(&[plot()], None).unwrap()] {
             assert!(!text.contains("<script>alert"), "escaped");
             assert!(text.contains("&#60;script&#62;alert") || text.contains("&lt;script&gt;alert"));
         }

@@ -1,35 +1,35 @@
-//! Static plot of a unit's history, for readers without scripts and for print; CSS recolours it in dark mode.
+//! Chart of a unit: flights, smoothed gap, forecast, limits, inspections, maintenance and peers.
 
-use jiff::Timestamp;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use jiff::{SignedDuration, Timestamp};
 use records::time::DAY_S;
 
-use crate::charts::axes::{Axes, Chart, DATA, DrawError, INK, PLAN, day, picture, thinned};
+use crate::charts::frame::{BAR, DATA, Frame, GRID, INK, LIMIT, PEER, PLAN, THIN, WATCH, day, thinned};
+use crate::format::{date, micrometres};
 use crate::model::{FlightRow, TimedInterval, UnitView};
-use crate::page::Error;
+use crate::stats::peers::Peers;
 
-const WATCH: RGBColor = RGBColor(0xD9, 0xA9, 0x00);
-const ACT: RGBColor = RGBColor(0x7A, 0x00, 0x44);
-
-/// Maximum number of points in the plot; above it, each point is the mean of neighbouring flights.
+/// Maximum number of points in the chart; above it, each point is the mean of neighbouring flights.
 const MAX_POINTS: usize = 120;
+/// Least distance of two labels of events, as a share of the width.
+const LABEL_SHARE: f64 = 0.14;
 
-type DrawResult = Result<(), DrawError>;
-/// Day, and 5 %, median and 95 % of a gap, µm.
-type BandPoint = [f64; 4];
-
-/// Until when the forecast is drawn: the median crossing, or the latest one where it is not much later; a fifth more.
-/// Nothing beyond serves a plan.
+/// Until when the forecast is drawn: the latest date on which the limit is reached, where it is at most three times as far
+/// away as the likely one; else a fifth more than the likely one.
 pub(crate) fn forecast_end(unit: &UnitView) -> Option<Timestamp> {
-    let s = &unit.assessment;
-    let whole = unit.forecast.last()?.at_utc;
-    let start = unit.forecast.first()?.at_utc;
-    let Some(likely) = s.likely_utc.filter(|likely| *likely > start) else { return Some(whole) };
-    let ahead_s = likely.duration_since(start).as_secs_f64();
-    let latest_s = s.not_after_utc.map_or(f64::INFINITY, |latest| latest.duration_since(start).as_secs_f64());
-    let shown_s = 1.2 * if latest_s <= 2.0 * ahead_s { latest_s } else { ahead_s };
-    Some((start + jiff::SignedDuration::from_secs(shown_s.max(30.0 * DAY_S) as i64)).min(whole))
+    let (start, whole) = (unit.forecast.first()?.at_utc, unit.forecast.last()?.at_utc);
+    let ahead_s = |at: Timestamp| at.duration_since(start).as_secs_f64();
+    let Some(likely_s) = unit.row.likely_utc.map(ahead_s).filter(|ahead_s| *ahead_s > 0.0) else {
+        return Some(whole);
+    };
+    let latest_s = unit.row.not_after_utc.map(ahead_s).filter(|latest_s| *latest_s <= 3.0 * likely_s);
+    let shown_s = latest_s.map_or(1.2 * likely_s, |latest_s| 1.05 * latest_s).max(30.0 * DAY_S);
+    Some((start + SignedDuration::from_secs(shown_s as i64)).min(whole))
+}
+
+/// Whether the chart shows when the limit is reached.
+pub(crate) fn shows_crossing(unit: &UnitView) -> bool {
+    let is_ahead = unit.row.crossing_hours_p05.is_some_and(|hours| hours > 0.0);
+    is_ahead && unit.row.not_before_utc.is_some_and(|from| Some(from) <= forecast_end(unit))
 }
 
 /// The forecast as far as it is drawn.
@@ -38,112 +38,136 @@ pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<TimedInterval> {
     unit.forecast.iter().filter(|f| end.is_none_or(|end| f.at_utc <= end)).copied().collect()
 }
 
-/// Draws gap against date: flights with error bars, smoothed level, limits, forecast band and events.
-pub(crate) fn history(unit: &UnitView) -> Result<String, Error> {
-    let points = thinned(&estimated(unit), MAX_POINTS);
-    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(String::new()) };
-    let span = (last[0] - first[0]).max(10.0);
-    let end = forecast_end(unit).map_or(last[0], day).max(last[0]);
-    let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6);
-    let limit = unit.assessment.limit_m.map(|l| l * 1e6);
-    // A forecast far above the limit would squeeze the flights into the bottom of the plot.
-    let ahead = ahead.fold(0.0, f64::max).min(limit.map_or(f64::INFINITY, |l| 1.15 * l));
-    let top = points.iter().map(|p| p[3]).chain(limit).fold(ahead.max(1.0), f64::max) * 1.04;
-    let lowest = points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-    let bottom = (lowest - 0.2 * (top - lowest)).max(lowest.min(0.0));
-    let (x, y) = ((first[0] - 0.02 * span, end + 0.02 * span), (bottom, top));
-    let axes = Axes {
-        x: x.0..x.1,
-        y: y.0..y.1,
-        names: ["", "Gap [µm]"],
-        margins: [8, 28, 48],
-        text_px: 13,
-        dates: Some([7, 11]),
-    };
-    picture((860, 340), |root| {
-        let mut chart = axes.draw(root)?;
-        draw_flights(&mut chart, &points)?;
-        draw_band(&mut chart, &band_points(&unit.level), y, INK, false)?;
-        draw_band(&mut chart, &band_points(&drawn_forecast(unit)), y, PLAN, true)?;
-        draw_lines(&mut chart, unit, x, y)
-    })
+/// Draws gap against date as an SVG picture; an empty string for a unit without an estimate.
+pub(crate) fn history(unit: &UnitView, peers: &Peers<'_>) -> String {
+    let all: Vec<[f64; 4]> = unit.flights.iter().filter_map(point).collect();
+    let points = thinned(&all, MAX_POINTS);
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return String::new() };
+    let mut frame = frame(unit, peers, &points, first[0], last[0]);
+    frame.grid(5);
+    frame.dates(8);
+    let forecast = drawn_forecast(unit);
+    frame.clipped(|frame| {
+        for peer in peers.curves(unit) {
+            frame.line(peer.iter().map(|[at, gap_um]| (*at, *gap_um)), PEER);
+        }
+        draw_band(frame, &unit.level, r##"fill="#1C2530""##, INK);
+        draw_band(frame, &forecast, r##"fill="#C85200""##, &format!(r#"{PLAN} stroke-dasharray="6 4""#));
+        for [at, low, _, high] in &points {
+            frame.line([(*at, *low), (*at, *high)], BAR);
+        }
+    });
+    draw_limits(&mut frame, unit);
+    draw_events(&mut frame, unit);
+    let names = (all.len() == points.len()).then(|| unit.flights.iter().filter(|f| f.gap_m.is_some()));
+    let mut names = names.into_iter().flatten();
+    for [at, low, gap, high] in points {
+        let name = names.next().map(|f| format!("{} {}: ", date(f.departure_utc), f.flight_id));
+        let title = format!("{}{gap:.1} µm ({low:.1} to {high:.1})", name.unwrap_or_default());
+        frame.dot((at, gap), 3.5, DATA, &title);
+    }
+    draw_inspections(&mut frame, unit);
+    frame.finish("")
 }
 
-fn draw_flights(chart: &mut Chart<'_>, points: &[BandPoint]) -> DrawResult {
-    let bars = points.iter().map(|p| PathElement::new(vec![(p[0], p[1]), (p[0], p[3])], DATA));
-    chart.draw_series(bars)?;
-    chart.draw_series(points.iter().map(|p| Circle::new((p[0], p[2]), 3, DATA.filled()))).map(drop)
+/// Scales that hold flights, limits, inspections, and the forecast up to a little above the limit.
+fn frame(unit: &UnitView, peers: &Peers<'_>, points: &[[f64; 4]], first: f64, last: f64) -> Frame {
+    let today = day(unit.row.as_of_utc).min(last + 400.0);
+    let end = forecast_end(unit).map_or(today, day).max(last).max(today);
+    let span = (end - first).max(14.0);
+    let limit = unit.row.limit_m.map(|limit_m| limit_m * 1e6);
+    let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6).fold(0.0, f64::max);
+    let ahead = ahead.min(limit.map_or(f64::INFINITY, |limit| 1.1 * limit));
+    let shown = unit.inspections.iter().map(|check| check.play_m * 1e6);
+    let highest =
+        points.iter().map(|p| p[3]).chain(limit).chain(shown.clone()).fold(ahead.max(1.0), f64::max);
+    let peers = peers.curves(unit).flatten().map(|[_, gap_um]| *gap_um);
+    let lowest = points.iter().map(|p| p[1]).chain(shown).chain(peers).fold(f64::INFINITY, f64::min);
+    let room = 0.08 * (highest - lowest.min(0.8 * highest));
+    let bottom = (lowest - 2.0 * room).max(lowest.min(0.0));
+    let (x, y) = (first - 0.09 * span..first + 1.02 * span, bottom..highest + 1.5 * room);
+    Frame::new([900.0, 440.0], [26.0, 6.0, 34.0, 6.0], x, y)
 }
 
-/// Draws a band and its median, clipped to the plot.
-fn draw_band(
-    chart: &mut Chart<'_>,
-    band: &[BandPoint],
-    y: (f64, f64),
-    colour: RGBColor,
-    dashed: bool,
-) -> DrawResult {
-    let edge = band.iter().map(|p| (p[0], p[3])).chain(band.iter().rev().map(|p| (p[0], p[1])));
-    let edge: Vec<(f64, f64)> = edge.map(|(d, gap)| (d, gap.clamp(y.0, y.1))).collect();
-    chart.draw_series([Polygon::new(edge, colour.mix(0.18))])?;
-    let middle = band.iter().map(|p| (p[0], p[2])).take_while(|p| p.1 <= y.1);
-    if dashed {
-        chart.draw_series(DashedLineSeries::new(middle, 6, 4, colour.stroke_width(2))).map(drop)
-    } else {
-        chart.draw_series(LineSeries::new(middle, colour.stroke_width(2))).map(drop)
+fn draw_band(frame: &mut Frame, band: &[TimedInterval], fill: &str, pen: &str) {
+    let um = |m: f64| m * 1e6;
+    let edges: Vec<[f64; 3]> = band.iter().map(|b| [day(b.at_utc), um(b.p05_m), um(b.p95_m)]).collect();
+    if !edges.is_empty() {
+        frame.band(&edges, fill);
+        frame.line(band.iter().map(|b| (day(b.at_utc), um(b.m))), pen);
     }
 }
 
-/// Draws limits as horizontal and events as vertical lines.
-fn draw_lines(chart: &mut Chart<'_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
-    let s = &unit.assessment;
-    for (name, limit, colour) in [("watch", s.watch_m, WATCH), ("act limit", s.limit_m, ACT)] {
-        // A level outside the plot would be drawn along its edge.
-        let level = limit.map(|l| l * 1e6).filter(|l| (y.0..y.1).contains(l));
+/// Draws both limits with their names, the crossing as a bar on the limit with its median as a mark, and today.
+fn draw_limits(frame: &mut Frame, unit: &UnitView) {
+    let row = &unit.row;
+    for (name, limit_m, pen) in [("watch", unit.watch_m, WATCH), ("limit", row.limit_m, LIMIT)] {
+        let level = limit_m.map(|limit_m| limit_m * 1e6).filter(|level| frame.y.contains(level));
         let Some(level) = level else { continue };
-        chart.draw_series(LineSeries::new([(x.0, level), (x.1, level)], colour.stroke_width(2)))?;
+        frame.horizontal(level, pen);
         let text = format!("{name} {level:.0} µm");
-        let style = ("sans-serif", 12).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Bottom));
-        chart.draw_series([Text::new(text, (x.0 + 0.005 * (x.1 - x.0), level), style)])?;
+        // At the right end of the limit is the crossing.
+        if name == "limit" {
+            frame.text((frame.x.start, level), [62.0, -5.0], "start", text);
+        } else {
+            frame.text((frame.x.end, level), [-4.0, -5.0], "end", text);
+        }
     }
-    draw_crossing(chart, unit, x, y)?;
-    for event in unit.events.iter().map(|e| day(e.departure_utc)).filter(|d| (x.0..x.1).contains(d)) {
-        chart.draw_series(LineSeries::new([(event, y.0), (event, y.1)], PLAN))?;
+    let today = day(row.as_of_utc);
+    if frame.x.contains(&today) {
+        frame.vertical(today, THIN);
+        frame.text((today, frame.y.start), [-4.0, -5.0], "end", "today");
     }
-    Ok(())
-}
-
-/// Draws the day of the assessment, and the crossing: its 90 % interval as a bar on the limit, its median as a mark.
-fn draw_crossing(chart: &mut Chart<'_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
-    let s = &unit.assessment;
-    if let Some(today) = unit.forecast.first().map(|f| day(f.at_utc)).filter(|d| (x.0..x.1).contains(d)) {
-        chart.draw_series(DashedLineSeries::new([(today, y.0), (today, y.1)], 2, 3, INK.stroke_width(1)))?;
-        let style = ("sans-serif", 12).into_font().color(&INK).pos(Pos::new(HPos::Right, VPos::Bottom));
-        chart.draw_series([Text::new("today ", (today, y.0), style)])?;
+    let limit = row.limit_m.map(|limit_m| limit_m * 1e6).filter(|limit| frame.y.contains(limit));
+    let is_ahead = row.crossing_hours_p05.is_some_and(|hours| hours > 0.0);
+    let (Some(limit), Some(earliest)) = (limit.filter(|_| is_ahead), row.not_before_utc) else { return };
+    let (from, end) = (day(earliest), frame.x.end);
+    if from < end {
+        let until = row.not_after_utc.map_or(end, day).min(end);
+        frame.line([(from, limit), (until, limit)], &PLAN.replace("\"2\"", "\"7\""));
     }
-    let Some(limit) = s.limit_m.map(|l| l * 1e6).filter(|l| (y.0..y.1).contains(l)) else { return Ok(()) };
-    let Some(from) = s.not_before_utc.map(day).filter(|d| *d < x.1) else { return Ok(()) };
-    let until = s.not_after_utc.map_or(x.1, day).min(x.1);
-    chart.draw_series([PathElement::new(
-        vec![(from.max(x.0), limit), (until, limit)],
-        PLAN.stroke_width(6),
-    )])?;
-    if let Some(likely) = s.likely_utc.map(day).filter(|d| (x.0..x.1).contains(d)) {
-        chart.draw_series([Circle::new((likely, limit), 5, PLAN.filled())])?;
+    if let Some(likely) = row.likely_utc.map(day).filter(|likely| *likely < end) {
+        frame.dot((likely, limit), 6.0, r##"fill="#C85200""##, "");
     }
-    Ok(())
-}
-
-fn band_points(band: &[TimedInterval]) -> Vec<BandPoint> {
-    band.iter().map(|b| [day(b.at_utc), b.p05_m * 1e6, b.m * 1e6, b.p95_m * 1e6]).collect()
-}
-
-/// The flights with an estimate.
-fn estimated(unit: &UnitView) -> Vec<BandPoint> {
-    let point = |f: &FlightRow| {
-        let gap = f.gap_m?;
-        let (low, high) = (f.gap_p05_m.unwrap_or(gap), f.gap_p95_m.unwrap_or(gap));
-        Some([day(f.departure_utc), low * 1e6, gap * 1e6, high * 1e6])
+    // A date that lies outside, or is not known.
+    let beyond = match row.not_after_utc {
+        _ if from >= end => format!("5 % by {} →", row.day(earliest)),
+        Some(latest) if day(latest) > end => format!("95 % by {} →", row.day(latest)),
+        None => "95 % later →".to_owned(),
+        Some(_) => return,
     };
-    unit.flights.iter().filter_map(point).collect()
+    frame.text((end, limit), [-4.0, 17.0], "end", beyond);
+}
+
+/// Draws maintenance, installations and changes as vertical lines, with a label where there is room.
+fn draw_events(frame: &mut Frame, unit: &UnitView) {
+    let changes = unit.events.iter().filter(|event| !event.kind.starts_with("exceedance"));
+    let changes = changes.map(|event| (event.departure_utc, event.word(), PLAN));
+    let installed = unit.installations.iter().map(|of| (of.installed_utc, "installed", GRID));
+    let mut events: Vec<_> =
+        changes.chain(installed).filter(|(at, ..)| frame.x.contains(&day(*at))).collect();
+    events.sort_by_key(|(at, ..)| *at);
+    let mut free_from = frame.x.start;
+    for (at, word, pen) in events {
+        frame.vertical(day(at), &pen.replace("\"2\"", "\"1\""));
+        if day(at) >= free_from {
+            frame.text((day(at), frame.y.end), [2.0, -8.0], "start", format!("↓ {word}"));
+            free_from = day(at) + LABEL_SHARE * (frame.x.end - frame.x.start);
+        }
+    }
+}
+
+fn draw_inspections(frame: &mut Frame, unit: &UnitView) {
+    let shown = frame.x.clone();
+    for check in unit.inspections.iter().filter(|check| shown.contains(&day(check.date_utc))) {
+        let title = format!("{} hangar: {} µm", date(check.date_utc), micrometres(check.play_m));
+        frame.square((day(check.date_utc), check.play_m * 1e6), &title);
+    }
+}
+
+/// Day, and 5 %, middle and 95 % of the gap of a flight with an estimate, µm.
+fn point(flight: &FlightRow) -> Option<[f64; 4]> {
+    let gap_m = flight.gap_m?;
+    let (low_m, high_m) = (flight.gap_p05_m.unwrap_or(gap_m), flight.gap_p95_m.unwrap_or(gap_m));
+    Some([day(flight.departure_utc), low_m * 1e6, gap_m * 1e6, high_m * 1e6])
 }

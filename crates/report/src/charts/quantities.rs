@@ -1,68 +1,38 @@
-//! Small charts of followed quantities on one time axis, for readers without scripts and for print.
+//! Small chart of a followed quantity that changed.
 
 use jiff::Timestamp;
-use plotters::prelude::*;
 use records::Quantity;
 
-use crate::charts::axes::{Axes, DATA, INK, PLAN, day, picture, thinned};
-use crate::page::Error;
+use crate::charts::frame::{DATA, Frame, INK, PLAN, day, thinned};
 
-/// Size of a chart, px.
-const SIZE: (u32, u32) = (420, 130);
-/// Most points of a line; above it, each is the mean of neighbouring flights.
+/// Most points; above it, each is the mean of neighbouring flights.
 const MAX_POINTS: usize = 90;
 
-/// One line of a chart: the values of one unit.
-pub(crate) struct Line {
-    pub(crate) flights: Vec<(Timestamp, f64)>,
-    /// Fitted level, drawn as a horizontal line from the last step on.
-    pub(crate) level: Option<f64>,
-}
-
-/// Draws a quantity against date: flights, levels, and events as vertical lines.
-///
-/// # Errors
-/// When the plot cannot be drawn.
+/// Draws the flights of a unit against date, its fitted level from the last step on, and steps as vertical lines.
 pub(crate) fn small_chart(
     quantity: Quantity,
-    lines: &[Line],
-    events: &[Timestamp],
-    span: (Timestamp, Timestamp),
-) -> Result<String, Error> {
+    flights: &[(Timestamp, f64)],
+    level: Option<f64>,
+    steps: &[Timestamp],
+) -> String {
     let (_, factor) = quantity.display_unit();
-    let points = |line: &Line| -> Vec<[f64; 2]> {
-        let all: Vec<[f64; 2]> = line.flights.iter().map(|(at, value)| [day(*at), value * factor]).collect();
-        thinned(&all, MAX_POINTS)
-    };
-    let series: Vec<Vec<[f64; 2]>> = lines.iter().map(points).collect();
-    let values = || series.iter().flatten().map(|p| p[1]);
+    let all: Vec<[f64; 2]> = flights.iter().map(|(at, value)| [day(*at), value * factor]).collect();
+    let points = thinned(&all, MAX_POINTS);
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return String::new() };
+    let level = level.map(|level| level * factor);
+    let values = || points.iter().map(|p| p[1]).chain(level);
     let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    if low > high {
-        return Ok(String::new());
-    }
     let margin = (0.1 * (high - low)).max(0.02 * high.abs()).max(1e-9);
-    let (y, x) = (low - margin..high + margin, day(span.0)..day(span.1).max(day(span.0) + 1.0));
-    let axes = Axes {
-        x: x.clone(),
-        y: y.clone(),
-        names: ["", ""],
-        margins: [4, 20, 52],
-        text_px: 12,
-        dates: Some([4, 4]),
-    };
-    picture(SIZE, |root| {
-        let mut chart = axes.draw(root)?;
-        for (points, line) in series.iter().zip(lines) {
-            chart.draw_series(points.iter().map(|p| Circle::new((p[0], p[1]), 2, DATA.filled())))?;
-            let from = events.iter().map(|e| day(*e)).fold(x.start, f64::max);
-            if let Some(level) = line.level.map(|level| level * factor).filter(|l| y.contains(l)) {
-                let ends = [(from, level), (x.end, level)];
-                chart.draw_series(LineSeries::new(ends, INK.stroke_width(2)))?;
-            }
-        }
-        for event in events.iter().map(|e| day(*e)).filter(|d| x.contains(d)) {
-            chart.draw_series(LineSeries::new([(event, y.start), (event, y.end)], PLAN))?;
-        }
-        Ok(())
-    })
+    let span = (last[0] - first[0]).max(1.0);
+    let x = first[0] - 0.12 * span..last[0] + 0.02 * span;
+    let mut frame = Frame::new([420.0, 150.0], [14.0, 2.0, 24.0, 2.0], x, low - margin..high + margin);
+    frame.grid(4);
+    frame.dates(3);
+    points.iter().for_each(|p| frame.dot((p[0], p[1]), 2.0, DATA, ""));
+    steps.iter().for_each(|step| frame.vertical(day(*step), PLAN));
+    if let Some(level) = level {
+        let from = steps.iter().map(|step| day(*step)).fold(first[0], f64::max);
+        frame.line([(from, level), (last[0], level)], INK);
+    }
+    frame.finish("")
 }

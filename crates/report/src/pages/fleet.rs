@@ -1,54 +1,28 @@
-//! Fleet page: work list, changes, map of tails and positions, removal forecast, forecast accuracy, data quality.
+//! Fleet page: warnings, work list, what is new, map of tails and positions, data; the rest behind details.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use askama::Template;
+use records::assessment::action::{counts_text, day_text, state_rank};
+use records::report_rows::{ReportInspectionRow, ReportTailRow};
 use records::time::days_between;
 
-use crate::charts::agreement_plot::agreement_plot;
-use crate::format::{
-    NO_DATA, count, counted, date, date_or, hours, micrometres, micrometres_or, minute_or, or_no_data,
-    percent, rate, unbroken,
-};
-use crate::model::{Inspection, Report, Tail, UnitView};
+use crate::format::{NO_DATA, count, counted, date, micrometres, micrometres_or, or_no_data, rate, unbroken};
+use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
+use crate::pages::work_list::{Group, capital, grouped, work};
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
-use crate::stats::rate_spread::spreads;
-use crate::stats::removal_forecast::{Month, removal_forecast};
+use crate::stats::peers::Peers;
+use crate::stats::removal_forecast::removal_forecast;
 
-/// Maximum number of work-list rows on one page.
-const WORK_ROWS: usize = 100;
-/// Maximum number of tails on one page.
-const TAIL_ROWS: usize = 100;
-/// Maximum number of entries in the short lists.
+/// Maximum number of rows on one page of the work list or of tails.
+const ROWS: usize = 100;
+/// Maximum number of entries on the fleet page itself.
 const FEW: usize = 40;
-
-/// Units below the heading of their tail; on the page of a tail, which needs no heading, its name is empty.
-pub(crate) struct Group<'a> {
-    pub(crate) tail: &'a str,
-    pub(crate) units: Vec<&'a UnitView>,
-}
-
-/// Reason of the state, with the states of the other followed quantities.
-pub(crate) fn why(unit: &UnitView) -> String {
-    let reason = unit.assessment.reason.clone().unwrap_or_else(|| NO_DATA.to_owned());
-    let states = unit.quantities.iter().filter_map(|view| view.row.state);
-    states.fold(reason, |why, state| format!("{why}; {}", state.replace('_', " ")))
-}
-
-/// Date and hours of a crossing, or why there is none.
-pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &UnitView) -> String {
-    let s = &unit.assessment;
-    match (h, at) {
-        (Some(h), _) if h <= 0.0 => "now".to_owned(),
-        (Some(h), Some(at)) => format!("{} ({} FH)", date(at), hours(h)),
-        (Some(h), None) => format!("{} FH", hours(h)),
-        (None, _) if s.limit_m.is_none() || s.gap_m.is_none() || s.state.is_none() => NO_DATA.to_owned(),
-        (None, _) => "after the forecast horizon".to_owned(),
-    }
-}
+/// Least expected number of removals that a month is shown with.
+const LEAST_REMOVALS: f64 = 0.05;
 
 #[derive(Template)]
 #[template(path = "fleet.html")]
@@ -57,15 +31,13 @@ struct FleetView<'a> {
     title: String,
     footer: String,
     report: &'a Report,
+    peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
     more_work: Vec<String>,
-    label: &'static str,
     quantity_changes: Vec<Change>,
     more_quantity_changes: usize,
     map: Map<'a>,
     tail_pages: Vec<String>,
-    /// Plot of estimates against inspections; empty without a pair.
-    scatter: String,
 }
 
 #[derive(Template)]
@@ -74,8 +46,8 @@ struct WorkView<'a> {
     root: &'static str,
     title: String,
     footer: String,
+    peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
-    label: &'static str,
 }
 
 #[derive(Template)]
@@ -87,7 +59,7 @@ struct TailsView<'a> {
     map: Map<'a>,
 }
 
-/// Positions, and each tail with its units by position.
+/// Positions, and each tail with its installed units by position.
 struct Map<'a> {
     positions: BTreeSet<&'a str>,
     rows: Vec<(&'a str, Vec<Vec<&'a UnitView>>)>,
@@ -97,176 +69,100 @@ struct Map<'a> {
 ///
 /// # Errors
 /// When a template cannot be filled.
-pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
+pub fn fleet_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Error> {
     let mut work = work(report);
     let rest = work.split_off(FEW.min(work.len()));
-    let mut pages = Vec::new();
-    let mut more_work = Vec::new();
-    for (k, chunk) in rest.chunks(WORK_ROWS).enumerate() {
+    let (mut pages, mut more_work, mut tail_pages) = (Vec::new(), Vec::new(), Vec::new());
+    for (k, chunk) in rest.chunks(ROWS).enumerate() {
         let path = format!("work-{}.html", k + 2);
         let title = format!("Work list, page {} · actuator free play", k + 2);
-        let groups = grouped(chunk);
-        let view = WorkView { root: "", title, footer: report.footer(), groups, label: "Work list" };
+        let view = WorkView { root: "", title, footer: report.footer(), peers, groups: grouped(chunk) };
         pages.push(Page::html(path.clone(), &view.render()?));
         more_work.push(path);
     }
     let tails: Vec<&str> = report.tails.iter().map(|t| t.tail_number.as_str()).collect();
-    let mut tail_pages = Vec::new();
-    if tails.len() > FEW {
-        for (k, chunk) in tails.chunks(TAIL_ROWS).enumerate() {
-            let path = format!("tails-{}.html", k + 1);
-            let title = format!("All tails, page {} · actuator free play", k + 1);
-            let view = TailsView { root: "", title, footer: report.footer(), map: map(report, chunk) };
-            pages.push(Page::html(path.clone(), &view.render()?));
-            tail_pages.push(path);
-        }
+    for (k, chunk) in tails.chunks(ROWS).enumerate().filter(|_| tails.len() > FEW) {
+        let path = format!("tails-{}.html", k + 1);
+        let title = format!("All tails, page {} · actuator free play", k + 1);
+        let view = TailsView { root: "", title, footer: report.footer(), map: map(report, chunk) };
+        pages.push(Page::html(path.clone(), &view.render()?));
+        tail_pages.push(path);
     }
-    let view = index_page(report, grouped(&work), more_work, tail_pages)?;
-    pages.push(Page::html("index.html".to_owned(), &view.render()?));
-    Ok(pages)
-}
-
-fn index_page<'a>(
-    report: &'a Report,
-    groups: Vec<Group<'a>>,
-    more_work: Vec<String>,
-    tail_pages: Vec<String>,
-) -> Result<FleetView<'a>, Error> {
     let quantity_changes = quantities::changes(report, "", |_| true);
-    Ok(FleetView {
+    let view = FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
         footer: report.footer(),
         report,
-        groups,
+        peers,
+        groups: grouped(&work),
         more_work,
-        label: "Work list",
         more_quantity_changes: quantity_changes.len().saturating_sub(FEW),
         quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
         map: map(report, &most_urgent_tails(report)),
         tail_pages,
-        scatter: agreement_plot(&inspection_pairs(report))?,
-    })
+    };
+    pages.push(Page::html("index.html".to_owned(), &view.render()?));
+    Ok(pages)
 }
 
-/// Heading of the fleet page: scope and date.
-fn heading(report: &Report) -> String {
-    let scope = report.scope.as_deref().unwrap_or("Fleet");
-    match report.as_of_utc {
-        Some(day) => format!("{scope}: actuator free play – {}", date(day)),
-        None => format!("{scope}: actuator free play"),
+/// Date of the report, and age of the newest log.
+fn freshness(report: &Report) -> String {
+    let Some(now) = report.as_of_utc else { return NO_DATA.to_owned() };
+    let newest = report.newest_departure_utc.map_or_else(
+        || "no log".to_owned(),
+        |at| match days_between(at, now) {
+            ..1.0 => format!("newest log {}", day_text(now, at)),
+            days => format!("newest log {}, {} old", day_text(now, at), counted(days as usize, "day")),
+        },
+    );
+    format!("{}, {newest}", now.strftime("%a %-d %b %Y %H:%M UTC"))
+}
+
+/// What the installed units ask for, counted.
+fn counts(report: &Report) -> String {
+    match counts_text(report.units.iter().map(|unit| &unit.row)) {
+        text if text.is_empty() => "No unit is installed.".to_owned(),
+        text => text,
     }
 }
 
-/// What the report covers, and until when.
-fn lead(report: &Report) -> String {
-    format!(
-        "{} · data to {} · assessed {}",
-        report.scope.as_deref().unwrap_or("Whole fleet"),
-        minute_or(report.newest_departure_utc),
-        minute_or(report.as_of_utc),
-    )
-}
-
-/// Number of units in a state.
-fn in_state(report: &Report, badge: StateBadge) -> usize {
-    report.units.iter().filter(|unit| unit.badge() == badge).count()
-}
-
-/// Number of units whose removal has no date, because their utilisation is unknown.
-fn undated(report: &Report) -> usize {
-    report.units.iter().filter(|unit| unit.assessment.hours_per_day.is_none()).count()
-}
-
-/// Inspections one by one, with their units.
-fn checks(report: &Report) -> Vec<(&UnitView, &Inspection)> {
-    let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
-    if report.inspections_given { checks.take(WORK_ROWS).collect() } else { Vec::new() }
-}
-
-/// What to do first, and how many units are in each state.
-fn decision(report: &Report) -> String {
-    let counts = StateBadge::ALL.map(|badge| (in_state(report, badge), badge.word()));
-    let counts: Vec<String> =
-        counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{} {word}", count(n))).collect();
-    let first = work(report).into_iter().find(|unit| unit.badge().needs_action());
-    let Some(unit) = first else {
-        let counts = if counts.is_empty() { "no unit".to_owned() } else { counts.join(", ") };
-        return format!("No unit needs action: {counts}.");
-    };
-    let action = unit.assessment.action_text.as_deref().unwrap_or("inspect");
-    format!("{} ({}): {action}. In all: {}.", unit.place(), unit.name(), counts.join(", "))
-}
-
-/// Units that need action or have an open work request, by earliest date.
-fn work(report: &Report) -> Vec<&UnitView> {
-    let mut units: Vec<&UnitView> =
-        report.units.iter().filter(|u| u.badge().needs_action() || u.open_request().is_some()).collect();
-    units.sort_by(|a, b| urgency(a).partial_cmp(&urgency(b)).unwrap_or(std::cmp::Ordering::Equal));
-    // Units of one tail are grouped for one maintenance visit, after the tail's most urgent unit.
-    let mut first: BTreeMap<Option<&str>, usize> = BTreeMap::new();
-    for (rank, unit) in units.iter().enumerate() {
-        first.entry(unit.tail_number.as_deref()).or_insert(rank);
-    }
-    units.sort_by_key(|u| first.get(&u.tail_number.as_deref()).copied());
-    units
-}
-
-fn urgency(unit: &UnitView) -> (u8, f64, String) {
-    let due = unit.assessment.due_utc.map(|t| t.as_second() as f64);
-    (unit.badge().rank(), due.unwrap_or(f64::MAX), unit.name())
-}
-
-fn grouped<'a>(units: &[&'a UnitView]) -> Vec<Group<'a>> {
-    let tail = |unit: &UnitView| unit.tail_number.clone();
-    let group = |units: &[&'a UnitView]| Group {
-        tail: units[0].tail_number.as_deref().unwrap_or("tail not known"),
-        units: units.to_vec(),
-    };
-    units.chunk_by(|a, b| tail(a) == tail(b)).map(group).collect()
-}
-
-/// State changes since the day before, and events of the last 30 days.
-fn changes(report: &Report) -> Vec<(String, String, String, String)> {
-    let mut found = Vec::new();
-    for unit in &report.units {
-        let s = &unit.assessment;
-        let mut add = |what: String, detail: String| found.push((unit_path(unit), unit.name(), what, detail));
-        if let Some(before) = s.state_day_before.as_ref().filter(|before| **before != s.state) {
-            let was = StateBadge::from_state(before.as_deref());
-            let now = unit.badge();
-            add(
-                if now.rank() < was.rank() { "worse" } else { "cleared" }.to_owned(),
-                format!("{} → {}", was.word(), now.word()),
-            );
-        }
-        for event in &unit.events {
-            let age = report.as_of_utc.map(|now| days_between(event.departure_utc, now));
-            if age.is_some_and(|age| age <= 30.0) {
-                let books = match (event.is_on_record, event.is_tail_wide) {
-                    (true, _) => "on record",
-                    (false, true) => "whole tail at once: its sensor or recorder is likelier",
-                    (false, false) => "not on record",
-                };
-                add(
-                    event.kind.replace('_', " "),
-                    format!("{}, {} µm, {books}", date(event.departure_utc), micrometres(event.step_m)),
-                );
+/// State changes since the day before: path, place and serial number, change.
+fn news(report: &Report) -> Vec<(String, String, String)> {
+    let changed = |unit: &UnitView| {
+        let now = unit.badge().word();
+        let what = match &unit.state_day_before {
+            Some(before) if before.as_deref() == unit.row.state => return None,
+            Some(before) => format!("{} → {now}", StateBadge::from_state(before.as_deref()).word()),
+            None if unit.row.gap_m.is_some() && unit.row.removed_utc.is_none() => {
+                format!("first assessment: {now}")
             }
-        }
-    }
-    found.truncate(WORK_ROWS);
-    found
+            None => return None,
+        };
+        Some((unit_path(unit), format!("{} {}", unit.place(), unit.row.serial_number), what))
+    };
+    report.units.iter().filter_map(changed).take(FEW).collect()
 }
 
+/// Removed units: path, serial number, and when with the last gap.
+fn removed(report: &Report) -> Vec<(String, &str, String)> {
+    let of = |unit: &&UnitView| unit.row.removed_utc.is_some();
+    let row = |unit| {
+        let unit: &UnitView = unit;
+        (unit_path(unit), unit.row.serial_number.as_str(), unit.row.why_text())
+    };
+    report.units.iter().filter(of).take(FEW).map(row).collect()
+}
+
+/// The tails of the most urgent units.
 fn most_urgent_tails(report: &Report) -> Vec<&str> {
     let mut worst: BTreeMap<&str, u8> = BTreeMap::new();
-    for unit in &report.units {
-        let Some(tail) = unit.tail_number.as_deref() else { continue };
-        let rank = worst.entry(tail).or_insert(StateBadge::NORMAL.rank());
-        *rank = unit.badge().rank().min(*rank);
+    for unit in report.units.iter().filter(|unit| unit.row.removed_utc.is_none()) {
+        let Some(tail) = unit.row.tail_number.as_deref() else { continue };
+        let rank = worst.entry(tail).or_insert(u8::MAX);
+        *rank = state_rank(unit.row.state).min(*rank);
     }
-    let mut tails: Vec<(u8, &str)> = worst.into_iter().map(|(tail, s)| (s, tail)).collect();
+    let mut tails: Vec<(u8, &str)> = worst.into_iter().map(|(tail, rank)| (rank, tail)).collect();
     tails.sort_unstable();
     tails.into_iter().take(FEW).map(|(_, tail)| tail).collect()
 }
@@ -274,8 +170,8 @@ fn most_urgent_tails(report: &Report) -> Vec<&str> {
 fn map<'a>(report: &'a Report, tails: &[&'a str]) -> Map<'a> {
     let mut cells: BTreeMap<(&str, &str), Vec<&UnitView>> = BTreeMap::new();
     let mut positions = BTreeSet::new();
-    for unit in &report.units {
-        if let (Some(tail), Some(position)) = (&unit.tail_number, &unit.position) {
+    for unit in report.units.iter().filter(|unit| unit.row.removed_utc.is_none()) {
+        if let (Some(tail), Some(position)) = (&unit.row.tail_number, &unit.row.position) {
             positions.insert(position.as_str());
             cells.entry((tail, position)).or_default().push(unit);
         }
@@ -288,66 +184,54 @@ fn map<'a>(report: &'a Report, tails: &[&'a str]) -> Map<'a> {
     Map { positions, rows }
 }
 
-/// Length of a month's bar, % of the largest bound of all months.
-fn bar_percent(month: &Month, months: &[Month]) -> u32 {
-    let most = months.iter().map(|m| m.high).fold(1.0, f64::max);
-    (100.0 * month.expected / most) as u32
-}
-
-fn longest_without_estimate(report: &Report) -> Vec<&Tail> {
-    let mut tails: Vec<&Tail> = report.tails.iter().collect();
-    tails.sort_by_key(|t| (t.last_estimate_utc, t.tail_number.clone()));
+/// Tails with the longest time without an estimate first.
+fn data(report: &Report) -> Vec<&ReportTailRow> {
+    let mut tails: Vec<&ReportTailRow> = report.tails.iter().collect();
+    tails.sort_by_key(|t| (t.last_estimate_utc, &t.tail_number));
     tails.truncate(FEW);
     tails
 }
 
 /// Days from a tail's last estimate to the date of the assessments.
-fn days_without(report: &Report, tail: &Tail) -> String {
+fn days_without(report: &Report, tail: &ReportTailRow) -> String {
     let age = tail.last_estimate_utc.zip(report.as_of_utc).map(|(last, now)| days_between(last, now));
     or_no_data(age, |days| format!("{days:.0}"))
 }
 
-/// Coverage of the 90 % forecast intervals by forecast lead.
-fn forecast_accuracy(report: &Report) -> Vec<(String, String, String)> {
+/// Flights with a log, of those flown where a table has them.
+pub(crate) fn logged(tail: &ReportTailRow) -> String {
+    match tail.flown {
+        Some(flown) if flown >= tail.flights => {
+            format!("{} of {}", count(tail.flights as usize), count(flown as usize))
+        }
+        _ => count(tail.flights as usize),
+    }
+}
+
+/// Forecasts whose 90 % interval contained the gap found later: lead, and how many of how many.
+fn forecast_check(report: &Report) -> Vec<(i64, String)> {
     let mut ages: BTreeMap<i64, (usize, usize)> = BTreeMap::new();
     for past in report.units.iter().flat_map(|u| &u.past_forecasts) {
         let (held, all) = ages.entry(past.days_ago).or_default();
         *held += usize::from(past.held());
         *all += 1;
     }
-    let row = |(days, (held, all)): (i64, (usize, usize))| {
-        (
-            format!("{days} days"),
-            format!("{} of {}", count(held), count(all)),
-            percent(held as f64 / all as f64),
-        )
-    };
-    ages.into_iter().map(row).collect()
+    ages.into_iter().map(|(days, (held, all))| (days, format!("{} of {}", count(held), count(all)))).collect()
 }
 
-/// Pairs of estimate and hangar inspection, m.
-fn inspection_pairs(report: &Report) -> Vec<(f64, f64)> {
-    let checks = report.units.iter().flat_map(|u| &u.inspections);
-    checks.filter_map(|i| Some((i.estimate_m?, i.play_m))).collect()
+/// Units that wear several times faster than their peers, the fastest first.
+fn fast<'a>(report: &'a Report, peers: &Peers<'_>) -> Vec<(&'a UnitView, f64, String)> {
+    let of = |unit: &'a UnitView| Some((unit, unit.row.rate_m_per_hour?, peers.faster_text(unit)?));
+    let mut found: Vec<_> = report.units.iter().filter_map(of).collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found.truncate(FEW);
+    found
 }
 
-/// Agreement of each part's estimates with its inspections: part, pairs, bias, limits.
-fn inspection_bias(report: &Report) -> Vec<(String, String, String, String)> {
-    let mut parts: BTreeMap<&str, Vec<(f64, f64)>> = BTreeMap::new();
-    for unit in &report.units {
-        let pairs = unit.inspections.iter().filter_map(|i| Some((i.estimate_m?, i.play_m)));
-        parts.entry(unit.part_number.as_deref().unwrap_or(NO_DATA)).or_default().extend(pairs);
-    }
-    let row = |(part, pairs): (&str, Vec<(f64, f64)>)| {
-        let found = Agreement::of(&pairs);
-        let text = |value: fn(&Agreement) -> String| or_no_data(found.as_ref(), value);
-        (!pairs.is_empty()).then(|| {
-            let bias = text(|a| format!("{} ± {}", micrometres(a.bias_m), micrometres(a.bias_half_width_m)));
-            let limits = text(|a| format!("{} to {}", micrometres(a.lower_m), micrometres(a.upper_m)));
-            (part.to_owned(), count(pairs.len()), bias, limits)
-        })
-    };
-    parts.into_iter().filter_map(row).collect()
+/// Inspections one by one, with their units.
+fn checks(report: &Report) -> Vec<(&UnitView, &ReportInspectionRow)> {
+    let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
+    checks.take(ROWS).collect()
 }
 
 /// Agreement of estimates with hangar inspections, in words.
@@ -355,21 +239,19 @@ fn inspection_agreement(report: &Report) -> String {
     if !report.inspections_given {
         return "No data: no inspections table is configured (`logs.inspections`).".to_owned();
     }
-    let pairs = inspection_pairs(report);
-    let words = match Agreement::of(&pairs) {
-        Some(a) => format!(
-            "Estimate minus inspection over {}: bias {} ± {} µm (90 %), limits of agreement (95 % of differences) {} to {} µm.",
-            counted(a.pairs, "pair"),
-            micrometres(a.bias_m),
-            micrometres(a.bias_half_width_m),
-            micrometres(a.lower_m),
-            micrometres(a.upper_m)
+    let checks = report.units.iter().flat_map(|unit| &unit.inspections);
+    let differences: Vec<f64> = checks.filter_map(ReportInspectionRow::difference_m).collect();
+    let words = match Agreement::of(&differences) {
+        Some(found) => format!(
+            "Estimate minus inspection over {}: {} ± {} µm (90 %); shown, never applied.",
+            counted(differences.len(), "pair"),
+            micrometres(found.bias_m),
+            micrometres(found.half_width_m),
         ),
-        None => format!("{}: at least 3 are needed to state a bias.", counted(pairs.len(), "pair")),
+        None => format!("{}: at least 3 are needed to state a bias.", counted(differences.len(), "pair")),
     };
-    let unmatched = report.inspections_unmatched;
-    if unmatched == 0 {
-        return words;
+    match report.inspections_unmatched {
+        0 => words,
+        unmatched => format!("{words} {} of units without records.", counted(unmatched, "check")),
     }
-    format!("{words} {} of units without records.", counted(unmatched, "check"))
 }

@@ -5,4 +5,4 @@ pub(crate) mod part;
 pub(crate) mod quantities;
 pub(crate) mod tail;
 pub(crate) mod unit;
-pub(crate) mod work_requests;
+pub(crate) mod work_list;

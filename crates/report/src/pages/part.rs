@@ -1,14 +1,20 @@
 //! Part pages: all units of a part number as small multiples on shared axes.
 
 use askama::Template;
+use jiff::Timestamp;
 
-use crate::charts::small_multiple::SharedAxes;
-use crate::format::{counted, date_or, micrometres};
+use crate::charts::frame::{day, thinned};
+use crate::charts::sparkline::sparkline;
+use crate::format::{date, micrometres};
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};
+use crate::pages::work_list::what;
+use crate::stats::peers::Peers;
 
 /// Maximum number of units on one page.
 const UNITS: usize = 200;
+/// Most points of a picture: neighbouring flights are averaged.
+const MAX_POINTS: usize = 60;
 
 #[derive(Template)]
 #[template(path = "part.html")]
@@ -17,24 +23,49 @@ struct View<'a> {
     title: String,
     footer: String,
     part: &'a str,
-    /// Axes of all pictures, and what they show.
-    axes: Option<SharedAxes>,
-    description: String,
+    axes: Axes,
     units: &'a [&'a UnitView],
+    peers: &'a Peers<'a>,
     /// Paths of all pages of the part, relative to this one.
     pages: Vec<String>,
 }
 
-/// Renders the pages of all part numbers: the most urgent units first, then by share of the limit.
+/// First and last departure and the largest gap or limit of the units of a part, m.
+#[derive(Debug, Clone, Copy)]
+struct Axes {
+    span: Option<(Timestamp, Timestamp)>,
+    full_m: f64,
+}
+
+impl Axes {
+    fn of(units: &[&UnitView]) -> Self {
+        let flights = || units.iter().flat_map(|unit| &unit.flights).filter(|flight| flight.gap_m.is_some());
+        let times = || flights().map(|flight| flight.departure_utc);
+        let limits_m = units.iter().filter_map(|unit| unit.row.limit_m);
+        let full_m =
+            flights().filter_map(|flight| flight.gap_m).chain(limits_m).fold(f64::MIN_POSITIVE, f64::max);
+        Self { span: times().min().zip(times().max()), full_m }
+    }
+
+    fn draw(self, unit: &UnitView) -> String {
+        let Some((from, to)) = self.span else { return String::new() };
+        let gap = |flight: &crate::FlightRow| Some([day(flight.departure_utc), flight.gap_m? * 1e6]);
+        let gaps: Vec<[f64; 2]> = unit.flights.iter().filter_map(gap).collect();
+        let x = [day(from), day(to).max(day(from) + 1.0)];
+        let limit = unit.row.limit_m.map(|limit_m| limit_m * 1e6);
+        sparkline([200.0, 64.0], x, 1.08e6 * self.full_m, &thinned(&gaps, MAX_POINTS), limit)
+    }
+}
+
+/// Renders the pages of all part numbers: the most urgent units first.
 ///
 /// # Errors
 /// When the template cannot be filled.
-pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
+pub fn part_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Error> {
     let mut pages = Vec::new();
     for (part, mut units) in report.by_part() {
-        let order = |unit: &UnitView| (unit.badge().rank(), -unit.share().unwrap_or(0.0));
-        units.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap_or(std::cmp::Ordering::Equal));
-        let axes = SharedAxes::of(&units);
+        units.sort_by(|a, b| a.row.by_urgency(&b.row));
+        let axes = Axes::of(&units);
         let paths: Vec<String> = (0..units.len().div_ceil(UNITS)).map(|k| part_path(part, k)).collect();
         for (units, path) in units.chunks(UNITS).zip(&paths) {
             let view = View {
@@ -43,22 +74,12 @@ pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
                 footer: report.footer(),
                 part,
                 axes,
-                description: axes.map(description).unwrap_or_default(),
                 units,
+                peers,
                 pages: if paths.len() > 1 { paths.clone() } else { Vec::new() },
             };
             pages.push(Page::html(path.clone(), &view.render()?));
         }
     }
     Ok(pages)
-}
-
-fn description(axes: SharedAxes) -> String {
-    let (from, to, full_m) = axes.extent();
-    format!(
-        "Gap from {} to {}, 0 to {} µm, the same axes for all; dashed: act limit.",
-        date_or(from),
-        date_or(to),
-        micrometres(full_m)
-    )
 }

@@ -3,23 +3,10 @@
 use jiff::Timestamp;
 use records::{Quantity, QuantityChange};
 
-use crate::charts::quantities::{Line, small_chart};
+use crate::charts::quantities::small_chart;
 use crate::format::{NO_DATA, date};
 use crate::model::{QuantityView, Report, UnitView};
-use crate::page::{Error, tail_path, unit_path};
-
-/// Quantities with a chart on a unit's page.
-const OF_UNIT: [Quantity; 6] = [
-    Quantity::StiffnessNPerM,
-    Quantity::FrictionN,
-    Quantity::LostMotionM,
-    Quantity::SkewS,
-    Quantity::LoadZeroN,
-    Quantity::LoadDelayS,
-];
-/// Quantities with a chart on a tail's page: those that a sensor or recorder of the aircraft moves.
-const OF_TAIL: [Quantity; 4] =
-    [Quantity::SkewS, Quantity::StiffnessNPerM, Quantity::LoadZeroN, Quantity::LoadDelayS];
+use crate::page::{tail_path, unit_path};
 
 /// A chart with its heading and description.
 pub(crate) struct Chart {
@@ -47,70 +34,25 @@ pub(crate) struct Change {
     pub(crate) evidence: String,
 }
 
-/// Charts of a unit, all on the time axis of its flights, with its events.
-pub(crate) fn unit_charts(unit: &UnitView) -> Result<Vec<Chart>, Error> {
-    let Some(span) = span(std::iter::once(unit)) else { return Ok(Vec::new()) };
-    let events: Vec<Timestamp> = unit.events.iter().map(|event| event.departure_utc).collect();
-    let mut charts = Vec::new();
-    for quantity in OF_UNIT {
-        let Some(view) = view(unit, quantity) else { continue };
-        let steps = view.row.steps.iter().map(|step| step.departure_utc);
-        let all: Vec<Timestamp> = events.iter().copied().chain(steps).collect();
-        let line = Line { flights: points(unit, view), level: view.row.level };
-        let svg = small_chart(quantity, &[line], &all, span)?;
-        charts.extend(chart(quantity, svg, &unit.name()));
-    }
-    Ok(charts)
-}
-
-/// Charts of the units of a tail together.
-pub(crate) fn tail_charts(report: &Report, tail: &str) -> Result<Vec<Chart>, Error> {
-    let units: Vec<&UnitView> =
-        report.units.iter().filter(|u| u.tail_number.as_deref() == Some(tail)).collect();
-    let Some(span) = span(units.iter().copied()) else { return Ok(Vec::new()) };
-    let mut charts = Vec::new();
-    for quantity in OF_TAIL {
-        let of_tail = |change: &&QuantityChange| {
-            change.tail_number.as_deref() == Some(tail)
-                && change.serial_number.is_none()
-                && change.quantity == quantity.as_str()
-        };
-        let events: Vec<Timestamp> =
-            report.quantity_changes.iter().filter(of_tail).map(|change| change.since_utc).collect();
-        let line =
-            |unit: &&UnitView| Some(Line { flights: points(unit, view(unit, quantity)?), level: None });
-        let lines: Vec<Line> = units.iter().filter_map(line).collect();
-        charts.extend(chart(quantity, small_chart(quantity, &lines, &events, span)?, tail));
-    }
-    Ok(charts)
-}
-
-fn chart(quantity: Quantity, svg: String, name: &str) -> Option<Chart> {
-    let (unit, _) = quantity.display_unit();
-    let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
-    (!svg.is_empty()).then(|| Chart {
-        heading: format!("{}{unit}", quantity.label()),
-        description: format!("{}{unit} of {name} against date", quantity.label()),
-        svg,
-    })
-}
-
-fn view(unit: &UnitView, quantity: Quantity) -> Option<&QuantityView> {
-    unit.quantities.iter().find(|view| view.row.quantity == quantity.as_str())
-}
-
-/// The values of a quantity by departure.
-fn points(unit: &UnitView, view: &QuantityView) -> Vec<(Timestamp, f64)> {
-    let departures = unit.flights.iter().map(|flight| flight.departure_utc);
-    let points = departures.zip(&view.values).filter(|(_, value)| value.is_finite());
-    points.map(|(at, value)| (at, f64::from(*value))).collect()
-}
-
-/// First and last flight of some units.
-fn span<'a>(units: impl Iterator<Item = &'a UnitView>) -> Option<(Timestamp, Timestamp)> {
-    let flights: Vec<Timestamp> =
-        units.flat_map(|unit| unit.flights.iter().map(|flight| flight.departure_utc)).collect();
-    Some((*flights.iter().min()?, *flights.iter().max()?))
+/// Charts of the quantities that changed on a unit, with their steps and its events.
+pub(crate) fn unit_charts(unit: &UnitView) -> Vec<Chart> {
+    let events = || unit.events.iter().map(|event| event.departure_utc);
+    let chart = |view: &QuantityView| {
+        let row = &view.row;
+        let quantity =
+            Quantity::from_name(row.quantity).filter(|_| row.state.is_some() || !row.steps.is_empty())?;
+        let departures = unit.flights.iter().map(|flight| flight.departure_utc);
+        let points = departures.zip(&view.values).filter(|(_, value)| value.is_finite());
+        let points: Vec<(Timestamp, f64)> = points.map(|(at, value)| (at, f64::from(*value))).collect();
+        let steps: Vec<Timestamp> = events().chain(row.steps.iter().map(|step| step.departure_utc)).collect();
+        let svg = small_chart(quantity, &points, row.level, &steps);
+        let (unit_of, _) = quantity.display_unit();
+        let unit_of = if unit_of.is_empty() { String::new() } else { format!(" [{unit_of}]") };
+        let heading = format!("{}{unit_of}", quantity.label());
+        let description = format!("{heading} of {} against date", unit.name());
+        (!svg.is_empty()).then_some(Chart { heading, description, svg })
+    };
+    unit.quantities.iter().filter_map(chart).collect()
 }
 
 /// Levels of all followed quantities of a unit.
@@ -157,7 +99,8 @@ pub(crate) fn changes(report: &Report, root: &str, wanted: impl Fn(&QuantityChan
 
 fn change(report: &Report, root: &str, change: &QuantityChange) -> Change {
     let is_unit = |unit: &&UnitView| {
-        Some(&unit.serial_number) == change.serial_number.as_ref() && unit.part_number == change.part_number
+        Some(&unit.row.serial_number) == change.serial_number.as_ref()
+            && unit.row.part_number == change.part_number
     };
     let unit = change.serial_number.as_ref().and_then(|_| report.units.iter().find(is_unit));
     let known = |tail: &&String| report.tails.iter().any(|t| t.tail_number == **tail);

@@ -1,12 +1,16 @@
-//! Tail page: actuators of one aircraft, its flights and failed logs.
+//! Tail page: verdict of one aircraft, its actuators, its sensors and its data.
 
 use askama::Template;
+use records::assessment::action::counts_text;
+use records::report_rows::{ReportLogErrorRow, ReportTailRow};
 
-use crate::format::{NO_DATA, count, minute, minute_or};
-use crate::model::{LogError, Report, Tail, UnitView};
+use crate::format::{minute, minute_or, unbroken};
+use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, tail_path};
-use crate::pages::fleet::Group;
-use crate::pages::quantities::{self, Change, Chart};
+use crate::pages::fleet::logged;
+use crate::pages::quantities::{self, Change};
+use crate::pages::work_list::Group;
+use crate::stats::peers::Peers;
 
 #[derive(Template)]
 #[template(path = "tail.html")]
@@ -14,44 +18,39 @@ struct View<'a> {
     root: &'static str,
     title: String,
     footer: String,
-    tail: &'a str,
-    facts: Vec<(&'static str, String)>,
-    label: &'static str,
+    tail: &'a ReportTailRow,
+    verdict: String,
+    warnings: Vec<&'a str>,
+    peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
+    removed: Vec<&'a UnitView>,
     quantity_changes: Vec<Change>,
-    charts: Vec<Chart>,
-    log_errors: Vec<&'a LogError>,
+    log_errors: Vec<&'a ReportLogErrorRow>,
 }
 
 /// Renders the page of a tail.
 ///
 /// # Errors
 /// When the template cannot be filled.
-pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
+pub fn tail_page(report: &Report, peers: &Peers<'_>, tail: &ReportTailRow) -> Result<Page, Error> {
     let name = tail.tail_number.as_str();
-    let mut units: Vec<&UnitView> =
-        report.units.iter().filter(|u| u.tail_number.as_deref() == Some(name)).collect();
-    units.sort_by_key(|unit| (unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()), unit.name()));
-    let log_errors = report.log_errors.iter().filter(|f| f.tail_number.as_deref() == Some(name));
+    let of_tail = report.units.iter().filter(|u| u.row.tail_number.as_deref() == Some(name));
+    let (removed, units): (Vec<&UnitView>, Vec<&UnitView>) =
+        of_tail.partition(|unit| unit.row.removed_utc.is_some());
     let view = View {
         root: "../",
         title: format!("{name} · actuator free play"),
         footer: report.footer(),
-        tail: name,
-        facts: vec![
-            ("Flights", count(tail.flights)),
-            ("Records", format!("{}, {} rejected", count(tail.records), count(tail.refused))),
-            ("Failed logs", count(tail.logs_in_error)),
-            ("Last flight", minute_or(tail.last_departure_utc)),
-            ("Last estimate", minute_or(tail.last_estimate_utc)),
-        ],
-        label: "Actuators of this tail",
-        groups: if units.is_empty() { Vec::new() } else { vec![Group { tail: "", units }] },
+        tail,
+        verdict: counts_text(units.iter().map(|unit| &unit.row)),
+        warnings: report.warnings(Some(name)),
+        peers,
+        groups: if units.is_empty() { Vec::new() } else { vec![Group::new("", units)] },
+        removed,
         quantity_changes: quantities::changes(report, "../", |change| {
             change.tail_number.as_deref() == Some(name)
         }),
-        charts: quantities::tail_charts(report, name)?,
-        log_errors: log_errors.collect(),
+        log_errors: report.log_errors.iter().filter(|f| f.tail_number.as_deref() == Some(name)).collect(),
     };
     Ok(Page::html(tail_path(name), &view.render()?))
 }

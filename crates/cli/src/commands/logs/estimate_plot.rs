@@ -52,7 +52,7 @@ type Renderer = fn(&[report::EstimatePlot]) -> Result<Vec<u8>, report::Error>;
 fn renderer(file: &Path) -> Result<Renderer, Failure> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match ending.as_str() {
-        "svg" => Ok(|plots| estimate_plot_svg(plots).map(String::into_bytes)),
+        "svg" => Ok(|plots| Ok(estimate_plot_svg(plots).into_bytes())),
         "html" | "htm" => Ok(|plots| estimate_plot_html(plots, None).map(String::into_bytes)),
         "png" => Err(Failure::usage(
             "unknown_ending",

@@ -1,9 +1,10 @@
 //! Comparison with peers: a unit or a tail whose quantities differ from those of its part from the first day.
 //!
 //! Changes in time show nothing of what was always so: a load cell with a wrong zero, a position with a delay, settings of
-//! another part. A unit is compared with the units of its part on other tails, by median and robust spread.
+//! another part. A unit is compared with the units of its part on other tails, by median and robust spread; what belongs to
+//! sensors and recorders, with all units on other tails where its part has too few.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use records::{Quantity, QuantityRow};
 
@@ -16,6 +17,8 @@ const COMPARED: [Quantity; 6] = [
     Quantity::LoadDelayS,
     Quantity::Nis,
 ];
+/// Those of sensors and recorders, which do not depend on the part.
+const OF_SENSORS: [Quantity; 4] = [Quantity::SkewS, Quantity::LoadZeroN, Quantity::LoadDelayS, Quantity::Nis];
 /// Fewest peers.
 const MIN_PEERS: usize = 6;
 /// Spreads from the peers' median from which a unit differs, for many peers; fewer ask for more. Of 60,000 draws each of
@@ -47,33 +50,44 @@ pub(crate) fn notes(rows: &[QuantityRow]) -> Vec<String> {
             deviation.row.tail_number.as_deref().is_some_and(|tail| of_tails.contains_key(tail))
         };
         units.extend(found.iter().filter(|d| d.share.abs() > 1.0 && !is_tails(d)).map(unit_note));
-        tails.extend(of_tails.iter().map(|(tail, members)| tail_note(tail, members)));
+        // Innovations grow with every fault of a sensor: a tail that is named has its reason.
+        let is_named = |tail: &str| tails.iter().any(|(named, _)| named == tail);
+        let new = of_tails.iter().filter(|(tail, _)| quantity != Quantity::Nis || !is_named(tail));
+        let new: Vec<_> = new.map(|(tail, members)| ((*tail).to_owned(), tail_note(tail, members))).collect();
+        tails.extend(new);
     }
-    tails.extend(units);
-    tails
+    tails.into_iter().map(|(_, note)| note).chain(units).collect()
 }
 
 fn deviations(rows: &[QuantityRow], quantity: Quantity) -> Vec<Deviation<'_>> {
-    let mut parts = BTreeMap::<&str, Vec<(&QuantityRow, f64)>>::new();
+    let mut parts = BTreeMap::<Option<&str>, Vec<(&QuantityRow, f64)>>::new();
     for row in rows.iter().filter(|row| row.quantity == quantity.as_str()) {
         let Some(level) = row.level.filter(|level| level.is_finite()) else { continue };
-        parts.entry(row.part_number.as_deref().unwrap_or_default()).or_default().push((row, level));
+        parts.entry(row.part_number.as_deref()).or_default().push((row, level));
     }
-    parts.into_values().flat_map(|units| of_part(&units, quantity)).collect()
+    let all: Vec<(&QuantityRow, f64)> =
+        parts.values().flatten().copied().filter(|_| OF_SENSORS.contains(&quantity)).collect();
+    let each = parts.values().flat_map(|units| units.iter().map(move |unit| (unit, units)));
+    each.filter_map(|(unit, units)| {
+        deviation(unit, units, quantity).or_else(|| deviation(unit, &all, quantity))
+    })
+    .collect()
 }
 
-/// The deviations of the units of one part, each from the units on other tails.
-fn of_part<'a>(units: &[(&'a QuantityRow, f64)], quantity: Quantity) -> Vec<Deviation<'a>> {
-    let deviation = |&(row, level): &(&'a QuantityRow, f64)| {
-        let others = units.iter().filter(|(peer, _)| peer.tail_number != row.tail_number);
-        let peers: Vec<f64> = others.map(|(_, level)| *level).collect();
-        let (median, spread) = centre_and_spread(&peers)?;
-        let factor = SPREADS * (1.0 + MIN_PEERS as f64 / peers.len() as f64);
-        let allowed = factor * spread.hypot(row.level_se.unwrap_or(0.0));
-        let share = (level - median) / allowed.max(row.change_limit.unwrap_or(0.0));
-        Some(Deviation { row, quantity, peers: peers.len(), median, spread, share })
-    };
-    units.iter().filter_map(deviation).collect()
+/// The deviation of a unit from the others on other tails; `None` for too few of them.
+fn deviation<'a>(
+    &(row, level): &(&'a QuantityRow, f64),
+    others: &[(&QuantityRow, f64)],
+    quantity: Quantity,
+) -> Option<Deviation<'a>> {
+    let peers: Vec<_> = others.iter().filter(|(peer, _)| peer.tail_number != row.tail_number).collect();
+    let (median, spread) = centre_and_spread(&peers.iter().map(|(_, level)| *level).collect::<Vec<_>>())?;
+    // A limit may be a share of the level: that of the peers counts, not that of a level which is wrong.
+    let limits = peers.iter().filter_map(|(peer, _)| peer.change_limit).collect();
+    let factor = SPREADS * (1.0 + MIN_PEERS as f64 / peers.len() as f64);
+    let allowed = factor * spread.hypot(row.level_se.unwrap_or(0.0));
+    let share = (level - median) / allowed.max(trend::quantity::median(limits).unwrap_or(0.0));
+    Some(Deviation { row, quantity, peers: peers.len(), median, spread, share })
 }
 
 /// Median and robust spread of enough values.
@@ -126,19 +140,42 @@ fn unit_note(deviation: &Deviation<'_>) -> String {
 }
 
 fn tail_note(tail: &str, members: &[&Deviation<'_>]) -> String {
-    let first = members[0];
-    let (unit, factor) = first.quantity.display_unit();
-    let apart: Vec<f64> =
-        members.iter().map(|d| (d.row.level.unwrap_or_default() - d.median) * factor).collect();
-    let apart = trend::quantity::median(apart).unwrap_or_default();
-    let positions: BTreeSet<&str> = members.iter().filter_map(|d| d.row.position.as_deref()).collect();
+    let quantity = members[0].quantity;
+    let (unit, factor) = quantity.display_unit();
+    let apart = |of: &dyn Fn(&Deviation<'_>) -> f64| {
+        trend::quantity::median(members.iter().map(|d| of(d) * factor).collect()).unwrap_or_default()
+    };
     format!(
-        "{tail}: {} differs by {apart:+.3} {unit} from other tails at {} positions ({}): its sensors or recorder are the \
-         likelier cause, and its gaps are as uncertain",
-        first.quantity.label(),
-        members.len(),
-        positions.into_iter().collect::<Vec<_>>().join(", ")
+        "{tail}: {} of its units reads {} {unit} where other tails read {}: {}",
+        quantity.label(),
+        short(apart(&|d| d.row.level.unwrap_or_default())),
+        short(apart(&|d| d.median)),
+        consequence(quantity),
     )
+}
+
+/// A number with about three digits.
+fn short(value: f64) -> String {
+    let places = [100.0, 10.0].iter().filter(|least| value.abs() < **least).count();
+    format!("{value:.places$}")
+}
+
+/// What a wrong sensor of a tail does to its gaps, and who should act.
+fn consequence(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::LoadZeroN => {
+            "gaps of the contact regression are corrected for it; avionics: check the zero of the load cells"
+        }
+        Quantity::SkewS | Quantity::LoadDelayS => {
+            "gaps of the contact regression are corrected for it; avionics: check the delays of sensors and recorder"
+        }
+        Quantity::Nis => {
+            "the model does not explain its measurements; avionics: check load cells and position sensors"
+        }
+        _ => {
+            "its sensors or recorder are the likelier cause, and its gaps are as uncertain; avionics: check the scale of load and positions"
+        }
+    }
 }
 
 #[cfg(test)]
@@ -197,8 +234,26 @@ mod tests {
             assert!(unit[0].starts_with("T3 p1 (P / 3-1): stiffness 3"), "{unit:?}");
             let tail = notes(&fleet(seed, |tail, _| if tail == 5 { 1.3 } else { 1.0 }));
             assert_eq!(tail.len(), 1, "{tail:?}");
-            assert!(tail[0].starts_with("T5: stiffness differs by +1"), "{tail:?}");
+            assert!(tail[0].starts_with("T5: stiffness of its units reads 6"), "{tail:?}");
         }
+    }
+
+    /// Three tails with four units of four parts each: no part has enough peers, and the load cells are alike.
+    #[test]
+    fn a_sensor_is_compared_across_parts_where_a_part_has_few_units() {
+        let of = |quantity: Quantity| {
+            let mut rows = fleet(3, |tail, _| if tail == 2 { 2.0 } else { 1.0 });
+            rows.truncate(12);
+            for row in &mut rows {
+                (row.quantity, row.part_number) = (quantity.as_str(), row.position.clone());
+                // A limit that is a share of the unit's own level hides nothing.
+                row.change_limit = row.level;
+            }
+            notes(&rows)
+        };
+        assert!(of(Quantity::StiffnessNPerM).is_empty());
+        let found = of(Quantity::LoadZeroN);
+        assert!(found.len() == 1 && found[0].starts_with("T2: load zero of its units reads 9"), "{found:?}");
     }
 
     #[test]

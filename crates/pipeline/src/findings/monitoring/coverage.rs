@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
 use job::Config;
+use records::assessment::action::day_text;
 use records::time::days_between;
 use records::{Installations, PartNumber, TrendRow};
 use serde::Serialize;
@@ -28,11 +29,15 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
         ));
     }
     let newest = installed().filter_map(|row| Some((row.latest_utc?, row.as_of_utc))).max();
-    if let Some((at, _)) = newest.filter(|(at, as_of)| days_between(*at, *as_of) > QUIET_DAYS) {
-        notes.push(format!(
-            "no record after {}; usage goes on at each unit's own rate",
-            at.strftime("%Y-%m-%d")
-        ));
+    if let Some((at, as_of)) = newest.filter(|(at, as_of)| days_between(*at, *as_of) > QUIET_DAYS) {
+        let mut rates: Vec<f64> = installed().filter_map(|row| row.hours_per_day).collect();
+        rates.sort_by(f64::total_cmp);
+        let assumed = match (rates.first(), rates.last()) {
+            (Some(least), Some(most)) if most - least < 0.1 => format!("{most:.1} FH a day"),
+            (Some(least), Some(most)) => format!("{least:.1} to {most:.1} FH a day, each unit's own rate"),
+            _ => "no usage".to_owned(),
+        };
+        notes.push(format!("no flight known since {}: dates assume {assumed}", day_text(as_of, at)));
     }
     notes.extend(flights_table_ends(rows, config));
     notes.extend(look_alikes(rows));
