@@ -54,7 +54,11 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
     // The report shows both.
     fleet.run_ok(&["report", "--output", "report", "--quiet"]);
     let index = std::fs::read_to_string(fleet.path("report/index.html")).unwrap();
-    assert!(index.contains("W1 acknowledged") && index.contains("W2 deferred to 2099-01-31"), "{index}");
+    assert!(
+        index.contains("W1 acknowledged")
+            && index.contains("W2 deferred to <span class=\"d\">2099-01-31</span>"),
+        "{index}"
+    );
     let report: Value =
         serde_json::from_slice(&std::fs::read(fleet.path("report/report.json")).unwrap()).unwrap();
     let units = report["units"].as_array().unwrap();

@@ -55,6 +55,8 @@ pub fn compose(
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
     let requests = requests_by_unit(work_requests::requests(&store.work_events()?, made_utc));
     let mut tails = tails(&histories, config, as_of_utc);
+    // An aircraft whose units flew on others alone has a page too: theirs lead to it.
+    now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
     let compose = ReportComposer {
         config,
         before: &by_name(before),
@@ -439,9 +441,13 @@ fn attribute_by_path(
 /// Adds each tail's logs in error, of tails that never had a good one too.
 fn add_log_errors(tails: &mut BTreeMap<String, ReportTailRow>, faults: &[ReportLogErrorRow]) {
     for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
-        let new = || ReportTailRow { tail_number: name.to_owned(), ..ReportTailRow::default() };
-        tails.entry(name.to_owned()).or_insert_with(new).logs_in_error += 1;
+        entry(tails, name).logs_in_error += 1;
     }
+}
+
+fn entry<'t>(tails: &'t mut BTreeMap<String, ReportTailRow>, name: &str) -> &'t mut ReportTailRow {
+    let new = || ReportTailRow { tail_number: name.to_owned(), ..ReportTailRow::default() };
+    tails.entry(name.to_owned()).or_insert_with(new)
 }
 
 /// An inspection with the median of the last estimates before it: later estimates may be of another gap.

@@ -8,6 +8,9 @@ use crate::charts::sparkline::sparkline;
 use crate::format::date;
 use crate::model::{Report, UnitView};
 
+/// Name of the group of units that are on no known aircraft.
+pub(crate) const UNKNOWN: &str = "tail not known";
+
 /// Units of an aircraft, the earliest date first.
 pub(crate) struct Group<'a> {
     /// Number of the aircraft; empty on its own page.
@@ -47,7 +50,7 @@ pub(crate) fn work(report: &Report) -> Vec<&UnitView> {
 
 /// Groups units that are sorted by aircraft.
 pub(crate) fn grouped<'a>(units: &[&'a UnitView]) -> Vec<Group<'a>> {
-    let tail = |unit: &&'a UnitView| unit.row.tail_number.as_deref().unwrap_or("tail not known");
+    let tail = |unit: &&'a UnitView| unit.row.tail_number.as_deref().unwrap_or(UNKNOWN);
     units.chunk_by(|a, b| tail(a) == tail(b)).map(|of| Group::new(tail(&of[0]), of.to_vec())).collect()
 }
 
