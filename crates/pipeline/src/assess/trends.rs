@@ -26,11 +26,11 @@ use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_chan
 use crate::fleet::bookkeeping::inspections::InspectionIndex;
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::usage::UsageSources;
-use crate::fleet::builder::HistoryBuilder;
+use crate::fleet::builder;
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::merge::of_parts;
+use crate::fleet::unit_rows;
 use job::config::{AsOf, QuantityLimits};
 use records::TrendRow;
 
@@ -294,15 +294,8 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
 }
 
 fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
-    let parts = store.scan_columns(query, &HistoryBuilder::of_store())?;
-    of_parts(parts.len(), true, |gathering, some| {
-        for part in some {
-            let mut batches = parts.read(part)?.into_iter();
-            let put = batches.try_for_each(|batch| gathering.add_store_batch(batch));
-            put.map_err(|e| Error::refused(e.diagnostic()))?;
-        }
-        Ok(())
-    })
+    let scan = store.scan_columns(query, &builder::stored_columns())?;
+    Ok(builder::histories(unit_rows::of_store(&scan, builder::add_stored)?, true).0)
 }
 
 /// One assessment for each selected unit, by part and serial number.
