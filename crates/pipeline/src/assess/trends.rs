@@ -121,12 +121,7 @@ pub fn assess_store_with_quantities(
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    Ok(StoreAssessment {
-        followed: fleet.followed_of(&now, &tail_wide),
-        mapping_faults: fleet.mapping_faults_of(&now),
-        notes: fleet.notes(&now, config),
-        now,
-    })
+    Ok(fleet.assessed(now, &tail_wide, config))
 }
 
 /// Assessments of the units of a run.
@@ -200,14 +195,8 @@ pub fn assess_run(
 /// Assessments of the selected units with everything that a report shows.
 #[derive(Default)]
 pub(crate) struct ReportAssessments {
-    /// Assessments at the date.
-    pub(crate) now: Vec<TrendRow>,
-    /// Followed quantities of these units, and what changed on their tails and parts.
-    pub(crate) followed: FollowedQuantities,
-    /// Wrong mappings that concern them.
-    pub(crate) mapping_faults: Vec<MappingFault>,
-    /// Limits and hours that their assessments lack, in words.
-    pub(crate) notes: Vec<String>,
+    /// Assessments at the date, and what was found about the units.
+    pub(crate) fleet: StoreAssessment,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Assessments of earlier dates, by the number of days before.
@@ -239,7 +228,6 @@ pub(crate) fn assess_for_report(
     let fleet = FleetContext::new(config, installations, histories, &days)?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    let followed = fleet.followed_of(&now, &tail_wide);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
@@ -255,8 +243,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, config));
-    Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
+    Ok(ReportAssessments { fleet: fleet.assessed(now, &tail_wide, config), drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -352,7 +339,7 @@ pub(crate) struct FleetContext<'a> {
 }
 
 impl<'a> FleetContext<'a> {
-    /// Reads all histories and learns the priors of the cut-off before each of the `days`, without later data.
+    /// Adds up the usage of all units, and learns the priors of the cut-off before each of the `days`, without later data.
     pub(crate) fn new(
         config: &'a Config,
         installations: &'a Installations,
@@ -364,7 +351,7 @@ impl<'a> FleetContext<'a> {
         let units: Vec<_> = histories.iter().collect();
         let read = |(name, history)| books.series(name, history, is_booked);
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+        Self::of(config, installations, histories, series, days)
     }
 
     /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
@@ -383,7 +370,7 @@ impl<'a> FleetContext<'a> {
         };
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+        Self::of(config, installations, histories, series, days)
     }
 
     /// Histories, and the usage series of each; the operator's tables apply to those of the store alone.
@@ -392,15 +379,18 @@ impl<'a> FleetContext<'a> {
         installations: &'a Installations,
         histories: &'a Histories,
         series: Vec<Series>,
+        days: &[Timestamp],
     ) -> Result<Self, Error> {
         let is_booked = histories.is_booked();
         let limits = Limits::new(config, series.iter());
+        let parts = histories.names().map(|name| name.0.as_deref()).zip(&series);
+        let priors = FleetPriors::train(parts, limits, days);
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
         Ok(Self {
             limits,
             units,
-            priors: FleetPriors::default(),
+            priors,
             followed: FollowedQuantities::default(),
             conditions: BTreeMap::new(),
             moved: Vec::new(),
@@ -408,13 +398,6 @@ impl<'a> FleetContext<'a> {
             installations: is_booked.then(|| InstallationIndex::new(installations)),
             inspections: if is_booked { InspectionIndex::read(config)? } else { InspectionIndex::default() },
         })
-    }
-
-    /// The same with the priors of the cut-off before each of the days.
-    fn taught_by(mut self, days: &[Timestamp]) -> Self {
-        let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
-        self.priors = FleetPriors::train(units, self.limits, days);
-        self
     }
 
     /// A unit's flights.
@@ -450,6 +433,16 @@ impl<'a> FleetContext<'a> {
         let recent = recent_diagnostics(store, as_of)?;
         let mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
         Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
+    }
+
+    /// Assessments of some units, with what was found about them in addition to gaps.
+    fn assessed(&self, now: Vec<TrendRow>, tail_wide: &[QuantityChange], config: &Config) -> StoreAssessment {
+        StoreAssessment {
+            followed: self.followed_of(&now, tail_wide),
+            mapping_faults: self.mapping_faults_of(&now),
+            notes: self.notes(&now, config),
+            now,
+        }
     }
 
     /// What assessments lack, and what of the fleet differs from its peers, in words.
