@@ -266,7 +266,8 @@ impl RunSummary {
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
         self.samples_repeated = repeated_samples::detect(&recent);
         (self.trends, self.changed, self.states) = (now, changes.changed, states);
-        (self.work_list, self.mapping_faults, self.notes) = (work_list, mapping_faults, notes);
+        (self.work_list, self.mapping_faults) = (work_list, mapping_faults);
+        self.notes.extend(notes);
     }
 
     /// Adds what the status of all logs shows about the aircraft.
@@ -280,6 +281,7 @@ impl RunSummary {
         self.newest_departure_utc = accounts.clone().filter_map(|account| account.departure_utc).max();
         self.quiet = quiet(accounts.clone(), days, self.newest_departure_utc);
         self.quiet_now = quiet(accounts.clone(), days, Some(Timestamp::now())).len();
+        self.notes.extend(coverage::departures_in_another_zone(config, accounts.clone()));
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }

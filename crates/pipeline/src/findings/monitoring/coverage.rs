@@ -111,6 +111,35 @@ fn no_limit(part: &str, count: usize, config: &Config) -> String {
     format!("part {part} is not configured{near}: {lost}; add `[part.\"{part}\"]`, or correct its name")
 }
 
+/// Departures of the flights table that differ from those of the logs by one number of hours: another time zone.
+pub(crate) fn departures_in_another_zone<'a>(
+    config: &Config,
+    accounts: impl Iterator<Item = &'a LogRecord>,
+) -> Option<String> {
+    const QUARTER_S: i64 = 900;
+    const MIN_FLIGHTS: usize = 3;
+    let offset = |account: &LogRecord| {
+        let (tail, id, at) =
+            (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
+        Some(config.flights.of(tail, id, at)?.departure_utc.duration_since(at).as_secs())
+    };
+    let (mut by_offset, mut all) = (BTreeMap::<i64, usize>::new(), 0);
+    for offset_s in accounts.filter_map(offset) {
+        all += 1;
+        *by_offset.entry(offset_s).or_default() += 1;
+    }
+    let (offset_s, flights) = by_offset.into_iter().max_by_key(|(_, flights)| *flights)?;
+    let is_zone = offset_s != 0 && offset_s % QUARTER_S == 0;
+    (is_zone && flights >= MIN_FLIGHTS && 2 * flights > all).then(|| {
+        let hours = offset_s as f64 / 3600.0;
+        let table = config.document.logs.flights.as_deref().unwrap_or_default();
+        format!(
+            "{table}: {flights} of {all} departures are {hours:+} h from those of the logs, which count; write them in UTC, or \
+             with their offset (2026-10-01T08:00-05:00), since those of flights without a log may be on the wrong day"
+        )
+    })
+}
+
 /// Installed positions whose channels no log has, with the number of their aircraft.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
