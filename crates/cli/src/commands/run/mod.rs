@@ -121,7 +121,7 @@ fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Fai
 
 fn request(args: &RunArgs) -> Result<Request, Failure> {
     let empty =
-        |e: records::ids::EmptyIdError| Failure::usage("empty_name", e, "omit the option to select all");
+        |e: records::ids::IdError| Failure::usage("empty_name", e, "omit the option to select all");
     Ok(Request {
         since_utc: args.departures.since,
         until_utc: args.departures.until,
