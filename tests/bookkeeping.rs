@@ -292,8 +292,12 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
     // one is: that without a load in the second case, where the other one has the ailerons alone.
     let run_anew = || {
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        fleet.run_ok(&["run", "--jobs", "1"]);
+        let summary = fleet.run_ok(&["run", "--jobs", "1"]);
         assert_eq!(gaps(&fleet.exported()), gaps(&before));
+        assert!(
+            summary.contains(&format!("  stored      {} records of 30 flights", gaps(&before).len() - 1)),
+            "{summary}"
+        );
         fleet.run_ok(&["store", "verify"]);
         assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
     };

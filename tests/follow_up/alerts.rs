@@ -183,6 +183,23 @@ fn a_failing_command_a_timeout_and_a_bad_folder_lose_no_result() {
     assert_eq!(serials(&got), IN_PLAN);
 }
 
+/// A channel that was renamed with messages in it: they go through another one, or are taken back.
+#[test]
+fn messages_of_a_channel_that_is_gone_can_be_sent_through_another_or_dropped() {
+    let fleet = fleet("[alerts.old]\ncommand = [\"false\"]\n");
+    assert_eq!(run(&fleet).code, Some(5));
+    fleet.configure("[alerts.old]\ncommand = [\"false\"]", "[alerts.files]\nfolder = \"alerts\"");
+    let result = fleet.freeplay(&["run"]);
+    assert!(result.out.contains("`freeplay store alerts --drop old`"), "{result:?}");
+    let drop = ["store", "alerts", "--drop", "old"];
+    assert_eq!(fleet.freeplay(&[&drop[..], &["--to", "none"]].concat()).code, Some(2));
+    fleet.run_ok(&[&drop[..], &["--to", "files"]].concat());
+    assert_eq!(run(&fleet).code, Some(0));
+    assert_eq!(serials(&files(&fleet, "alerts")), IN_PLAN);
+    assert!(fleet.run_ok(&["store", "alerts", "--unsent"]).contains("no alert"));
+    assert_eq!(fleet.freeplay(&drop).code, Some(2), "none is left");
+}
+
 /// Code of the answer and body of each request.
 type Received = Arc<Mutex<Vec<(u16, Value)>>>;
 

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
+use records::time::days_between;
 use records::{Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
@@ -137,6 +138,8 @@ pub struct RunAssessments {
     pub followed: FollowedQuantities,
     /// Number of units of the fleet by state.
     pub states: BTreeMap<&'static str, usize>,
+    /// Number of installed units whose newest gap is older than `trend.stale_after_days` before now.
+    pub stale_now: usize,
     /// Units of the whole fleet in another state than `normal`, touched by the run or not.
     pub work_list: Vec<TrendRow>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
@@ -177,6 +180,11 @@ pub fn assess_run(
     run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
+    let is_stale = |row: &&TrendRow| {
+        let newest = row.latest_utc.filter(|_| row.state.is_some());
+        newest.is_some_and(|at| days_between(at, Timestamp::now()) > config.document.trend.stale_after_days)
+    };
+    run.stale_now = now.iter().filter(is_stale).count();
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
     let causes: BTreeMap<UnitKey, &String> =
         run.changes.changed.iter().map(|change| (change.unit(), &change.because)).collect();

@@ -5,8 +5,8 @@ mod metrics;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use jiff::Timestamp;
@@ -41,22 +41,23 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let started_utc = Timestamp::now();
-    let ended = execute(args, global, output);
-    let code = match &ended {
-        Err(failure) => failure.code(),
-        Ok(Code::Interrupted) => Code::Interrupted,
-        Ok(_) => return ended,
-    };
+    let ended = execute(args, global, output, started_utc);
+    let Err(failure) = &ended else { return ended };
     if let (Some(file), false) = (&args.metrics, args.dry_run)
         && row_output::check_file(file, output).is_ok()
         && !metrics::is_of(file, started_utc)
     {
-        metrics::write_failed(file, started_utc, code)?;
+        metrics::write_failed(file, started_utc, failure.code())?;
     }
     ended
 }
 
-fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+fn execute(
+    args: &RunArgs,
+    global: &Global,
+    output: &Output,
+    started_utc: Timestamp,
+) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
     args.metrics.as_deref().map_or(Ok(()), |file| row_output::check_file(file, output))?;
     let config = load_config(global)?;
@@ -76,7 +77,11 @@ fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Fai
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
     let progress = Progress::new("run", output);
+    let phase = Arc::new(Mutex::new(Phase::Searching));
     let watch = |event: Event| {
+        if matches!(event, Event::Planned { .. }) {
+            enter(&phase, Phase::Processing);
+        }
         output.event(&event);
         follow(&event, &progress);
     };
@@ -87,17 +92,13 @@ fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Fai
         stop: &stop,
         watch: &watch,
     };
-    let is_done = Arc::new(AtomicBool::new(false));
-    announce_interrupt(&stop, &is_done, output);
+    let metrics = args.metrics.clone();
+    answer_interrupt(&stop, &phase, output, move || {
+        metrics.map_or(Ok(()), |file| metrics::write_failed(&file, started_utc, Code::Interrupted))
+    });
     let report = scheduler::run(&config, &request, &context);
-    is_done.store(true, Ordering::Relaxed);
+    enter(&phase, Phase::Ended);
     progress.end();
-    if let (Err(pipeline::Error::Store(store::Error::Held { .. })), true) =
-        (&report, stop.load(Ordering::Relaxed))
-    {
-        output.note("interrupted while waiting for another run; nothing was started");
-        return Ok(Code::Interrupted);
-    }
     let report = report?;
     output.diagnostics(report.errors.iter().map(|e| &e.diagnostic));
     output.diagnostics(&report.follow_up.errors);
@@ -120,8 +121,7 @@ fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Fai
 }
 
 fn request(args: &RunArgs) -> Result<Request, Failure> {
-    let empty =
-        |e: records::ids::EmptyIdError| Failure::usage("empty_name", e, "omit the option to select all");
+    let empty = |e: records::ids::IdError| Failure::usage("empty_name", e, "omit the option to select all");
     Ok(Request {
         since_utc: args.departures.since,
         until_utc: args.departures.until,
@@ -145,18 +145,49 @@ fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Acknowledges the first signal within a fraction of a second, while the logs in progress finish.
-fn announce_interrupt(stop: &Arc<AtomicBool>, is_done: &Arc<AtomicBool>, output: &Output) {
+/// What a run is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// It lists logs, or waits for another run: nothing is stored.
+    Searching,
+    /// It processes logs and stores their results.
+    Processing,
+    Ended,
+}
+
+fn enter(phase: &Mutex<Phase>, next: Phase) {
+    *phase.lock().unwrap_or_else(PoisonError::into_inner) = next;
+}
+
+/// Answers the first signal within a fraction of a second: the logs in progress finish, and a run that has begun none ends.
+/// A listing that hangs could not be asked to end.
+fn answer_interrupt(
+    stop: &Arc<AtomicBool>,
+    phase: &Arc<Mutex<Phase>>,
+    output: &Output,
+    write_metrics: impl FnOnce() -> Result<(), Failure> + Send + 'static,
+) {
     const POLL: Duration = Duration::from_millis(100);
-    let (stop, is_done, output) = (Arc::clone(stop), Arc::clone(is_done), output.clone());
+    let (stop, phase, output) = (Arc::clone(stop), Arc::clone(phase), output.clone());
     std::thread::spawn(move || {
-        while !is_done.load(Ordering::Relaxed) {
-            if stop.load(Ordering::Relaxed) {
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(POLL);
+        }
+        // Held until the process ends: the run must not begin to store meanwhile.
+        let phase = phase.lock().unwrap_or_else(PoisonError::into_inner);
+        match *phase {
+            Phase::Searching => {
+                output.note("interrupted while searching for logs or waiting; no log was begun");
+                if let Err(failure) = write_metrics() {
+                    output.failure(&failure);
+                }
+                std::process::exit(Code::Interrupted as i32);
+            }
+            Phase::Processing => {
                 output
                     .note("interrupted: finishing the logs in progress; press Ctrl-C again to stop at once");
-                return;
             }
-            std::thread::sleep(POLL);
+            Phase::Ended => {}
         }
     });
 }
