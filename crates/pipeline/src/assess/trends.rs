@@ -124,7 +124,7 @@ pub fn assess_store_with_quantities(
     Ok(StoreAssessment {
         followed: fleet.followed_of(&now, &tail_wide),
         mapping_faults: fleet.mapping_faults_of(&now),
-        notes: fleet.notes(&now, config),
+        notes: fleet.notes(&now, ask.as_of_utc, config),
         now,
     })
 }
@@ -174,7 +174,7 @@ pub fn assess_run(
         recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
-        notes: fleet.notes(&now, config),
+        notes: fleet.notes(&now, None, config),
         changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
@@ -255,7 +255,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, config));
+    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, ask.as_of_utc, config));
     Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
 }
 
@@ -459,10 +459,14 @@ impl<'a> FleetContext<'a> {
         Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
     }
 
-    /// What assessments lack, and what of the fleet differs from its peers, in words.
-    fn notes(&self, rows: &[TrendRow], config: &Config) -> Vec<String> {
-        let mut notes = coverage::notes(rows, config);
-        notes.extend(peers::notes(&self.followed.rows));
+    /// What assessments lack, and what of their units differs from its peers, in words.
+    /// The age of the newest log counts from a given date of assessment, else from today.
+    fn notes(&self, rows: &[TrendRow], given: Option<Timestamp>, config: &Config) -> Vec<String> {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let newest_log = rows.iter().filter_map(|row| self.latest_flight(&row.unit(), row.as_of_utc)).max();
+        let today = given.unwrap_or_else(Timestamp::now);
+        let mut notes = coverage::notes(rows, newest_log, today, config);
+        notes.extend(peers::notes(&self.followed.rows, |row| units.contains(&row.unit())));
         notes
     }
 
