@@ -122,7 +122,7 @@ pub fn assess_store_with_quantities(
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    Ok(fleet.assessed(now, &tail_wide, config))
+    Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc, config))
 }
 
 /// Assessments of the units of a run.
@@ -172,7 +172,7 @@ pub fn assess_run(
         recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
-        notes: fleet.notes(&now, config),
+        notes: fleet.notes(&now, None, config),
         changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
@@ -251,7 +251,8 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    Ok(ReportAssessments { fleet: fleet.assessed(now, &tail_wide, config), drawn, before, past, priors })
+    let fleet = fleet.assessed(now, &tail_wide, ask.as_of_utc, config);
+    Ok(ReportAssessments { fleet, drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -444,19 +445,29 @@ impl<'a> FleetContext<'a> {
     }
 
     /// Assessments of some units, with what was found about them in addition to gaps.
-    fn assessed(&self, now: Vec<TrendRow>, tail_wide: &[QuantityChange], config: &Config) -> StoreAssessment {
+    fn assessed(
+        &self,
+        now: Vec<TrendRow>,
+        tail_wide: &[QuantityChange],
+        given: Option<Timestamp>,
+        config: &Config,
+    ) -> StoreAssessment {
         StoreAssessment {
             followed: self.followed_of(&now, tail_wide),
             mapping_faults: self.mapping_faults_of(&now),
-            notes: self.notes(&now, config),
+            notes: self.notes(&now, given, config),
             now,
         }
     }
 
-    /// What assessments lack, and what of the fleet differs from its peers, in words.
-    fn notes(&self, rows: &[TrendRow], config: &Config) -> Vec<String> {
-        let mut notes = coverage::notes(rows, config);
-        notes.extend(peers::notes(&self.followed.rows));
+    /// What assessments lack, and what of their units differs from its peers, in words.
+    /// The age of the newest log counts from a given date of assessment, else from today.
+    fn notes(&self, rows: &[TrendRow], given: Option<Timestamp>, config: &Config) -> Vec<String> {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let newest_log = rows.iter().filter_map(|row| self.latest_flight(&row.unit(), row.as_of_utc)).max();
+        let today = given.unwrap_or_else(Timestamp::now);
+        let mut notes = coverage::notes(rows, newest_log, today, config);
+        notes.extend(peers::notes(&self.followed.rows, |row| units.contains(&row.unit())));
         notes
     }
 

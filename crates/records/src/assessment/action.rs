@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 
 use crate::assessment::trend_row::TrendRow;
-use crate::time::days_between;
+use crate::time::day_text;
 
 /// What a unit's state asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,7 +111,6 @@ impl TrendRow {
 
     /// A date for readers: `28 Dec`, with its year where it is more than 300 days from `as_of_utc`.
     pub fn day(&self, at: Timestamp) -> String {
-        let is_near = days_between(self.as_of_utc, at).abs() <= 300.0;
-        at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
+        day_text(at, self.as_of_utc)
     }
 }

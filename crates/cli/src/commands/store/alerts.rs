@@ -11,7 +11,7 @@ use crate::args::RowFormatArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
-use crate::table::{self, count, number, text};
+use crate::table::{self, count, number, or_dash, text, unit_name};
 
 /// Lists alerts.
 ///
@@ -100,40 +100,29 @@ fn page(found: &[AlertRecord]) -> String {
     if found.is_empty() {
         return "no alert\n".to_owned();
     }
-    let columns = [
-        text("alert", 2),
-        text("part / serial", 0),
-        text("tail", 3),
-        text("change", 0),
-        text("channel", 0),
-        text("status", 0),
-        number("attempts", 4),
-        text("error", 5),
-    ];
-    let cells = |row: &AlertRecord| {
-        let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+    let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+    let change = |row: &AlertRecord| {
         let change = format!("{} → {}", word(&row.from_state), word(&row.to_state));
-        let change = match row.kind.as_str() {
+        match row.kind.as_str() {
             "change" if row.quantity == GAP => change,
             "change" => format!("{}: {change}", row.quantity),
             kind => kind.to_owned(),
-        };
-        let unit = match (&row.serial_number, &row.part_number) {
-            (Some(serial), part) => format!("{} / {serial}", part.as_deref().unwrap_or("–")),
-            (None, Some(part)) => part.clone(),
-            (None, None) => table::empty_cell(),
-        };
-        vec![
-            row.alert_id.clone(),
-            unit,
-            row.tail_number.clone().unwrap_or_else(table::empty_cell),
-            change,
-            if row.channel.is_empty() { table::empty_cell() } else { row.channel.clone() },
-            row.status.as_str().to_owned(),
-            row.attempts.to_string(),
-            row.error.clone().unwrap_or_else(table::empty_cell),
-        ]
+        }
     };
-    let head = format!("{}\n", count(found.len(), "row"));
-    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    let unit = |row: &AlertRecord| match (&row.serial_number, &row.part_number) {
+        (Some(serial), part) => unit_name(part.as_deref(), serial),
+        (None, part) => or_dash(part.as_deref()),
+    };
+    let channel = |row: &AlertRecord| Some(row.channel.clone()).filter(|channel| !channel.is_empty());
+    let columns: &table::Columns<'_, AlertRecord> = &[
+        (text("alert", 2), &|r| r.alert_id.clone()),
+        (text("part / serial", 0), &unit),
+        (text("tail", 3), &|r| or_dash(r.tail_number.as_deref())),
+        (text("change", 0), &change),
+        (text("channel", 0), &|r| or_dash(channel(r).as_deref())),
+        (text("status", 0), &|r| r.status.as_str().to_owned()),
+        (number("attempts", 4), &|r| r.attempts.to_string()),
+        (text("error", 5), &|r| or_dash(r.error.as_deref())),
+    ];
+    count(found.len(), "row") + "\n" + &table::of(found, columns)
 }

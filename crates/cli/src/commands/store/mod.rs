@@ -236,7 +236,7 @@ fn export(config: &Config, format: &RowFormatArgs, output: &Output) -> Result<Co
             format,
             output,
             || Ok(to_batch(&records).map_err(store::Error::from)?),
-            || query::page(&records, config),
+            || query::page(&records),
         )?;
     } else {
         let batch = store.scan(&Query::default())?;

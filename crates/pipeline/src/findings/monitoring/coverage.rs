@@ -5,13 +5,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
 use job::Config;
-use records::time::days_between;
+
+use records::time::{day_text, days_between};
 use records::{Installations, PartNumber, TrendRow};
 use serde::Serialize;
 use store::LogRecord;
 
-/// Limits and hours that the assessments of some units lack, in words.
-pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
+/// Limits, hours and new logs that the assessments of some units lack, in words.
+///
+/// `newest_log` is the departure of the newest log of these units, and `today` the date from which its age counts.
+pub fn notes(
+    rows: &[TrendRow],
+    newest_log: Option<Timestamp>,
+    today: Timestamp,
+    config: &Config,
+) -> Vec<String> {
     let installed = || rows.iter().filter(|row| row.removed_utc.is_none());
     let mut without_limit = BTreeMap::<&str, usize>::new();
     for row in installed().filter(|row| row.limit_m.is_none()) {
@@ -27,16 +35,27 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             units(of_logs)
         ));
     }
-    let newest = installed().filter_map(|row| Some((row.latest_utc?, row.as_of_utc))).max();
-    if let Some((at, _)) = newest.filter(|(at, as_of)| days_between(*at, *as_of) > QUIET_DAYS) {
-        notes.push(format!(
-            "no record after {}; usage goes on at each unit's own rate",
-            at.strftime("%Y-%m-%d")
-        ));
-    }
+    let as_of = rows.first().map(|row| row.as_of_utc);
+    notes.extend(newest_log.zip(as_of).and_then(|(at, as_of)| age_of(at, as_of, today)));
     notes.extend(flights_table_ends(rows, config));
     notes.extend(look_alikes(rows));
     notes
+}
+
+/// Age of the newest log from the first day on, and what that means for dates.
+fn age_of(newest_log: Timestamp, as_of: Timestamp, today: Timestamp) -> Option<String> {
+    let age = days_between(newest_log, today) as i64;
+    let age = match age {
+        ..1 => return None,
+        1 => "1 day".to_owned(),
+        _ => format!("{age} days"),
+    };
+    let dates = if days_between(as_of, today) < 1.0 {
+        "since then, usage goes on at each unit's own rate"
+    } else {
+        "states are those of the newest record (`trend.as_of`)"
+    };
+    Some(format!("newest log {}, {age} old; {dates}", day_text(newest_log, today)))
 }
 
 /// Units of one part whose serial numbers look alike: one of them may be misspelt.
@@ -93,7 +112,7 @@ fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
     ))
 }
 
-/// Days without a record from which a note states that usage is assumed to go on.
+/// Days by which logs may go on after the end of the flights table.
 const QUIET_DAYS: f64 = 3.0;
 
 fn units(count: usize) -> String {
