@@ -111,6 +111,26 @@ fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
     }
 }
 
+/// A flights table in local time, five hours behind UTC, is named; the logs' own departures stay.
+#[test]
+fn departures_in_another_zone_are_named() {
+    let fleet = TestFleet::processed();
+    let row = |log: std::path::PathBuf| {
+        let facts: BTreeMap<String, String> = facts(&log).into_iter().collect();
+        let departure: jiff::Timestamp = facts["departure_utc"].parse().unwrap();
+        let local = (departure - jiff::SignedDuration::from_hours(5)).strftime("%Y-%m-%d %H:%M:%S");
+        format!("{},{},{local}\n", facts["tail_number"], facts["flight_id"])
+    };
+    let rows: String = fleet.logs().into_iter().map(row).collect();
+    std::fs::write(fleet.path("flights.csv"), format!("tail_number,flight_id,departure_utc\n{rows}"))
+        .unwrap();
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
+    let before = trend(&fleet);
+    let notes = run(&fleet)["notes"].to_string();
+    assert!(notes.contains("departures are -5 h from those of the logs"), "{notes}");
+    assert_eq!(trend(&fleet), before);
+}
+
 /// One digit of the hour meter of a flight without a log.
 #[test]
 fn a_misread_hour_meter_moves_no_usage_and_is_named() {
@@ -272,8 +292,12 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
     // one is: that without a load in the second case, where the other one has the ailerons alone.
     let run_anew = || {
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        fleet.run_ok(&["run", "--jobs", "1"]);
+        let summary = fleet.run_ok(&["run", "--jobs", "1"]);
         assert_eq!(gaps(&fleet.exported()), gaps(&before));
+        assert!(
+            summary.contains(&format!("  stored      {} records of 30 flights", gaps(&before).len() - 1)),
+            "{summary}"
+        );
         fleet.run_ok(&["store", "verify"]);
         assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
     };

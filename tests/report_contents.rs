@@ -33,14 +33,23 @@ fn a_flight_leads_to_its_diagnostic_plot() {
         assert!(page.contains(&format!("gap {gap_um:.1} µm")), "{flight}");
         assert_eq!(links(&page, "serial/"), ["../serial/unit-EMA-27-1040_1040-0013.html"]);
     }
-    // A log that is gone is an error of its own; the report is there without its plot.
-    let log = queried[1]["log_path"].as_str().unwrap();
-    std::fs::remove_file(fleet.path(log)).unwrap();
-    let result = fleet.freeplay(&serial);
-    assert_eq!(result.code, Some(1), "{result:?}");
-    assert!(result.err.contains(log), "{}", result.err);
-    let unit = read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html");
-    assert_eq!(links(&unit, "flight/").into_iter().collect::<BTreeSet<_>>().len(), 1);
+    // Another log in its place, and a log that is gone, are errors of their own; the report is there without the plot.
+    let [other, log] = [0, 1].map(|k| fleet.path(queried[k]["log_path"].as_str().unwrap()));
+    let facts = crate::harness::facts(&log);
+    crate::harness::rewrite(&other, &log, &facts, |_| true, |_| true);
+    for code in ["log_changed", "unreadable"] {
+        let result = fleet.freeplay(&serial);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        let name = queried[1]["log_path"].as_str().unwrap();
+        assert!(
+            result.err.contains(&format!("error[{code}]")) && result.err.contains(name),
+            "{}",
+            result.err
+        );
+        let unit = read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html");
+        assert_eq!(links(&unit, "flight/").into_iter().collect::<BTreeSet<_>>().len(), 1);
+        let _ = std::fs::remove_file(&log);
+    }
     // Without the option no log is read.
     fleet.run_ok(&serial[..5]);
     assert!(links(&read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html"), "flight/").is_empty());

@@ -25,4 +25,5 @@ const SHORT_HORIZON: &str = "planning_horizon_hours = 1.0";
 
 mod alerts;
 mod dashboards;
+mod same_story;
 mod work;

@@ -1,4 +1,4 @@
-"""Writes src/vector.rs from the estimator's reference vectors: python3 make_vector.py (needs pyarrow)."""
+"""Writes src/vector.rs and the columns that it includes from the estimator's reference vectors: python3 make_vector.py (needs pyarrow)."""
 
 import json
 from pathlib import Path
@@ -19,7 +19,9 @@ def numbers(values):
 
 def column(name, said, key):
     values = table[key].to_pylist()
-    return f"/// {said}\npub const {name}: [f64; {len(values)}] = {numbers(values)};\n"
+    file = f"{name.lower()}.txt"
+    (HERE / "src" / file).write_text("[\n" + "".join(f"    {float(v)!r},\n" for v in values) + "]\n")
+    return f'/// {said}\npub const {name}: [f64; {len(values)}] = include!("{file}");\n'
 
 
 # W_d is symmetric, so that rows are columns.

@@ -112,6 +112,27 @@ fn a_stored_flight_is_not_displaced_by_a_later_claim() {
     assert_eq!(fleet.exported(), before);
 }
 
+/// A supplier's folder whose logs may be of one tail only; a key that comes later finds what was stored before.
+#[test]
+fn a_log_in_a_folder_of_other_tails_is_an_error_until_its_tail_is_allowed() {
+    let fleet = TestFleet::sample();
+    fleet.configure("[logs]", "[logs]\ntails = { \"*/N412FP/*0003*\" = [\"N41[34]FP\"] }");
+    let failed = fleet.freeplay(&["run"]);
+    assert_eq!(failed.code, Some(1), "{failed:?}");
+    assert!(
+        failed.err.contains("error[tail_not_allowed]") && failed.err.contains("N412FP"),
+        "{}",
+        failed.err
+    );
+    assert!(failed.out.contains("116 records of 29 flights"), "{}", failed.out);
+    fleet.configure("N41[34]FP", "N41?FP");
+    assert!(fleet.run_ok(&["run"]).contains("4 records of 1 flight"));
+    fleet.configure("N41?FP", "N999*");
+    let failed = fleet.freeplay(&["run"]);
+    assert_eq!(failed.code, Some(1), "{failed:?}");
+    assert!(failed.out.contains("4 stored records of logs that failed now stay"), "{}", failed.out);
+}
+
 /// A pipe, and folders that hold links to each other, among the logs.
 #[cfg(unix)]
 #[test]

@@ -62,6 +62,7 @@ fn content_is_compared_on_request() {
     let log = &fleet.logs()[4];
     let written = std::fs::metadata(log).unwrap().modified().unwrap();
     let mut content = std::fs::read(log).unwrap();
+    let sound = content.clone();
     let middle = content.len() / 2;
     content[middle] ^= 1;
     std::fs::write(log, content).unwrap();
@@ -69,6 +70,12 @@ fn content_is_compared_on_request() {
     assert!(to_do(&fleet.run_ok(&["run"])).ends_with("10 logs: 0 new or changed, 10 already processed"));
     let result = fleet.freeplay(&["run", "--verify-content"]);
     assert!(to_do(&result.out).ends_with("10 logs: 1 new or changed, 9 already processed"), "{result:?}");
+    // A failed log of the same size and date is compared too.
+    assert_eq!(result.code, Some(1), "its checksum is wrong: {result:?}");
+    std::fs::write(log, sound).unwrap();
+    std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1), "the same size and date");
+    fleet.run_ok(&["run", "--verify-content"]);
     let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
     assert!(page.contains("known 9") && page.contains("10 logs"), "{page}");
 }

@@ -640,23 +640,28 @@ fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
     }
 }
 
+/// While it processes logs, and while it groups pieces, for which it reads logs before it has a plan.
 #[test]
 fn a_run_with_a_log_that_never_ends_answers_a_signal() {
     let Some(injector) = Injector::get() else { return };
-    let fleet = small();
-    let fault = injector.hang(&fleet);
-    let hanging = fleet.path("hanging.txt");
-    let mut command = injector.command(&fleet, &["run", "--jobs", "1"], &fault);
-    let mut child = command.env("FAULT_COUNT", &hanging).stdout(Stdio::null()).spawn().unwrap();
-    wait_until(|| hanging.exists());
-    let began = Instant::now();
-    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
-    let mut ended = None;
-    wait_until(|| {
-        ended = child.try_wait().unwrap();
-        ended.is_some() || began.elapsed() > Duration::from_secs(20)
-    });
-    child.kill().unwrap();
-    assert_eq!(ended.expect("no answer to SIGTERM in 20 s").code(), Some(130));
-    fleet.run_ok(&["run"]);
+    for setting in ["", "pieces = true\n"] {
+        let fleet = small();
+        let hang = injector.hang(&fleet);
+        fleet.configure("[logs]", &format!("[logs]\n{setting}"));
+        let fault = if setting.is_empty() { hang } else { Fault { at: 1, ..hang } };
+        let hanging = fleet.path("hanging.txt");
+        let mut command = injector.command(&fleet, &["run", "--jobs", "1"], &fault);
+        let mut child = command.env("FAULT_COUNT", &hanging).stdout(Stdio::null()).spawn().unwrap();
+        wait_until(|| hanging.exists());
+        let began = Instant::now();
+        Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+        let mut ended = None;
+        wait_until(|| {
+            ended = child.try_wait().unwrap();
+            ended.is_some() || began.elapsed() > Duration::from_secs(20)
+        });
+        child.kill().unwrap();
+        assert_eq!(ended.expect("no answer to SIGTERM in 20 s").code(), Some(130), "{setting}");
+        fleet.run_ok(&["run"]);
+    }
 }

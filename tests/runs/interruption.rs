@@ -151,7 +151,8 @@ fn a_run_that_waits_can_be_interrupted() {
     fleet.run_ok(&["run", "--limit", "1"]);
     let store = store::Store::open(fleet.path("results")).unwrap();
     let held = store.lock(&store::Holder::this_process(), None).unwrap();
-    let child = fleet.command(&["run", "--wait", "10m"]).stdout(null()).stderr(null()).spawn().unwrap();
+    let run = ["run", "--wait", "10m", "--metrics", "freeplay.prom"];
+    let child = fleet.command(&run).stdout(null()).stderr(null()).spawn().unwrap();
     let opened = format!("/proc/{}/fd/*", child.id());
     let has_lock =
         |file: std::path::PathBuf| std::fs::read_link(file).is_ok_and(|file| file.ends_with("lock"));
@@ -159,5 +160,7 @@ fn a_run_that_waits_can_be_interrupted() {
     interrupt(&child);
     let result = child.wait_with_output().unwrap();
     assert_eq!(result.status.code(), Some(130), "{result:?}");
+    let metrics = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
+    assert!(metrics.contains("\nfreeplay_run_exit_code 130\n"), "{metrics}");
     drop(held);
 }

@@ -7,14 +7,12 @@ use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use arrow::array::AsArray;
-use arrow::compute::cast;
-use arrow::datatypes::DataType;
+use clap::ValueEnum;
 use clap_complete::CompletionCandidate;
 use job::Config;
-use store::{Query, Store};
+use store::Store;
 
-use crate::args::CONFIG;
+use crate::args::{CONFIG, QueryKey};
 
 /// Most names that are offered at once.
 const MAX_CANDIDATES: usize = 200;
@@ -47,14 +45,9 @@ pub(crate) fn positions(typed: &OsStr) -> Vec<CompletionCandidate> {
 /// Values for the field that the command line of `query` names.
 pub(crate) fn queried(typed: &OsStr) -> Vec<CompletionCandidate> {
     let words: Vec<String> = std::env::args().collect();
-    let field = words.iter().skip_while(|word| *word != "query").find_map(|word| match word.as_str() {
-        "tail" => Some("tail_number"),
-        "serial" => Some("serial_number"),
-        "flight" => Some("flight_id"),
-        "position" => Some("position"),
-        _ => None,
-    });
-    field.map(|field| candidates(typed, field)).unwrap_or_default()
+    let mut typed_words = words.iter().skip_while(|word| *word != "query");
+    let key = typed_words.find_map(|word| QueryKey::from_str(word, false).ok());
+    key.map(|key| candidates(typed, key.column())).unwrap_or_default()
 }
 
 fn candidates(typed: &OsStr, column: &str) -> Vec<CompletionCandidate> {
@@ -74,16 +67,7 @@ fn is_plain(name: &str) -> bool {
 fn names(column: &str) -> Option<BTreeSet<String>> {
     let file = std::env::var_os("FREEPLAY_CONFIG").map_or_else(|| PathBuf::from(CONFIG), PathBuf::from);
     let config = Config::read(&file).ok()?;
-    let store = Store::open(config.store()).ok()?;
-    let parts = store.scan_columns(&Query::default(), &[column]).ok()?;
-    let mut names = BTreeSet::new();
-    for part in 0..parts.len() {
-        for batch in parts.read(part).ok()? {
-            let values = cast(batch.column_by_name(column)?, &DataType::Utf8).ok()?;
-            names.extend(values.as_string::<i32>().iter().flatten().map(str::to_owned));
-        }
-    }
-    Some(names)
+    Store::open(config.store()).ok()?.distinct(column).ok()
 }
 
 #[cfg(test)]

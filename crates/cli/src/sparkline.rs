@@ -4,11 +4,14 @@
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 /// Maximum length, characters.
 const WIDTH: usize = 12;
-/// Minimum full scale as a share of the largest value, so that noise does not look like growth.
+/// Least full scale as a share of the limit, or of the largest value, so that noise does not look like growth.
 const LEAST_SHARE: f64 = 0.2;
 
-/// Sparkline of at most twelve means of neighbours, oldest first; empty for fewer than two values. With a limit, a full
-/// block is the limit and an empty one zero; otherwise the values' own range.
+/// Heading of a column of sparklines: their scale.
+pub(crate) const SCALE: &str = "▁ lowest █ limit";
+
+/// Sparkline of at most twelve means of neighbours, oldest first; empty for fewer than two values. An empty block is the
+/// lowest value and a full one the limit, or the highest value without a limit.
 pub(crate) fn sparkline(values: &[f64], limit: Option<f64>) -> String {
     if values.len() < 2 {
         return String::new();
@@ -19,8 +22,11 @@ pub(crate) fn sparkline(values: &[f64], limit: Option<f64>) -> String {
     let means: Vec<f64> = (0..buckets).map(|k| mean(&values[edge(k)..edge(k + 1)])).collect();
     let (low, high) =
         means.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    let range = (high - low).max(LEAST_SHARE * high.abs()).max(f64::MIN_POSITIVE);
-    let (low, height) = limit.map_or((low, range), |limit| (0.0, limit));
+    let (low, top) = match limit {
+        Some(limit) => (low.min((1.0 - LEAST_SHARE) * limit), limit),
+        None => (low, high.max(low + LEAST_SHARE * high.abs())),
+    };
+    let height = (top - low).max(f64::MIN_POSITIVE);
     let last = BLOCKS.len() - 1;
     means.iter().map(|v| BLOCKS[(((v - low) / height * last as f64).round() as usize).min(last)]).collect()
 }
@@ -37,9 +43,15 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_is_a_full_block() {
+    fn the_lowest_value_is_an_empty_block_and_the_limit_a_full_one() {
         assert_eq!(sparkline(&[0.0, 75e-6, 150e-6, 160e-6], Some(150e-6)), "▁▅██");
-        assert_eq!(sparkline(&[-1e-6, 20e-6], Some(150e-6)), "▁▂");
+        assert_eq!(sparkline(&[100e-6, 110e-6, 125e-6, 140e-6], Some(150e-6)), "▁▂▅▇", "wear shows");
+        assert_eq!(
+            sparkline(&[140e-6, 141e-6, 139e-6], Some(150e-6)),
+            "▆▆▅",
+            "noise near the limit does not"
+        );
+        assert_eq!(sparkline(&[20e-6, 21e-6, 20e-6], Some(150e-6)), "▁▁▁");
     }
 
     #[test]

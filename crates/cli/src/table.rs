@@ -1,6 +1,8 @@
-//! Text tables: fitted to the terminal by hiding the least important columns first; the text of the last column wraps.
+//! Text tables: fitted to the terminal by hiding the least important columns first. The text of the last column stands
+//! beside the others where there is room, else below its row; it is broken between words and never cut.
 
-use comfy_table::{CellAlignment, Table as Grid};
+use std::fmt::Write as _;
+
 use report::StateBadge;
 
 use crate::output::escape;
@@ -9,8 +11,10 @@ use crate::output::escape;
 const GAP: usize = 2;
 /// Minimum width to which text is cut.
 const LEAST_TEXT: usize = 6;
-/// Width of the last column from which columns are hidden instead of wrapping it more.
-const LEAST_WRAPPED: usize = 20;
+/// Width of the last text column below which its text stands below the row.
+const LEAST_BESIDE: usize = 60;
+/// Indent of text below its row.
+const INDENT: usize = 4;
 
 /// A column of a table.
 #[derive(Debug, Clone, Copy)]
@@ -19,7 +23,7 @@ pub(crate) struct Column {
     pub heading: &'static str,
     /// Whether the column is right-aligned.
     pub right: bool,
-    /// Rank: 0 is hidden last.
+    /// Rank: 0 is never hidden, the others from the highest down.
     pub rank: u8,
 }
 
@@ -33,82 +37,113 @@ pub(crate) const fn number(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: true, rank }
 }
 
-/// Lays out rows within the width of the terminal; a pipe gets all columns.
+/// Columns of rows: each with the text of its cells.
+pub(crate) type Columns<'c, R> = [(Column, &'c dyn Fn(&R) -> String)];
+
+/// A table of rows within the width of the terminal; a pipe gets all columns. Without rows it is empty.
+pub(crate) fn of<'r, R: 'r>(rows: impl IntoIterator<Item = &'r R>, columns: &Columns<'_, R>) -> String {
+    let cells = |row: &'r R| columns.iter().map(|(_, cell)| cell(row)).collect();
+    let rows: Vec<Vec<String>> = rows.into_iter().map(cells).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    layout(&columns.iter().map(|(column, _)| *column).collect::<Vec<_>>(), &rows)
+}
+
+/// The same for cells that are text already.
 pub(crate) fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
     within(columns, rows, terminal_width())
 }
 
 fn within(columns: &[Column], rows: &[Vec<String>], width: usize) -> String {
+    let escaped = |row: &Vec<String>| row.iter().map(|cell| escape(cell)).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(escaped).collect();
     let mut kept: Vec<usize> = (0..columns.len()).collect();
-    let mut order: Vec<usize> = kept.clone();
+    let is_least = |i: &usize| columns[*i].rank == 0;
+    let least: Vec<usize> = kept.iter().copied().filter(is_least).collect();
+    let below = kept.last().copied().filter(|&last| is_prose(columns, last));
+    let below = below.filter(|_| needed(columns, &rows, &least) > width);
+    kept.retain(|&i| Some(i) != below);
+    let mut order = kept.clone();
     order.sort_by_key(|&i| std::cmp::Reverse(columns[i].rank));
+    let mut hidden = 0;
     for out in order {
-        if needed(columns, rows, &kept) <= width || columns[out].rank == 0 {
+        if needed(columns, &rows, &kept) <= width || columns[out].rank == 0 {
             break;
         }
         kept.retain(|&i| i != out);
+        hidden += 1;
     }
-    let mut text = grid(columns, rows, &kept, &widths(columns, rows, &kept, width));
-    text.push('\n');
-    if kept.len() < columns.len() {
-        let hidden = (0..columns.len()).filter(|i| !kept.contains(i)).map(|i| columns[i].heading);
-        let note = format!(
-            "hidden: {}; see all in a wider terminal or with `| less -S`",
-            hidden.collect::<Vec<_>>().join(", ")
-        );
-        text.push_str(&wrapped(&note, width));
-        text.push('\n');
-    }
-    text
-}
-
-fn grid(columns: &[Column], rows: &[Vec<String>], kept: &[usize], widths: &[usize]) -> String {
-    let mut grid = Grid::new();
-    let fitted = |i: usize, text: &str, width: usize| {
-        if wraps(columns, i) { wrapped(text, width) } else { shortened(text, width) }
-    };
-    let line = |cell: &dyn Fn(usize) -> String| -> Vec<String> {
-        kept.iter().zip(widths).map(|(&i, &width)| fitted(i, &cell(i), width)).collect()
-    };
-    grid.load_style(comfy_table::presets::NOTHING).set_header(line(&|i| columns[i].heading.to_owned()));
-    for row in rows {
-        grid.add_row(line(&|i| escape(&row[i])));
-    }
-    for (at, &i) in kept.iter().enumerate() {
-        if let Some(column) = grid.column_mut(at) {
-            column.set_padding((0, GAP as u16));
-            if columns[i].right {
-                column.set_cell_alignment(CellAlignment::Right);
-            }
+    let widths = widths(columns, &rows, &kept, width);
+    let headings: Vec<String> = columns.iter().map(|column| column.heading.to_owned()).collect();
+    let mut page = lines(columns, &kept, &widths, &headings);
+    for row in &rows {
+        page.push_str(&lines(columns, &kept, &widths, row));
+        if let Some(below) = below.filter(|&below| row[below] != empty_cell()) {
+            page.push_str(&indented(&row[below], INDENT, width));
         }
     }
-    let lines: Vec<String> = grid.lines().map(|line| line.trim_end().to_owned()).collect();
-    lines.join("\n")
+    if hidden > 0 {
+        let _ = writeln!(page, "{} hidden; `| less -S` shows all", count(hidden, "column"));
+    }
+    page
 }
 
-/// Whether a column wraps: the last one, if it is text.
-fn wraps(columns: &[Column], i: usize) -> bool {
+/// The lines of one row: the text of the last column continues below itself.
+fn lines(columns: &[Column], kept: &[usize], widths: &[usize], row: &[String]) -> String {
+    let mut line = String::new();
+    for (&i, &width) in kept.iter().zip(widths) {
+        let start = line.chars().count();
+        let text = match &row[i] {
+            prose if is_prose(columns, i) && !is_path(prose) => {
+                wrapped(prose, width).join(&format!("\n{}", " ".repeat(start)))
+            }
+            text => shortened(text, width),
+        };
+        let blanks = " ".repeat(width.saturating_sub(text.chars().count()));
+        let (before, after) =
+            if columns[i].right { (blanks, String::new()) } else { (String::new(), blanks) };
+        line.extend([before, text, after, " ".repeat(GAP)]);
+    }
+    line.truncate(line.trim_end().len());
+    line + "\n"
+}
+
+/// Whether a column holds sentences: the last one, if it is text.
+fn is_prose(columns: &[Column], i: usize) -> bool {
     i + 1 == columns.len() && !columns[i].right
 }
 
-/// Text in lines of a width, broken between words; a longer word is shortened.
-fn wrapped(text: &str, width: usize) -> String {
-    if text.chars().count() <= width || is_path(text) {
-        return shortened(text, width);
-    }
+/// A text in lines of a width, broken between words. A longer word has a line of its own.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
-    for word in text.split(' ').map(|word| shortened(word, width)) {
+    for word in text.split(' ') {
         let used = lines.last().map_or(0, |line| line.chars().count());
         match lines.last_mut() {
-            Some(line) if used == 0 => line.push_str(&word),
+            Some(line) if used == 0 => line.push_str(word),
             Some(line) if used + 1 + word.chars().count() <= width => {
                 line.push(' ');
-                line.push_str(&word);
+                line.push_str(word);
             }
-            _ => lines.push(word),
+            _ => lines.push(word.to_owned()),
         }
     }
-    lines.join("\n")
+    lines
+}
+
+/// A text in indented lines of a width, each with its end.
+fn indented(text: &str, indent: usize, width: usize) -> String {
+    let lines = wrapped(text, width.saturating_sub(indent).max(LEAST_TEXT));
+    let blanks = " ".repeat(indent);
+    let lines: Vec<&str> = lines.iter().map(|line| line.trim_end()).collect();
+    format!("{blanks}{}\n", lines.join(&format!("\n{blanks}")))
+}
+
+/// A label and its text in lines of the terminal's width; further lines begin below the text.
+pub(crate) fn labelled(label: &str, text: &str) -> String {
+    let indent = label.chars().count();
+    let lines = indented(&escape(text), indent, terminal_width());
+    format!("{label}{}", lines.get(indent..).unwrap_or_default())
 }
 
 /// Shortens text to a width: a path keeps its end, other text its beginning.
@@ -140,8 +175,8 @@ fn min_width(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
     if columns[i].right {
         return usize::MAX;
     }
-    if wraps(columns, i) {
-        return LEAST_WRAPPED;
+    if is_prose(columns, i) {
+        return LEAST_BESIDE;
     }
     let digits = |text: &str| text.chars().collect::<Vec<_>>().iter().rposition(char::is_ascii_digit);
     let cells = rows.iter().map(|row| row[i].as_str()).filter(|text| !is_path(text));
@@ -153,14 +188,14 @@ fn is_path(text: &str) -> bool {
 }
 
 fn wide(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
-    let cells = rows.iter().map(|row| escape(&row[i]).chars().count());
+    let cells = rows.iter().map(|row| row[i].chars().count());
     cells.chain([columns[i].heading.chars().count()]).max().unwrap_or(0)
 }
 
 fn needed(columns: &[Column], rows: &[Vec<String>], kept: &[usize]) -> usize {
     let width = |i: usize| {
         let width = wide(columns, rows, i);
-        if wraps(columns, i) { width.min(LEAST_WRAPPED) } else { width }
+        if is_prose(columns, i) { width.min(LEAST_BESIDE) } else { width }
     };
     kept.iter().map(|&i| width(i) + GAP).sum::<usize>().saturating_sub(GAP)
 }
@@ -193,6 +228,16 @@ pub(crate) fn hours(h: Option<f64>) -> String {
 /// Text of an empty cell.
 pub(crate) fn empty_cell() -> String {
     "–".to_owned()
+}
+
+/// A text, or a dash.
+pub(crate) fn or_dash(text: Option<&str>) -> String {
+    text.map_or_else(empty_cell, str::to_owned)
+}
+
+/// Part and serial number of a unit.
+pub(crate) fn unit_name(part: Option<&str>, serial: &str) -> String {
+    format!("{} / {serial}", part.unwrap_or("–"))
 }
 
 /// `1 log`, `2 logs`.
@@ -229,20 +274,23 @@ mod tests {
             let table = within(&COLUMNS, &rows(), width);
             assert!(table.lines().all(|line| line.chars().count() <= width), "{width}:\n{table}");
             assert!(table.contains("103.25") && table.contains("0.99856") && table.contains("0413.parquet"));
-            assert_eq!(table.lines().count() > 3, table.contains("hidden: "), "{table}");
+            assert_eq!(table.lines().count() > 3, table.contains(" hidden; "), "{table}");
         }
     }
 
     #[test]
-    fn the_last_column_wraps_between_words_and_nothing_of_it_is_lost() {
+    fn the_last_column_stands_beside_the_others_or_below_and_nothing_of_it_is_lost() {
         let columns = [text("unit", 0), number("gap µm", 0), text("flights", 1), text("reason", 0)];
         let reason = "could reach the limit within 348 FH (5 % point); planning horizon 500 FH";
         let rows = [["1040-0009", "110.2 ± 3.9", "322", reason].map(str::to_owned).to_vec()];
-        let table = within(&columns, &rows, 50);
-        assert!(table.lines().all(|line| line.chars().count() <= 50), "{table}");
-        let words: Vec<&str> = table.split_whitespace().collect();
-        assert!(reason.split(' ').all(|word| words.contains(&word)), "{table}");
-        assert!(table.contains("hidden: flights;"), "{table}");
+        for (width, has_heading) in [(50, false), (90, true), (200, true)] {
+            let table = within(&columns, &rows, width);
+            assert!(table.lines().all(|line| line.chars().count() <= width), "{table}");
+            let words: Vec<&str> = table.split_whitespace().collect();
+            assert!(reason.split(' ').all(|word| words.contains(&word)), "{table}");
+            assert_eq!(table.contains("reason"), has_heading, "{table}");
+        }
+        assert!(within(&columns, &rows, 28).contains("1 column hidden;"));
     }
 
     #[test]

@@ -62,6 +62,7 @@ impl FlightLog {
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
         let identity = identity_of(&log, files, config).map_err(in_log)?;
         check_not_ahead(&identity, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
+        check_tail(&identity, display_name, config)?;
         let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
@@ -368,6 +369,7 @@ pub fn identify(
         let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
         let id = identity_of(&log, files, config).map_err(in_log)?;
+        check_tail(&id, display_name, config)?;
         Ok((flight_of(&id), id.position))
     })
 }
@@ -388,6 +390,7 @@ pub fn identify_companion(
         };
         let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
+        check_tail(&id, display_name, config)?;
         Ok((flight_of(&id), id.position))
     })
 }
@@ -402,6 +405,15 @@ fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic
     let what = format!("the departure {departure_utc} is after this machine's clock, {now:.0}");
     let hint = "fix the date in the log, `clock.unit` or `identity`, or the clock of this machine; then `freeplay run --retry`";
     Err(Diagnostic::new("departure_ahead", what).hint(hint))
+}
+
+/// A log may name only the tails that `logs.tails` allows for its folder.
+fn check_tail(identity: &Identity, display_name: &str, config: &Config) -> Result<(), Diagnostic> {
+    let tail = &identity.tail_number;
+    let Some(pattern) = config.document.logs.forbidden_by(display_name, tail) else { return Ok(()) };
+    let what = format!("the log names tail {tail}, which `logs.tails` does not allow for `{pattern}`");
+    let hint = "check who sent it; if it is right, add the tail to `logs.tails`";
+    Err(Diagnostic::new("tail_not_allowed", what).in_file(display_name).hint(hint))
 }
 
 /// The identity that the log holds, completed from the flights table.

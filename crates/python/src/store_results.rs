@@ -9,13 +9,12 @@ use ::records::{Diagnostic, GapRecord};
 use jiff::Timestamp;
 use pipeline::assess::backtest;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
-use pipeline::findings::work_requests::{self, WorkSelection};
+use pipeline::findings::work_list::{self, WorkSelection};
 use pipeline::fleet::external_estimates;
 use pipeline::inspect::explain::RecordKey;
 use pipeline::inspect::store_diff::compare_stores;
 use pipeline::report::{compose, data, publish};
 use pyo3::prelude::*;
-use store::Store;
 
 use crate::VERSION;
 use crate::arrow_capsule;
@@ -172,7 +171,7 @@ pub(crate) fn report(
     Ok((written.files, written.bytes))
 }
 
-/// Selected work requests, by urgency.
+/// Selected work requests, by the date until when.
 #[pyfunction]
 pub(crate) fn work(
     py: Python<'_>,
@@ -183,10 +182,7 @@ pub(crate) fn work(
     let [tail_number, serial_number, part_number] = units;
     let selection = WorkSelection { status, tail_number, serial_number, part_number };
     let config = &config.inner;
-    let found = py.detach(|| {
-        let events = Store::open(config.store())?.work_events()?;
-        Ok(work_requests::work_list(&events, &selection, Timestamp::now()))
-    });
+    let found = py.detach(|| Ok(work_list::work_list(config, &selection)?.0));
     table(py, found)
 }
 

@@ -4,12 +4,20 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// An identifier was empty or blank.
+/// Most bytes of an identifier: it stands in every record, file name and message.
+pub const ID_BYTES: usize = 256;
+
+/// A text that is no identifier; `what` is its kind, e.g. `tail number`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a {what} must not be empty")]
-pub struct EmptyIdError {
-    /// Kind of the identifier, e.g. `tail number`.
-    pub what: &'static str,
+pub enum IdError {
+    /// It is empty or blank.
+    #[error("a {what} must not be empty")]
+    #[allow(missing_docs, reason = "the text of the error says what it is")]
+    Empty { what: &'static str },
+    /// It is longer than [`ID_BYTES`].
+    #[error("a {what} of {bytes} bytes is longer than {ID_BYTES}")]
+    #[allow(missing_docs, reason = "the text of the error says what they are")]
+    TooLong { what: &'static str, bytes: usize },
 }
 
 macro_rules! identifier {
@@ -23,13 +31,14 @@ macro_rules! identifier {
             /// Creates the identifier from text; surrounding white space is removed.
             ///
             /// # Errors
-            /// [`EmptyIdError`] when the text is blank.
-            pub fn new(text: impl AsRef<str>) -> Result<Self, EmptyIdError> {
+            /// [`IdError`] when the text is blank or longer than [`ID_BYTES`].
+            pub fn new(text: impl AsRef<str>) -> Result<Self, IdError> {
                 let text = text.as_ref().trim();
-                if text.is_empty() {
-                    return Err(EmptyIdError { what: $what });
+                match text.len() {
+                    0 => Err(IdError::Empty { what: $what }),
+                    1..=ID_BYTES => Ok(Self(text.into())),
+                    bytes => Err(IdError::TooLong { what: $what, bytes }),
                 }
-                Ok(Self(text.into()))
             }
 
             /// The identifier as logged.
@@ -51,8 +60,8 @@ macro_rules! identifier {
         }
 
         impl TryFrom<String> for $name {
-            type Error = EmptyIdError;
-            fn try_from(text: String) -> Result<Self, EmptyIdError> {
+            type Error = IdError;
+            fn try_from(text: String) -> Result<Self, IdError> {
                 Self::new(text)
             }
         }
@@ -96,9 +105,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_trimmed_and_never_empty() {
+    fn a_name_is_trimmed_and_neither_empty_nor_long() {
         assert_eq!(TailNumber::new(" N412FP\n").unwrap().as_str(), "N412FP");
         assert_eq!(SerialNumber::new("  ").unwrap_err().to_string(), "a serial number must not be empty");
+        assert!(FlightId::new("F".repeat(256)).is_ok());
+        let error = FlightId::new("F".repeat(257)).unwrap_err();
+        assert_eq!(error.to_string(), "a flight id of 257 bytes is longer than 256");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::gear_bench::GearBenchLog;
 use crate::methods::METHODS;
-use crate::metrics::{ErrorStats, Errors, FALSE_ALARMS};
+use crate::metrics::{ErrorStats, FALSE_ALARMS};
 use crate::robot_logs::RobotRow;
 use crate::scenarios::Kind;
 
@@ -34,29 +34,58 @@ fn visible(stats: &[ErrorStats]) -> impl Iterator<Item = &ErrorStats> {
     stats.iter().filter(|t| !matches!(t.kind, Kind::Blind(_)))
 }
 
-/// Contact regression: errors, coverage, flags and refusals of every class.
+/// Contact regression: errors, coverage and refusals of every class.
 fn classes(stats: &[&ErrorStats]) -> String {
-    let mut table = "| scenario | flights | unit | median | P95 | worst | 90 % coverage [%] | range of coverage [%] | flags | refusals |\n|---|---|---|---|---|---|---|---|---|---|\n".to_owned();
+    let mut table = "| scenario | unit | median | P95 | worst | 90 % coverage [%] | refused |\n|---|---|---|---|---|---|---|\n".to_owned();
     for t in stats {
         let errors = &t.errors[0];
-        let (share, low, high) = t.coverage();
-        let coverage = if t.estimated == 0 {
-            "– | –".to_owned()
-        } else {
-            format!("{:.0} | {:.0}–{:.0}", 100.0 * share, 100.0 * low, 100.0 * high)
-        };
+        let (share, _, _) = t.coverage();
+        let coverage = if t.estimated == 0 { "–".to_owned() } else { format!("{:.0}", 100.0 * share) };
         let _ = writeln!(
             table,
-            "| {} | {} | {} | {} | {} | {} | {coverage} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {coverage} | {} of {} |",
             t.name,
-            t.flights,
             t.kind.unit(),
             digits(errors.median),
             digits(errors.p95),
             digits(errors.worst),
-            flags(t),
             t.false_refusals(),
+            t.flights,
         );
+    }
+    table
+}
+
+/// Every number of the study as a table of comma-separated values: a row for each class and method.
+pub fn csv(stats: &[ErrorStats]) -> String {
+    let alarms = FALSE_ALARMS.map(|flag| format!("false_{flag}")).join(",");
+    let mut table = format!(
+        "scenario,method,unit,flights,estimated,median,p95,worst,coverage,coverage_low,coverage_high,codes,{alarms}\n"
+    );
+    for t in stats {
+        for (k, (method, errors)) in METHODS.iter().zip(&t.errors).enumerate() {
+            let number = |value: f64| if value.is_finite() { format!("{value:.4}") } else { String::new() };
+            let errors = [errors.median, errors.p95, errors.worst].map(number).join(",");
+            let (share, low, high) = t.coverage();
+            let is_known = k == 0 && t.estimated > 0;
+            let held = [share, low, high].map(|share| number(if is_known { share } else { f64::NAN }));
+            let codes: Vec<String> = t.codes.iter().map(|(code, n)| format!("{code} {n}")).collect();
+            let alarms = t.false_alarms.map_or_else(
+                || ",".repeat(FALSE_ALARMS.len() - 1),
+                |alarms| alarms.map(|count| count.to_string()).join(","),
+            );
+            let own =
+                if k == 0 { format!("{},{alarms}", codes.join(" ")) } else { ",".repeat(FALSE_ALARMS.len()) };
+            let _ = writeln!(
+                table,
+                "\"{}\",{method},{},{},{},{errors},{},{own}",
+                t.name,
+                t.kind.unit(),
+                t.flights,
+                t.estimated,
+                held.join(",")
+            );
+        }
     }
     table
 }
@@ -70,37 +99,36 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Median / 95 % quantile / worst of every method.
+/// P95 error of every other method over that of the contact regression, over all classes.
 fn methods(stats: &[&ErrorStats]) -> String {
-    let mut table = format!("| scenario | unit | {} |\n|---|---|", METHODS.join(" | "));
-    table += &"---|".repeat(METHODS.len());
-    table.push('\n');
-    for t in stats {
-        let _ = write!(table, "| {} | {} |", t.name, t.kind.unit());
-        for errors in &t.errors {
-            let _ = write!(table, " {} |", three(errors));
-        }
-        table.push('\n');
+    let mut table =
+        "| method | median ratio of P95 | largest | scenarios with a smaller P95 |\n|---|---|---|---|\n"
+            .to_owned();
+    for (k, method) in METHODS.iter().enumerate().skip(1) {
+        let ratio = |t: &&ErrorStats| t.errors[k].p95 / t.errors[0].p95;
+        let mut ratios: Vec<f64> = stats.iter().map(ratio).filter(|ratio| ratio.is_finite()).collect();
+        ratios.sort_by(f64::total_cmp);
+        let better = ratios.iter().filter(|ratio| **ratio < 1.0).count();
+        let (middle, most) = (ratios.get(ratios.len() / 2).copied(), ratios.last().copied());
+        let [middle, most] = [middle, most].map(|ratio| digits(ratio.unwrap_or(f64::NAN)));
+        let _ = writeln!(table, "| {method} | {middle} | {most} | {better} of {} |", ratios.len());
     }
     table
 }
 
-/// Flags raised without cause, by class; classes without any are summed up in the last line.
+/// Flags raised without cause, over all classes, and the class with the most of them.
 fn alarms(stats: &[&ErrorStats]) -> String {
-    let names = FALSE_ALARMS.map(|flag| format!("`{flag}`")).join(" | ");
     let mut table =
-        format!("| scenario | estimated | {names} |\n|---|---|{}\n", "---|".repeat(FALSE_ALARMS.len()));
-    let (mut quiet, mut quiet_flights) = (0, 0);
-    for t in stats {
-        let Some(alarms) = &t.false_alarms else { continue };
-        if alarms.iter().all(|count| *count == 0) {
-            (quiet, quiet_flights) = (quiet + 1, quiet_flights + t.estimated);
-            continue;
-        }
-        let counts = alarms.map(|count| count.to_string()).join(" | ");
-        let _ = writeln!(table, "| {} | {} | {counts} |", t.name, t.estimated);
+        "| flag | estimates | false alarms | most in one scenario |\n|---|---|---|---|\n".to_owned();
+    let counted = || stats.iter().filter_map(|t| Some((t, t.false_alarms?)));
+    let estimates: usize = counted().map(|(t, _)| t.estimated).sum();
+    for (k, flag) in FALSE_ALARMS.iter().enumerate() {
+        let all: usize = counted().map(|(_, alarms)| alarms[k]).sum();
+        let most = counted().max_by_key(|(_, alarms)| alarms[k]).filter(|(_, alarms)| alarms[k] > 0);
+        let most = most
+            .map_or("–".to_owned(), |(t, alarms)| format!("{} of {}: {}", alarms[k], t.estimated, t.name));
+        let _ = writeln!(table, "| `{flag}` | {estimates} | {all} | {most} |");
     }
-    let _ = writeln!(table, "\nNo false alarm in {quiet} further classes with {quiet_flights} estimates.");
     table
 }
 
@@ -108,14 +136,6 @@ fn alarms(stats: &[&ErrorStats]) -> String {
 fn flags(stats: &ErrorStats) -> String {
     let codes: Vec<String> = stats.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
     if codes.is_empty() { "–".to_owned() } else { codes.join(", ") }
-}
-
-fn three(errors: &Errors) -> String {
-    if errors.count == 0 {
-        return "–".to_owned();
-    }
-    let digits = if errors.median < 10.0 { 2 } else { 0 };
-    format!("{:.digits$} / {:.digits$} / {:.digits$}", errors.median, errors.p95, errors.worst)
 }
 
 /// Flights that cannot show a gap with the codes given, and the false refusals of all others.

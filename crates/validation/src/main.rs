@@ -94,6 +94,7 @@ fn write_page(folder: &Path, stats: &[ErrorStats], args: &Args) -> Result<(), St
         ("accuracy-calibration.svg", plots::calibration(stats)),
     ];
     write(folder, "accuracy.md", &page)?;
+    write(folder, "accuracy.csv", &accuracy_page::csv(stats))?;
     for (name, plot) in plots {
         write(&folder.join("pictures"), name, &plot.map_err(|e| format!("{name}: {e}"))?)?;
     }

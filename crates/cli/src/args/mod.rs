@@ -14,8 +14,9 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args as ClapArgs, Parser, Subcommand, ValueEnum};
 
 pub(crate) use logs::{CheckArgs, EstimateArgs, InitArgs, NormalizeArgs, SimulateArgs};
+pub(crate) use parse::QueryKey;
 pub(crate) use results::{
-    BacktestArgs, DiffArgs, ExplainArgs, ExternalEstimatesArgs, QueryArgs, QueryKey, ReportArgs, TrendArgs,
+    BacktestArgs, DiffArgs, ExplainArgs, ExternalEstimatesArgs, QueryArgs, ReportArgs, TrendArgs,
 };
 pub(crate) use rows::{Format, RowFormatArgs};
 pub(crate) use run::{FailOn, RunArgs};

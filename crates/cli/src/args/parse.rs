@@ -1,5 +1,6 @@
-//! Parsers of option values.
+//! Parsers of option values, and the words that `query` takes.
 
+use clap::ValueEnum;
 use jiff::Timestamp;
 
 pub(super) fn parse_utc(text: &str) -> Result<Timestamp, String> {
@@ -29,4 +30,29 @@ pub(super) fn parse_span(text: &str) -> Result<std::time::Duration, String> {
     let span: jiff::SignedDuration =
         text.parse().map_err(|_| format!("`{text}` is not a duration with its unit, such as 20m or 30h"))?;
     span.try_into().map_err(|_| format!("`{text}` is negative"))
+}
+
+/// Fields by which records can be selected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QueryKey {
+    /// Tail number.
+    Tail,
+    /// Serial number.
+    Serial,
+    /// Flight.
+    Flight,
+    /// Installed position.
+    Position,
+}
+
+impl QueryKey {
+    /// Its column of the records.
+    pub(crate) fn column(self) -> &'static str {
+        match self {
+            Self::Tail => "tail_number",
+            Self::Serial => "serial_number",
+            Self::Flight => "flight_id",
+            Self::Position => "position",
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
 
@@ -44,21 +44,9 @@ pub(crate) struct QueryArgs {
     pub rows: RowFormatArgs,
 }
 
-/// Fields by which records can be selected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum QueryKey {
-    /// Tail number.
-    Tail,
-    /// Serial number.
-    Serial,
-    /// Flight.
-    Flight,
-    /// Installed position.
-    Position,
-}
-
 /// `trend`.
 #[derive(Debug, ClapArgs)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct TrendArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
@@ -70,6 +58,9 @@ pub(crate) struct TrendArgs {
     /// Table of (`serial_number`, `as_of_utc`, optional `part_number`) to assess, one row each.
     #[arg(long, value_name = "FILE", help_heading = "Selection", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
+    /// List normal and removed units too; otherwise a table only counts them.
+    #[arg(long, help_heading = "Views")]
+    pub all: bool,
     /// Without effect: the classic statistics are no longer computed. Scripts may still pass it.
     #[arg(long, hide = true)]
     pub statistics: bool,

@@ -46,6 +46,12 @@ pub(crate) enum StoreCommand {
         /// Let the next run send the unconfirmed messages of this alert again.
         #[arg(long, value_name = "ID")]
         resend: Option<String>,
+        /// Take back the unsent messages of this channel, e.g. of one that is no longer configured.
+        #[arg(long, value_name = "CHANNEL", conflicts_with = "resend")]
+        drop: Option<String>,
+        /// With `--drop`: let the next run send them through this channel.
+        #[arg(long, value_name = "CHANNEL", requires = "drop")]
+        to: Option<String>,
         #[command(flatten)]
         rows: RowFormatArgs,
     },
@@ -56,7 +62,11 @@ pub(crate) enum StoreCommand {
         table: Table,
     },
     /// Verify store integrity
-    Verify,
+    Verify {
+        /// Accept the commits of other programs: they get the digests that Freeplay's own have.
+        #[arg(long)]
+        accept_foreign: bool,
+    },
     /// Merge small files, sorted for queries
     Compact,
     /// Take records out, e.g. those of a log that was sent under a wrong tail; nothing is deleted

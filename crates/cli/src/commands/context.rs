@@ -5,9 +5,10 @@ use std::path::Path;
 
 use jiff::Timestamp;
 use job::Config;
-use pipeline::assess::trends::{self, UnitSelection};
+use pipeline::assess::trends::UnitSelection;
 use pipeline::fleet::histories::Histories;
 use records::Installations;
+use store::Store;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
 use crate::exit::Failure;
@@ -68,94 +69,98 @@ pub(crate) fn check_range(since: Option<Timestamp>, until: Option<Timestamp>) ->
     }
 }
 
-/// Refuses a name that is not among the known ones, with the nearest of them.
-pub(crate) fn check_name<'n>(
-    what: &str,
-    name: Option<&str>,
-    known: impl IntoIterator<Item = &'n str>,
-) -> Result<(), Failure> {
-    let known: BTreeSet<&str> = known.into_iter().collect();
-    let Some(name) = name.filter(|name| !known.contains(name)) else { return Ok(()) };
-    let hint = match ingest::mapping::column_pattern::nearest(name, known.iter().copied()) {
-        Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
-        None => "list the contents of the store with `freeplay store info`".to_owned(),
-    };
-    Err(Failure::usage(
-        "unknown_name",
-        format!("no {what} `{name}` in the store and the installations table ({} searched)", known.len()),
-        &hint,
-    ))
+/// Columns of names, and what a name of each is called.
+const NAMES: [(&str, &str); 5] = [
+    ("tail_number", "tail"),
+    ("serial_number", "serial number"),
+    ("flight_id", "flight"),
+    ("position", "position"),
+    ("part_number", "part number"),
+];
+
+/// Names of tails, units, positions and flights, from where a command reads them.
+pub(crate) enum KnownNames {
+    /// A store, if there is one, and the installations table.
+    Store(Option<Box<Store>>, Installations),
+    /// A table of estimates made elsewhere.
+    Estimates(Histories),
 }
 
-/// Names in the store and in the installations table.
-pub(crate) struct KnownNames {
-    histories: Histories,
-    installations: Installations,
+/// What a name of a column is called.
+pub(crate) fn called(column: &str) -> &str {
+    NAMES.iter().find(|(name, _)| *name == column).map_or(column, |(_, word)| word)
 }
 
 impl KnownNames {
-    /// Names of a store and a table.
-    pub(crate) fn new(histories: Histories, installations: Installations) -> Self {
-        Self { histories, installations }
-    }
-
-    /// Reads the names of a store; a missing store or table has none.
-    pub(crate) fn read(config: &Config) -> Self {
+    /// The names of the configured store and table; missing ones have none.
+    pub(crate) fn of(config: &Config) -> Self {
         let installations = pipeline::run::scheduler::installations(config).unwrap_or_default();
-        let store = pipeline::open_store(config, &installations).ok();
-        let histories = store.and_then(|store| trends::load_histories(&store).ok());
-        Self { histories: histories.unwrap_or_default(), installations }
+        Self::Store(pipeline::open_store(config, &installations).ok().map(Box::new), installations)
     }
 
-    /// Tail numbers.
-    pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
-        self.histories
-            .tails()
-            .chain(self.installations.iter().map(|installation| installation.tail_number.as_str()))
-    }
-
-    /// Positions.
-    pub(crate) fn positions(&self) -> impl Iterator<Item = &str> {
-        self.histories
-            .positions()
-            .chain(self.installations.iter().map(|installation| installation.position.as_str()))
-    }
-
-    /// Serial numbers.
-    pub(crate) fn serials(&self) -> impl Iterator<Item = &str> {
-        let stored = self.histories.names().map(|(_, serial)| serial.as_str());
-        stored.chain(self.installations.iter().map(|installation| installation.serial_number.as_str()))
-    }
-
-    /// Part numbers.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = &str> {
-        let stored = self.histories.names().filter_map(|(part, _)| part.as_deref());
-        stored.chain(self.installations.iter().map(|installation| installation.part_number.as_str()))
-    }
-
-    /// Flights.
-    pub(crate) fn flights(&self) -> impl Iterator<Item = &str> {
-        self.histories.iter().flat_map(|(_, history)| {
-            history.flights().iter().filter_map(move |flown| history.flight_id(flown))
-        })
-    }
-
-    /// What was searched, as text: the departures in the store.
-    pub(crate) fn searched(&self) -> String {
-        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
-        match (self.histories.oldest_utc(), self.histories.newest_utc()) {
-            (Some(oldest), Some(newest)) => {
-                format!("the departures in the store are from {} to {}", day(oldest), day(newest))
+    /// The names in a column of the records, such as `tail_number`.
+    pub(crate) fn names(&self, column: &str) -> BTreeSet<String> {
+        match self {
+            Self::Store(store, installations) => {
+                let stored = store.as_ref().and_then(|store| store.distinct(column).ok());
+                let installed = installations.iter().filter_map(|stay| match column {
+                    "tail_number" => Some(stay.tail_number.to_string()),
+                    "serial_number" => Some(stay.serial_number.to_string()),
+                    "position" => Some(stay.position.to_string()),
+                    "part_number" => Some(stay.part_number.to_string()),
+                    _ => None,
+                });
+                stored.unwrap_or_default().into_iter().chain(installed).collect()
             }
-            _ => "the store has no departures".to_owned(),
+            Self::Estimates(histories) => match column {
+                "tail_number" => histories.tails().map(str::to_owned).collect(),
+                "serial_number" => histories.names().map(|(_, serial)| serial.clone()).collect(),
+                "part_number" => histories.names().filter_map(|(part, _)| part.clone()).collect(),
+                _ => BTreeSet::new(),
+            },
         }
+    }
+
+    /// Refuses a name that is in none of some columns, with the nearest that is.
+    pub(crate) fn check(&self, columns: &[&str], name: Option<&str>) -> Result<(), Failure> {
+        let Some(name) = name else { return Ok(()) };
+        let known: BTreeSet<String> = columns.iter().flat_map(|column| self.names(column)).collect();
+        if known.contains(name) {
+            return Ok(());
+        }
+        let what = columns.iter().map(|column| called(column)).collect::<Vec<_>>().join(" or ");
+        let hint = match ingest::mapping::column_pattern::nearest(name, known.iter().map(String::as_str)) {
+            Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
+            None => "list the contents of the store with `freeplay store info`".to_owned(),
+        };
+        Err(Failure::usage(
+            "unknown_name",
+            format!("no {what} `{name}` in the store and the installations table ({} searched)", known.len()),
+            &hint,
+        ))
     }
 
     /// Refuses the first name of a selection of units that is unknown.
     pub(crate) fn check_units(&self, units: &UnitFilterArgs) -> Result<(), Failure> {
-        check_name("tail", units.tail.as_deref(), self.tails())?;
-        check_name("serial number", units.serial.as_deref(), self.serials())?;
-        check_name("part number", units.part.as_deref(), self.parts())
+        self.check(&["tail_number"], units.tail.as_deref())?;
+        self.check(&["serial_number"], units.serial.as_deref())?;
+        self.check(&["part_number"], units.part.as_deref())
+    }
+
+    /// What was searched, as text: the departures in the store.
+    pub(crate) fn searched(&self) -> String {
+        let range = match self {
+            Self::Store(store, _) => store
+                .as_ref()
+                .and_then(|store| store.info().ok())
+                .and_then(|info| info.first_departure_utc.zip(info.last_departure_utc)),
+            Self::Estimates(histories) => histories.oldest_utc().zip(histories.newest_utc()),
+        };
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d");
+        range.map_or_else(
+            || "the store has no departures".to_owned(),
+            |(from, to)| format!("the departures in the store are from {} to {}", day(from), day(to)),
+        )
     }
 }
 

@@ -1,11 +1,15 @@
 //! `work`: lists work requests, and records what people decide about them.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use clap::ValueEnum as _;
 use jiff::Timestamp;
-use pipeline::findings::work_requests::{self, Decision, WorkSelection};
-use records::{WorkEventKind, WorkRequest};
+use job::Config;
+use pipeline::findings::work_list::{self, WorkSelection};
+use pipeline::findings::work_requests::{self, Decision};
+use pipeline::fleet::histories::UnitKey;
+use records::{TrendRow, WorkEventKind, WorkRequest};
 use store::{Holder, Store};
 
 use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
@@ -13,7 +17,7 @@ use crate::commands::context::{KnownNames, load_config};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::row_output;
-use crate::table::{self, count, state_mark, text};
+use crate::table::{self, count, or_dash, state_mark, text, unit_name};
 
 /// Longest wait for a run that writes into the store.
 const WAIT: Duration = Duration::from_mins(1);
@@ -26,7 +30,7 @@ pub(crate) fn work(args: &WorkArgs, global: &Global, output: &Output) -> Result<
     let config = load_config(global)?;
     let store = Store::open(config.store())?;
     let (who, kind, reason, until_utc) = match &args.command {
-        WorkCommand::List(args) => return list(&config, &store, args, output),
+        WorkCommand::List(args) => return list(&config, args, output),
         WorkCommand::Acknowledge { who, reason } => (who, WorkEventKind::Acknowledged, reason.clone(), None),
         WorkCommand::Defer { who, until, reason } => {
             (who, WorkEventKind::Deferred, Some(reason.clone()), Some(*until))
@@ -66,68 +70,65 @@ fn decide(
         return Ok(Code::Success);
     };
     let by = escape(&who.by);
-    output.write_result(&format!("{id}: {}; {} by {by}\n", escape(&unit(request)), status(request)))?;
+    output.write_result(&format!(
+        "{id}: {}; {} by {by}\n",
+        escape(&unit_name(request.part_number.as_deref(), &request.serial_number)),
+        status(request)
+    ))?;
     Ok(Code::Success)
 }
 
-fn list(config: &job::Config, store: &Store, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
+fn list(config: &Config, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
     let selection = WorkSelection {
         status: args.status.and_then(|status| Some(status.to_possible_value()?.get_name().to_owned())),
         tail_number: args.units.tail.clone(),
         serial_number: args.units.serial.clone(),
         part_number: args.units.part.clone(),
     };
-    let found = work_requests::work_list(&store.work_events()?, &selection, Timestamp::now());
-    if found.is_empty()
-        && [&args.units.tail, &args.units.serial, &args.units.part].iter().any(|name| name.is_some())
-    {
-        let known = KnownNames::read(config);
-        known.check_units(&args.units)?;
+    let (found, units) = work_list::work_list(config, &selection)?;
+    if found.is_empty() {
+        KnownNames::of(config).check_units(&args.units)?;
     }
-    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;
+    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, &units))?;
     Ok(Code::Success)
 }
 
-fn page(found: &[WorkRequest]) -> String {
+fn page(found: &[WorkRequest], units: &BTreeMap<UnitKey, TrendRow>) -> String {
     if found.is_empty() {
         return "no work request\n".to_owned();
     }
-    let columns = [
-        text("request", 0),
-        text("state", 0),
-        text("tail", 0),
-        text("position", 0),
-        text("part / serial", 1),
-        text("opened", 3),
-        text("status", 0),
-        text("by", 2),
-        text("remark", 4),
-        text("finding", 0),
-    ];
-    let cells = |request: &WorkRequest| {
-        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(table::empty_cell);
-        vec![
-            request.request_id.clone(),
-            state_mark(request.state.as_deref()),
-            or_dash(&request.tail_number),
-            or_dash(&request.position),
-            unit(request),
-            day(request.opened_utc),
-            status(request),
-            or_dash(&request.by),
-            or_dash(&request.reason),
-            or_dash(&request.finding),
-        ]
+    // A closed request has the state and the reason with which it was closed.
+    let present = |r: &WorkRequest| {
+        units.get(&(r.part_number.clone(), r.serial_number.clone())).filter(|_| r.is_open())
     };
+    let columns: &table::Columns<'_, WorkRequest> = &[
+        (text("request", 0), &|r| r.request_id.clone()),
+        (text("state", 0), &|r| state_mark(r.state.as_deref())),
+        (text("due", 0), &|r| or_dash(present(r).and_then(TrendRow::due_text).as_deref())),
+        (text("tail", 0), &|r| or_dash(r.tail_number.as_deref())),
+        (text("position", 0), &|r| or_dash(r.position.as_deref())),
+        (text("serial", 0), &|r| r.serial_number.clone()),
+        (text("status", 1), &status),
+        (text("by", 2), &|r| or_dash(r.by.as_deref())),
+        (text("part", 3), &|r| or_dash(r.part_number.as_deref())),
+        (text("opened", 4), &|r| day(r.opened_utc)),
+        (text("remark", 5), &|r| or_dash(r.reason.as_deref())),
+        (text("why, and how sure", 0), &|r| {
+            present(r).map_or_else(|| or_dash(r.finding.as_deref()), TrendRow::statement_text)
+        }),
+    ];
     let with = |status: &str| found.iter().filter(|request| request.status == status).count();
     let counts = ["open", "acknowledged", "deferred", "closed"].map(|status| (with(status), status));
     let counts = counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, status)| format!("{n} {status}"));
     let head = format!("{}: {}\n", count(found.len(), "work request"), counts.collect::<Vec<_>>().join(", "));
-    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
-}
-
-fn unit(request: &WorkRequest) -> String {
-    format!("{} / {}", request.part_number.as_deref().unwrap_or("–"), request.serial_number)
+    let next = found.iter().find(|request| request.is_open()).map_or_else(String::new, |request| {
+        let id = &request.request_id;
+        format!(
+            "next: `freeplay work acknowledge {id}`, `defer {id} --until DATE --reason TEXT`, or\n      \
+             `close {id} --reason TEXT`\n"
+        )
+    });
+    head + &table::of(found, columns) + &next
 }
 
 /// Status with its date.

@@ -156,12 +156,12 @@ impl Log {
         let mapping = &self.mapping.identity;
         let fail = |fault| self.main.error(fault);
         let mut facts = facts(&self.main, mapping)?;
-        let date =
-            facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
-        if date.is_some() {
-            // A day has several flights: the time comes from the flights table, or from the clock.
-            facts.remove(&IdentityField::DepartureUtc);
-        }
+        // A day has several flights: the time comes from the flights table, or from the clock.
+        let take_date = |facts: &mut IdentityFields| {
+            let date = identity::date_alone(facts.get(&IdentityField::DepartureUtc)?, mapping);
+            date.inspect(|_| drop(facts.remove(&IdentityField::DepartureUtc)))
+        };
+        let date = take_date(&mut facts);
         let fill = |facts: &mut IdentityFields, found: IdentityFields| {
             for (fact, text) in found {
                 facts.entry(fact).or_insert(text);
@@ -171,6 +171,7 @@ impl Log {
         let noon = date.and_then(|date| date.at(12, 0, 0, 0).to_zoned(TimeZone::UTC).ok());
         let found = known(&facts, noon.map(|noon| noon.timestamp()));
         fill(&mut facts, found);
+        let date = take_date(&mut facts).or(date);
         if facts.contains_key(&IdentityField::DepartureUtc) {
             return identity::read(&facts, mapping, None).map_err(fail);
         }
@@ -186,6 +187,7 @@ impl Log {
         if start.is_some() {
             let found = known(&facts, start);
             fill(&mut facts, found);
+            take_date(&mut facts);
         }
         identity::read(&facts, mapping, start).map_err(fail)
     }

@@ -62,12 +62,10 @@ fn duration(seconds: f64) -> SignedDuration {
 /// The date of a departure that is written without a time of the day.
 pub(crate) fn date_alone(text: &str, mapping: &IdentityMapping) -> Option<civil::Date> {
     let text = text.trim();
-    match &mapping.departure_format {
-        Some(format) => {
-            let parsed = jiff::fmt::strtime::parse(format, text).ok()?;
-            let has_time = parsed.hour().is_some() || parsed.to_timestamp().is_ok();
-            if has_time { None } else { parsed.to_date().ok() }
-        }
+    let parsed = mapping.departure_format.as_ref().and_then(|f| jiff::fmt::strtime::parse(f, text).ok());
+    match parsed {
+        Some(parsed) if parsed.hour().is_some() || parsed.to_timestamp().is_ok() => None,
+        Some(parsed) => parsed.to_date().ok(),
         None if text.contains([':', 'T', 't', ' ']) => None,
         None => text.parse().ok(),
     }
@@ -98,7 +96,7 @@ pub(crate) fn departure_on(
         return Err(invalid(format!("the log begins on another day, at {start:.0}: see `clock.epoch`")));
     }
     let Some(ClockSpan { origin: TimeOrigin::OfDay(first_s), earliest_s, .. }) = clock else {
-        let detail = "a date without a time of the day: several flights of a day would be one. Add the time, or the flights table, or set `clock.epoch = \"midnight\"` if the clock counts the seconds of the day";
+        let detail = "a date without a time of the day: several flights of a day would be one. Add the time to the log or to the flights table, or set `clock.epoch = \"midnight\"` if the clock counts the seconds of the day";
         return Err(invalid(detail.into()));
     };
     let local =
@@ -206,7 +204,7 @@ pub(crate) fn read(
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
     let invalid = |fact: IdentityField| {
-        move |e: records::ids::EmptyIdError| ErrorKind::IdentityInvalid {
+        move |e: records::ids::IdError| ErrorKind::IdentityInvalid {
             fact: fact.as_str(),
             found: String::new(),
             detail: e.to_string(),
@@ -262,7 +260,11 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
     let local = match &mapping.departure_format {
         Some(format) => {
             let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
-            let parsed = jiff::fmt::strtime::parse(format, text).map_err(other)?;
+            let parsed = match jiff::fmt::strtime::parse(format, text) {
+                Ok(parsed) => parsed,
+                // The flights table has instants of its own form.
+                Err(error) => return text.parse().map_err(|_| other(error)),
+            };
             if let Ok(instant) = parsed.to_timestamp() {
                 return Ok(instant);
             }

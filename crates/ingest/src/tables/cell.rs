@@ -47,7 +47,7 @@ pub(super) fn bad_cell(file: &Path, row: usize, column: Option<&String>, detail:
 ///
 /// # Errors
 /// When it is blank.
-pub fn name<T: TryFrom<String, Error = records::ids::EmptyIdError>>(text: &str) -> Result<T, String> {
+pub fn name<T: TryFrom<String, Error = records::ids::IdError>>(text: &str) -> Result<T, String> {
     T::try_from(text.to_owned()).map_err(|e| e.to_string())
 }
 
@@ -76,17 +76,8 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When it is neither a date nor a time.
 pub fn utc(text: &str) -> Result<Timestamp, String> {
-    let civil = || {
-        text.parse::<civil::DateTime>()
-            .or_else(|e| text.parse::<civil::Date>().map(civil::DateTime::from).map_err(|_| e))
-    };
-    match text.parse::<Timestamp>() {
-        Ok(instant) => Ok(instant),
-        Err(_) => {
-            let instant = civil().and_then(|civil| TimeZone::UTC.to_timestamp(civil));
-            instant.map_err(|_| not_utc(text))
-        }
-    }
+    let civil = || text.parse::<civil::DateTime>().and_then(|civil| TimeZone::UTC.to_timestamp(civil));
+    text.parse::<Timestamp>().or_else(|_| civil()).map_err(|_| not_utc(text))
 }
 
 /// Why a text is no instant: a day that no calendar has, or another form.

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use jiff::{SignedDuration, Timestamp};
+use jiff::{SignedDuration, Timestamp, civil, tz::TimeZone};
 use records::{Flight, FlightId, TailNumber};
 
 use crate::error::Error;
-use crate::log::identity::{IdentityFields, instant};
+use crate::log::identity::{IdentityFields, date_alone, instant};
 use crate::mapping::{IdentityField, IdentityMapping};
 use crate::tables::cell::{self, name, not_negative};
 use crate::tables::table::{ColumnAliases, Table};
@@ -18,7 +18,7 @@ const OVERLAP_SHARE: f64 = 1.25;
 const OVERLAP_HOURS: f64 = 1.0;
 
 /// A departure in the table and one in a log are those of one flight of the same id when they differ by at most this:
-/// airlines use an id again every day.
+/// airlines use an id again every day. From noon, it is the day of a departure that is a date alone.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
 /// Flights, found by the path of their log, or by the identity in the log.
@@ -33,13 +33,18 @@ pub struct Flights {
 /// The rows of one aircraft.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct TailRows {
+    /// Rows whose departure has a time of the day.
     by_departure: BTreeMap<Timestamp, usize>,
+    /// Rows whose departure is a date alone.
+    by_date: BTreeMap<civil::Date, Vec<usize>>,
     by_id: HashMap<String, Vec<usize>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
+    /// Departs at noon where the table has a date alone.
     flight: Flight,
+    is_date: bool,
     facts: IdentityFields,
 }
 
@@ -47,10 +52,11 @@ impl Flights {
     /// Reads the table: `tail_number, flight_id, departure_utc` and optionally `flight_hours`,
     /// `tail_hours_end`, `path` (the end of the log's path is enough) and `position`.
     ///
-    /// Departures are read as those of logs are; without a format and a zone they are UTC.
+    /// Departures are read as those of logs are; without a format and a zone they are UTC. A departure that is a date alone
+    /// is joined to the log of its flight id, or to the only one of its day, and the log's clock has the time.
     ///
     /// # Errors
-    /// Every cell that cannot be read.
+    /// Every cell that cannot be read, and a second flight of one id on one date without a time.
     pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
         let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
         let wanted = ["tail_number", "flight_id", "departure_utc"].map(|name| table.column(&[name]));
@@ -94,7 +100,11 @@ impl Flights {
         for flights in by_tail.values_mut() {
             flights.sort_by_key(|(_, flight)| flight.departure_utc);
             for (k, (row, flight)) in flights.iter().enumerate() {
-                let next = flights[k..].iter().find(|(_, next)| next.departure_utc > flight.departure_utc);
+                let is_next = |&(next, other): &(usize, &Flight)| {
+                    other.departure_utc > flight.departure_utc
+                        && self.rows[next].is_date == self.rows[*row].is_date
+                };
+                let next = flights[k..].iter().copied().find(is_next);
                 let (Some((_, next)), Some(hours)) = (next, flight.flight_hours) else { continue };
                 let until_next =
                     next.departure_utc.duration_since(flight.departure_utc).as_secs_f64() / 3600.0;
@@ -120,18 +130,25 @@ impl Flights {
         [hours, tail_hours, path, position]: [Option<usize>; 4],
         identity: &IdentityMapping,
     ) -> Result<(), Error> {
-        let departs = |text: &str| cell::utc(text).or_else(|e| instant(text, identity).map_err(|_| e));
+        let departs = |text: &str| match date_alone(text, identity) {
+            Some(date) => noon(date).map(|noon| (noon, Some(date))),
+            None => cell::utc(text).or_else(|e| instant(text, identity).map_err(|_| e)).map(|at| (at, None)),
+        };
+        let (departure_utc, date) = table.required(row, departure, departs)?;
         let flown = Flight {
             tail_number: table.required(row, tail, name::<TailNumber>)?,
             flight_id: table.required(row, flight, name::<FlightId>)?,
-            departure_utc: table.required(row, departure, departs)?,
+            departure_utc,
             flight_hours: table.optional(row, hours, not_negative)?,
             tail_hours_end: table.optional(row, tail_hours, not_negative)?,
         };
         let known = [
             (IdentityField::TailNumber, Some(flown.tail_number.to_string())),
             (IdentityField::FlightId, Some(flown.flight_id.to_string())),
-            (IdentityField::DepartureUtc, Some(flown.departure_utc.to_string())),
+            (
+                IdentityField::DepartureUtc,
+                Some(date.map_or(departure_utc.to_string(), |date| date.to_string())),
+            ),
             (IdentityField::FlightHours, flown.flight_hours.map(|h| h.to_string())),
             (IdentityField::TailHoursEnd, flown.tail_hours_end.map(|h| h.to_string())),
             (IdentityField::Position, position.and_then(|column| table.text(row, column)).map(str::to_owned)),
@@ -142,9 +159,22 @@ impl Flights {
             self.by_path.insert(path.replace('\\', "/"), index);
         }
         let of_tail = self.by_tail.entry(flown.tail_number.to_string()).or_default();
-        of_tail.by_departure.insert(flown.departure_utc, index);
-        of_tail.by_id.entry(flown.flight_id.to_string()).or_default().push(index);
-        self.rows.push(Row { flight: flown, facts });
+        let same_id = of_tail.by_id.entry(flown.flight_id.to_string()).or_default();
+        if let Some(date) = date {
+            if same_id.iter().any(|&other| {
+                self.rows[other].is_date && self.rows[other].flight.departure_utc == departure_utc
+            }) {
+                let (tail, id) = (&flown.tail_number, &flown.flight_id);
+                let what =
+                    format!("a second flight {id} of {tail} on {date}: give both departures with their time");
+                return Err(table.error(row, departure, what));
+            }
+            of_tail.by_date.entry(date).or_default().push(index);
+        } else {
+            of_tail.by_departure.insert(departure_utc, index);
+        }
+        same_id.push(index);
+        self.rows.push(Row { flight: flown, is_date: date.is_some(), facts });
         Ok(())
     }
 
@@ -164,7 +194,7 @@ impl Flights {
     }
 
     /// The table's row of a flight: the one with its departure, else the one with its id that departs nearest to it,
-    /// within 12 hours.
+    /// within 12 hours or on its date.
     pub fn of(&self, tail_number: &str, flight_id: &str, departure_utc: Timestamp) -> Option<&Flight> {
         self.row_of(tail_number, Some(flight_id), departure_utc).map(|row| &self.rows[row].flight)
     }
@@ -175,7 +205,11 @@ impl Flights {
             return Some(*row);
         }
         let away = |row: &usize| self.rows[*row].flight.departure_utc.duration_since(departure_utc).abs();
-        let same_id = of_tail.by_id.get(flight_id?)?.iter().copied();
+        let Some(id) = flight_id else {
+            let of_date = of_tail.by_date.get(&TimeZone::UTC.to_datetime(departure_utc).date());
+            return of_date.and_then(|rows| if let [row] = rows[..] { Some(row) } else { None });
+        };
+        let same_id = of_tail.by_id.get(id)?.iter().copied();
         same_id.filter(|row| away(row) <= SAME_FLIGHT).min_by_key(away)
     }
 
@@ -221,6 +255,11 @@ impl Flights {
             rest = rest.split_once('/')?.1;
         }
     }
+}
+
+/// Noon of a date, UTC.
+fn noon(date: civil::Date) -> Result<Timestamp, String> {
+    TimeZone::UTC.to_timestamp(date.at(12, 0, 0, 0)).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]
@@ -276,5 +315,31 @@ mod tests {
         assert_eq!(hours(Some(at("2026-03-20T06:10:00Z"))), None);
         let of = |text: &str| flights.of("N1", "FP100", at(text)).and_then(|flight| flight.flight_hours);
         assert_eq!((of("2026-03-07T06:10:00Z"), of("2026-03-07T07:00:00Z")), (Some(7.5), Some(7.5)));
+    }
+
+    /// Two legs of one day and one of the next, each with its date alone: the log's clock has the time.
+    #[test]
+    fn a_date_alone_is_joined_to_the_log_of_its_id_or_to_the_only_one_of_its_day() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("flights.csv");
+        let read = |rows: &str| {
+            std::fs::write(&file, format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}"))
+                .unwrap();
+            Flights::read(&file, &ColumnAliases::new(), &IdentityMapping::default())
+        };
+        let flights = read("N1,A,2026-03-04,2\nN1,B,2026-03-04,3\nN1,C,2026-03-05,4\n").unwrap();
+        let hours = |id: Option<&str>, at: &str| {
+            let id = id.map(|id| (IdentityField::FlightId, id.to_owned()));
+            let said = [(IdentityField::TailNumber, "N1".to_owned())].into_iter().chain(id).collect();
+            let facts = flights.facts(Path::new("/x"), &said, at.parse().ok(), &IdentityMapping::default());
+            facts.get(&IdentityField::FlightHours).cloned()
+        };
+        assert_eq!(hours(Some("A"), "2026-03-04T23:10:00Z").as_deref(), Some("2"));
+        assert_eq!(hours(Some("B"), "2026-03-04T00:10:00Z").as_deref(), Some("3"));
+        assert_eq!(hours(None, "2026-03-05T00:10:00Z").as_deref(), Some("4"));
+        assert_eq!(hours(None, "2026-03-04T12:00:00Z"), None, "two flights depart on this day");
+        assert_eq!(hours(Some("A"), "2026-03-05T12:10:00Z"), None, "another day");
+        let error = read("N1,A,2026-03-04,2\nN1,A,2026-03-04,3\n").unwrap_err()[0].diagnostic().to_string();
+        assert!(error.contains("row 2") && error.contains("give both departures with their time"), "{error}");
     }
 }

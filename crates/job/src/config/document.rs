@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use glob::Pattern;
 use ingest::log::identity::zone;
 use ingest::mapping::IdentityField;
 use ingest::mapping::column_pattern::nearest;
 use ingest::mapping::units::TimeUnit;
 use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
-use records::Diagnostic;
 use records::time::DAY_S;
+use records::{Diagnostic, TailNumber};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -84,6 +85,10 @@ pub struct LogSettings {
     /// The flights table, CSV or Parquet: facts about flights that the logs do not hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,
+    /// Tails that logs may be of, by a pattern of their paths from the folder of this file, such as
+    /// `"incoming/supplier/**" = ["N41?FP"]`. A log that names another tail is an error.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub tails: BTreeMap<String, Vec<String>>,
     /// Whether files of one flight are its pieces, one after the other. Without it a second file of the
     /// same flight is a copy of the first, or an error. `false`: logs with one flight id and different departures are
     /// flights of their own, also within 12 hours.
@@ -106,6 +111,15 @@ impl LogSettings {
     /// Whether files of one flight are declared to be its pieces.
     pub fn has_pieces(&self) -> bool {
         self.pieces == Some(true)
+    }
+
+    /// The pattern of `tails` that a log fits without being of one of its tails.
+    pub fn forbidden_by(&self, log_path: &str, tail: &TailNumber) -> Option<&str> {
+        let fits = |pattern: &String, text| Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(text));
+        let forbids = |(pattern, tails): &(&String, &Vec<String>)| {
+            fits(pattern, log_path) && !tails.iter().any(|allowed| fits(allowed, tail.as_str()))
+        };
+        self.tails.iter().find(forbids).map(|(pattern, _)| pattern.as_str())
     }
 }
 
@@ -359,6 +373,12 @@ impl Document {
         check_clock(&self.clock, &["clock"], source, &mut found);
         check_layout(&self.layout, &["layout"], source, &mut found);
         self.check_groups(source, &mut found);
+        for text in self.logs.tails.iter().flat_map(|(pattern, tails)| tails.iter().chain([pattern])) {
+            if let Err(e) = Pattern::new(text) {
+                let what = format!("`{text}` is not a valid pattern: {e}");
+                found.push(source.at(&["logs", "tails"], Diagnostic::new("bad_pattern", what)));
+            }
+        }
         self.check_identity(source, &mut found);
         for (key, hours) in [
             ("planning_horizon_hours", self.trend.planning_horizon_hours),
@@ -396,7 +416,7 @@ impl Document {
         }
         let numbers = || self.part.keys().map(String::as_str);
         for name in self.overrides.iter().flat_map(|one| &one.parts) {
-            let Ok(pattern) = glob::Pattern::new(name) else { continue };
+            let Ok(pattern) = Pattern::new(name) else { continue };
             if !self.part.is_empty() && !numbers().any(|number| pattern.matches(number)) {
                 let near = nearest(name, numbers());
                 let near = near.map(|near| format!("nearest: `{near}`; ")).unwrap_or_default();

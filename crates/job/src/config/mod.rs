@@ -156,7 +156,8 @@ impl Config {
                 (Ok(number), Ok(part)) => drop(parts.insert(number, part)),
                 (Err(e), _) => diagnostics.push(source.at(&["part"], Diagnostic::new("empty_name", e))),
                 (_, Err(found)) => diagnostics.extend(found.into_iter().map(|(key, diagnostic)| {
-                    let path: Vec<&str> = ["part", number].into_iter().chain(key.iter().copied()).collect();
+                    let path: Vec<&str> =
+                        ["part", number].into_iter().chain(key.iter().map(String::as_str)).collect();
                     source.at(&path, diagnostic)
                 })),
             }

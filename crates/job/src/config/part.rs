@@ -206,7 +206,31 @@ pub struct Part {
 }
 
 /// A key below the part's table, and what is wrong with it.
-pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
+pub(crate) type SettingError = (Vec<String>, Diagnostic);
+
+/// Checks the numbers of a table and of those below it; `path` is the key of the table.
+fn check_numbers(value: &serde_json::Value, path: &mut Vec<String>, keys: &mut SettingsValidator) {
+    match value {
+        serde_json::Value::Object(table) if !path.iter().any(|key| key == "quantity_limits") => {
+            for (key, value) in table {
+                path.push(key.clone());
+                check_numbers(value, path, keys);
+                path.pop();
+            }
+        }
+        serde_json::Value::Array(values) => {
+            values.iter().for_each(|value| check_numbers(value, path, keys));
+        }
+        value => {
+            let name = path.last().map_or("", String::as_str);
+            keys.found.extend(implausible(name, value.as_f64()).map(|c| (path.clone(), c)));
+        }
+    }
+}
+
+fn owned(key: &[&str]) -> Vec<String> {
+    key.iter().map(|key| (*key).to_owned()).collect()
+}
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -265,26 +289,11 @@ impl PartSettings {
 
     /// Every number that no actuator, sensor or limit can have.
     fn check_ranges(&self, keys: &mut SettingsValidator) {
-        let part: [(&'static [&'static str], Option<f64>); 11] = [
-            (&["stiffness_n_per_m"], self.stiffness_n_per_m),
-            (&["damping_n_s_per_m"], self.damping_n_s_per_m),
-            (&["screw_mass_kg"], self.screw_mass_kg),
-            (&["lead_m_per_rev"], self.lead_m_per_rev),
-            (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
-            (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
-            (&["inertia_kg_m2"], self.inertia_kg_m2),
-            (&["reference_radius_m"], self.reference_radius_m),
-            (&["reference_load_n"], self.reference_load_n),
-            (&["limit_m"], self.limit_m),
-            (&["watch_m"], self.watch_m),
-        ];
-        let noise = self.noise.as_ref().map(NoiseSettings::numbers);
-        for (key, value) in part.into_iter().chain(noise.into_iter().flatten()) {
-            let name = key.last().copied().unwrap_or_default();
-            keys.found.extend(implausible(name, value).map(|c| (key, c)));
+        if let Ok(table) = serde_json::to_value(self) {
+            check_numbers(&table, &mut Vec::new(), keys);
         }
         for (key, limit) in self.quantity_limits.iter().flat_map(QuantityLimits::entries) {
-            keys.found.extend(bounded(key[1], limit).map(|c| (key, c)));
+            keys.found.extend(bounded(key[1], limit).map(|c| (owned(key), c)));
         }
     }
 
@@ -375,31 +384,6 @@ impl PartSettings {
 }
 
 impl NoiseSettings {
-    /// Every number with its key; of a matrix its largest entry.
-    fn numbers(&self) -> [(&'static [&'static str], Option<f64>); 18] {
-        let largest = |w_d: [[f64; 3]; 3]| w_d.into_iter().flatten().map(f64::abs).fold(0.0, f64::max);
-        [
-            (&["noise", "screw_rms_m"], self.screw_rms_m),
-            (&["noise", "screw_resolution_m"], self.screw_resolution_m),
-            (&["noise", "motor_rms_m"], self.motor_rms_m),
-            (&["noise", "motor_resolution_m"], self.motor_resolution_m),
-            (&["noise", "unknown_force_n"], self.unknown_force_n),
-            (&["noise", "screw_rms_rad"], self.screw_rms_rad),
-            (&["noise", "screw_resolution_rad"], self.screw_resolution_rad),
-            (&["noise", "motor_rms_rad"], self.motor_rms_rad),
-            (&["noise", "motor_resolution_rad"], self.motor_resolution_rad),
-            (&["noise", "unknown_torque_nm"], self.unknown_torque_nm),
-            (&["noise", "bandwidth_hz"], self.bandwidth_hz),
-            (&["noise", "w_d"], self.w_d.map(largest)),
-            (&["noise", "v_d_m2"], self.v_d_m2),
-            (&["noise", "force_psd_n2_s"], self.force_psd_n2_s),
-            (&["noise", "backlash_rate_psd_m2_per_s"], self.backlash_rate_psd_m2_per_s),
-            (&["noise", "initial_position_rms_m"], self.initial_position_rms_m),
-            (&["noise", "initial_speed_rms_m_per_s"], self.initial_speed_rms_m_per_s),
-            (&["noise", "initial_backlash_rms_m"], self.initial_backlash_rms_m),
-        ]
-    }
-
     /// P₀: the estimator's own where a key is missing.
     fn initial(&self) -> estimator::InitialVariances {
         let default = estimator::InitialVariances::default();
@@ -462,7 +446,7 @@ struct SettingsValidator {
 
 impl SettingsValidator {
     fn report(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
-        self.found.push((key, diagnostic));
+        self.found.push((owned(key), diagnostic));
     }
 
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
@@ -479,7 +463,7 @@ impl SettingsValidator {
 
     fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
         let name = key.last().copied().unwrap_or_default();
-        self.found.extend(crate::config::limits::positive(name, value).map(|c| (key, c)));
+        self.found.extend(crate::config::limits::positive(name, value).map(|c| (owned(key), c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

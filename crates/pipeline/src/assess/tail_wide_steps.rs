@@ -87,10 +87,7 @@ fn of_step(tail: &str, step: &TailWideStep, level_m: f64) -> Option<QuantityChan
         quantity: Quantity::GapM.as_str(),
         scope: scope.as_str(),
         kind: "step",
-        part_number: None,
         tail_number: Some(tail.to_owned()),
-        serial_number: None,
-        positions: Vec::new(),
         units: step.units as i64,
         units_able: step.units_able as i64,
         since_utc,
@@ -106,6 +103,7 @@ fn of_step(tail: &str, step: &TailWideStep, level_m: f64) -> Option<QuantityChan
             since_utc.strftime("%Y-%m-%d"),
             scope.cause(),
         ),
+        ..QuantityChange::default()
     })
 }
 

@@ -41,10 +41,8 @@ pub(crate) fn row(
     let crossing = trend.crossing.filter(|_| is_judged);
     let use_now = trend.utilization;
     let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
-    // Usage goes on at the unit's own rate after its last flight.
-    let day = |hours: Option<f64>| {
-        days_after(as_of, (hours? - trend.elapsed_hours).max(0.0) / use_now?.hours_per_day)
-    };
+    // Usage goes on at the unit's own rate after its last flight; a date that has passed stays what it was.
+    let day = |hours: Option<f64>| days_after(as_of, (hours? - trend.elapsed_hours) / use_now?.hours_per_day);
     let (state, cause) =
         if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
     let utc = |us: i64| Timestamp::from_microsecond(us).ok();
@@ -136,7 +134,9 @@ pub(crate) fn inspected(
         return TrendRow { state, reason_code, reason: Some(reason), ..row };
     }
     if is_above || contradicts {
-        return TrendRow { reason: Some(format!("{reason}; {statement}")), ..row };
+        let reason = Some(format!("{reason}; {statement}"));
+        let caveats = NoColumn(row.caveats.0.iter().cloned().chain([statement]).collect());
+        return TrendRow { reason, caveats, ..row };
     }
     row
 }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
+use records::time::days_between;
 use records::{Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
@@ -26,11 +27,11 @@ use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_chan
 use crate::fleet::bookkeeping::inspections::InspectionIndex;
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::usage::UsageSources;
-use crate::fleet::builder::HistoryBuilder;
+use crate::fleet::builder;
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::merge::of_parts;
+use crate::fleet::unit_rows;
 use job::config::{AsOf, QuantityLimits};
 use records::TrendRow;
 
@@ -121,12 +122,7 @@ pub fn assess_store_with_quantities(
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    Ok(StoreAssessment {
-        followed: fleet.followed_of(&now, &tail_wide),
-        mapping_faults: fleet.mapping_faults_of(&now),
-        notes: fleet.notes(&now, config),
-        now,
-    })
+    Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc, config))
 }
 
 /// Assessments of the units of a run.
@@ -142,6 +138,8 @@ pub struct RunAssessments {
     pub followed: FollowedQuantities,
     /// Number of units of the fleet by state.
     pub states: BTreeMap<&'static str, usize>,
+    /// Number of installed units whose newest gap is older than `trend.stale_after_days` before now.
+    pub stale_now: usize,
     /// Units of the whole fleet in another state than `normal`, touched by the run or not.
     pub work_list: Vec<TrendRow>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
@@ -174,7 +172,7 @@ pub fn assess_run(
         recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
-        notes: fleet.notes(&now, config),
+        notes: fleet.notes(&now, None, config),
         changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
@@ -182,6 +180,11 @@ pub fn assess_run(
     run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
+    let is_stale = |row: &&TrendRow| {
+        let newest = row.latest_utc.filter(|_| row.state.is_some());
+        newest.is_some_and(|at| days_between(at, Timestamp::now()) > config.document.trend.stale_after_days)
+    };
+    run.stale_now = now.iter().filter(is_stale).count();
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
     let causes: BTreeMap<UnitKey, &String> =
         run.changes.changed.iter().map(|change| (change.unit(), &change.because)).collect();
@@ -200,14 +203,8 @@ pub fn assess_run(
 /// Assessments of the selected units with everything that a report shows.
 #[derive(Default)]
 pub(crate) struct ReportAssessments {
-    /// Assessments at the date.
-    pub(crate) now: Vec<TrendRow>,
-    /// Followed quantities of these units, and what changed on their tails and parts.
-    pub(crate) followed: FollowedQuantities,
-    /// Wrong mappings that concern them.
-    pub(crate) mapping_faults: Vec<MappingFault>,
-    /// Limits and hours that their assessments lack, in words.
-    pub(crate) notes: Vec<String>,
+    /// Assessments at the date, and what was found about the units.
+    pub(crate) fleet: StoreAssessment,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Assessments of earlier dates, by the number of days before.
@@ -239,7 +236,6 @@ pub(crate) fn assess_for_report(
     let fleet = FleetContext::new(config, installations, histories, &days)?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    let followed = fleet.followed_of(&now, &tail_wide);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
@@ -255,8 +251,8 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, config));
-    Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
+    let fleet = fleet.assessed(now, &tail_wide, ask.as_of_utc, config);
+    Ok(ReportAssessments { fleet, drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -294,15 +290,8 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
 }
 
 fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
-    let parts = store.scan_columns(query, &HistoryBuilder::of_store())?;
-    of_parts(parts.len(), true, |gathering, some| {
-        for part in some {
-            let mut batches = parts.read(part)?.into_iter();
-            let put = batches.try_for_each(|batch| gathering.add_store_batch(batch));
-            put.map_err(|e| Error::refused(e.diagnostic()))?;
-        }
-        Ok(())
-    })
+    let scan = store.scan_columns(query, &builder::stored_columns())?;
+    Ok(builder::histories(unit_rows::of_store(&scan, builder::add_stored)?, true).0)
 }
 
 /// One assessment for each selected unit, by part and serial number.
@@ -359,7 +348,7 @@ pub(crate) struct FleetContext<'a> {
 }
 
 impl<'a> FleetContext<'a> {
-    /// Reads all histories and learns the priors of the cut-off before each of the `days`, without later data.
+    /// Adds up the usage of all units, and learns the priors of the cut-off before each of the `days`, without later data.
     pub(crate) fn new(
         config: &'a Config,
         installations: &'a Installations,
@@ -371,7 +360,7 @@ impl<'a> FleetContext<'a> {
         let units: Vec<_> = histories.iter().collect();
         let read = |(name, history)| books.series(name, history, is_booked);
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+        Self::of(config, installations, histories, series, days)
     }
 
     /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
@@ -390,7 +379,7 @@ impl<'a> FleetContext<'a> {
         };
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, installations, histories, series)?.taught_by(days))
+        Self::of(config, installations, histories, series, days)
     }
 
     /// Histories, and the usage series of each; the operator's tables apply to those of the store alone.
@@ -399,15 +388,18 @@ impl<'a> FleetContext<'a> {
         installations: &'a Installations,
         histories: &'a Histories,
         series: Vec<Series>,
+        days: &[Timestamp],
     ) -> Result<Self, Error> {
         let is_booked = histories.is_booked();
         let limits = Limits::new(config, series.iter());
+        let parts = histories.names().map(|name| name.0.as_deref()).zip(&series);
+        let priors = FleetPriors::train(parts, limits, days);
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
         Ok(Self {
             limits,
             units,
-            priors: FleetPriors::default(),
+            priors,
             followed: FollowedQuantities::default(),
             conditions: BTreeMap::new(),
             moved: Vec::new(),
@@ -415,13 +407,6 @@ impl<'a> FleetContext<'a> {
             installations: is_booked.then(|| InstallationIndex::new(installations)),
             inspections: if is_booked { InspectionIndex::read(config)? } else { InspectionIndex::default() },
         })
-    }
-
-    /// The same with the priors of the cut-off before each of the days.
-    fn taught_by(mut self, days: &[Timestamp]) -> Self {
-        let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
-        self.priors = FleetPriors::train(units, self.limits, days);
-        self
     }
 
     /// A unit's flights.
@@ -459,10 +444,30 @@ impl<'a> FleetContext<'a> {
         Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
     }
 
-    /// What assessments lack, and what of the fleet differs from its peers, in words.
-    fn notes(&self, rows: &[TrendRow], config: &Config) -> Vec<String> {
-        let mut notes = coverage::notes(rows, config);
-        notes.extend(peers::notes(&self.followed.rows));
+    /// Assessments of some units, with what was found about them in addition to gaps.
+    fn assessed(
+        &self,
+        now: Vec<TrendRow>,
+        tail_wide: &[QuantityChange],
+        given: Option<Timestamp>,
+        config: &Config,
+    ) -> StoreAssessment {
+        StoreAssessment {
+            followed: self.followed_of(&now, tail_wide),
+            mapping_faults: self.mapping_faults_of(&now),
+            notes: self.notes(&now, given, config),
+            now,
+        }
+    }
+
+    /// What assessments lack, and what of their units differs from its peers, in words.
+    /// The age of the newest log counts from a given date of assessment, else from today.
+    fn notes(&self, rows: &[TrendRow], given: Option<Timestamp>, config: &Config) -> Vec<String> {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let newest_log = rows.iter().filter_map(|row| self.latest_flight(&row.unit(), row.as_of_utc)).max();
+        let today = given.unwrap_or_else(Timestamp::now);
+        let mut notes = coverage::notes(rows, newest_log, today, config);
+        notes.extend(peers::notes(&self.followed.rows, |row| units.contains(&row.unit())));
         notes
     }
 

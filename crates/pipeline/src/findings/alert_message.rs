@@ -74,6 +74,8 @@ fn unit_fields(finding: &Finding) -> Value {
         "quantity": finding.quantity,
         "state": word(finding.state),
         "reason": finding.reason,
+        "statement": finding.statement,
+        "due_utc": finding.due_utc,
         "since_utc": finding.since_utc,
         "as_of_utc": finding.as_of_utc,
         "gap_m": finding.gap_m,
@@ -98,17 +100,15 @@ fn change_text(from: Option<&str>, to: &Finding) -> String {
         _ => String::new(),
     };
     let quantity = if to.quantity == GAP { String::new() } else { format!("{} ", to.quantity) };
-    let reason = to.reason.as_deref().map(|reason| format!(" ({reason})")).unwrap_or_default();
-    let gap = match (to.gap_m, to.limit_m) {
-        (Some(gap), Some(limit)) => format!("; gap {:.1} µm, limit {:.1} µm", gap * 1e6, limit * 1e6),
-        _ => String::new(),
-    };
+    let due = to.due.as_deref().map(|due| format!(", due {due}")).unwrap_or_default();
+    let why = to.statement.as_ref().or(to.reason.as_ref());
+    let why = why.map(|why| format!(" ({why})")).unwrap_or_default();
     let name = match (to.serial_number(), &to.tail_number) {
         (Some(serial), _) => format!("{}{place}", unit_text(to.unit.0.as_deref(), serial)),
         (None, Some(tail)) => format!("all of {tail}"),
         (None, None) => format!("all of {}", to.unit.0.as_deref().unwrap_or_default()),
     };
     let cause = to.cause.as_deref().map(|cause| format!("; cause: {cause}")).unwrap_or_default();
-    let text = format!("{name}: {quantity}{} → {}{reason}{gap}{cause}", word(from), word(to.state));
+    let text = format!("{name}: {quantity}{} → {}{due}{why}{cause}", word(from), word(to.state));
     escape_cell(&text).into_owned()
 }

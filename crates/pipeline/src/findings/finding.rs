@@ -25,6 +25,11 @@ pub struct Finding {
     /// `None` of a unit that is not assessed or was removed.
     pub state: Option<&'static str>,
     pub reason: Option<String>,
+    /// Why and how sure, in a few words: [`TrendRow::statement_text`].
+    pub statement: Option<String>,
+    /// Until when something is to be done, for readers: [`TrendRow::due_text`].
+    pub due: Option<String>,
+    pub due_utc: Option<Timestamp>,
     /// First flight of a change that a tail or a part made; none for a unit's state.
     pub since_utc: Option<Timestamp>,
     pub as_of_utc: Timestamp,
@@ -90,6 +95,9 @@ impl Finding {
             quantity: GAP,
             state: row.state,
             reason: row.reason.clone(),
+            statement: Some(row.statement_text()),
+            due: row.due_text(),
+            due_utc: row.due_utc,
             since_utc: None,
             as_of_utc: row.as_of_utc,
             latest_flight_utc,

@@ -8,6 +8,7 @@ pub mod finding;
 pub mod monitoring;
 mod run_step;
 pub mod summary;
+pub mod work_list;
 pub mod work_requests;
 pub mod work_update;
 

@@ -2,47 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use ::report::StateBadge;
 use jiff::Timestamp;
 use records::{Diagnostic, WorkEvent, WorkEventKind, WorkRequest};
 
 use crate::fleet::histories::UnitKey;
-
-/// Which requests to list; those without a status are all but closed ones.
-#[derive(Debug, Clone, Default)]
-pub struct WorkSelection {
-    /// `open`, `acknowledged`, `deferred`, `closed` or `all`.
-    pub status: Option<String>,
-    /// Requests of this tail only.
-    pub tail_number: Option<String>,
-    /// Requests of this serial number only.
-    pub serial_number: Option<String>,
-    /// Requests of this part number only.
-    pub part_number: Option<String>,
-}
-
-impl WorkSelection {
-    fn fits(&self, request: &WorkRequest) -> bool {
-        let is_wanted = match self.status.as_deref() {
-            None => request.is_open(),
-            Some("all") => true,
-            Some(status) => request.status == status,
-        };
-        is_wanted
-            && (self.tail_number.is_none() || self.tail_number == request.tail_number)
-            && self.serial_number.as_ref().is_none_or(|serial| *serial == request.serial_number)
-            && (self.part_number.is_none() || self.part_number == request.part_number)
-    }
-}
-
-/// The selected requests: closed ones last, the others by urgency and age.
-pub fn work_list(events: &[WorkEvent], selection: &WorkSelection, now: Timestamp) -> Vec<WorkRequest> {
-    let mut found = requests(events, now);
-    found.retain(|request| selection.fits(request));
-    let urgency = |request: &WorkRequest| StateBadge::from_state(request.state.as_deref()).rank();
-    found.sort_by_key(|request| (!request.is_open(), urgency(request), request.opened_utc));
-    found
-}
 
 /// Every request, earliest first. A deferred request whose date is reached is open again.
 pub fn requests(events: &[WorkEvent], now: Timestamp) -> Vec<WorkRequest> {
@@ -78,6 +41,7 @@ fn opened(event: &WorkEvent) -> WorkRequest {
         position: event.position.clone(),
         quantity: event.quantity.clone(),
         finding: event.reason.clone(),
+        due_utc: None,
         opened_utc: event.as_of_utc,
         by: None,
         reason: None,

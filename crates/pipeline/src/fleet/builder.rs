@@ -1,19 +1,16 @@
-//! Histories while their rows come in, from tables of any length.
+//! Flights of units from tables: the store's own, or estimates made elsewhere.
 
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::BTreeMap;
 
-use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch};
+use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch, TimestampMicrosecondArray};
 use ingest::tables::TableBatch;
 use jiff::Timestamp;
+use rayon::prelude::*;
 
-use crate::fleet::flight_row::{FlightExtras, FlightInput};
-use crate::fleet::histories::{Positions, UnitKey};
-use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
-use crate::fleet::settings_counts::SettingsCounts;
-
-/// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
-const BLOCK_ROWS: usize = 1 << 19;
+use crate::fleet::flight_row::{FlightExtras, FlightInput, FlightRow, StoredFlight};
+use crate::fleet::histories::{Histories, History, UnitKey};
+use crate::fleet::row_keys::{RowKey, TextColumn};
+use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at};
 
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
@@ -21,249 +18,223 @@ const OTHER_GAP: &str = "gap_midrange_fitted_m";
 /// The column with the digest of the settings of the estimate.
 const SETTINGS: &str = "config_digest";
 
+/// The columns that a table made elsewhere may bring; `serial_number`, `departure_utc` and `gap_m` it must.
+pub(crate) const COLUMNS: [&str; 14] = [
+    "serial_number",
+    "serial",
+    "part_number",
+    "tail_number",
+    "tail",
+    "position",
+    "flight_id",
+    "departure_utc",
+    "flight_hours",
+    "tail_hours_end",
+    "load_reversals",
+    "gap_m",
+    "gap_se_m",
+    "flags",
+];
+
+/// The columns of the store that a history is made from.
+pub(crate) fn stored_columns() -> Vec<&'static str> {
+    let stored = COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
+    stored.chain([OTHER_GAP, SETTINGS]).collect()
+}
+
 /// Builder of histories from rows.
-///
-/// Most rows belong to another unit than the row before. So rows are stored in the order of arrival, and each unit's
-/// rows are collected at the end, when their number is known: no buffer grows, and no row is moved twice.
 #[derive(Debug, Default)]
-pub struct HistoryBuilder {
-    /// Units by serial number; a serial number is unique only with its part number.
-    by_serial: HashMap<String, Vec<usize>>,
-    pub(crate) units: Vec<UnitEntry>,
-    last: usize,
-    /// The unit that came after each the last time.
-    follows: Vec<usize>,
-    pub(crate) blocks: Vec<RowBlock>,
-}
-
-/// A unit, and the number of its stored rows.
-#[derive(Debug, Default)]
-pub(crate) struct UnitEntry {
-    pub(crate) name: UnitKey,
-    pub(crate) places: Positions,
-    pub(crate) rows: usize,
-    /// Of its flights' names.
-    pub(crate) bytes: usize,
-    /// Its gaps by the settings that they were estimated with.
-    pub(crate) settings: SettingsCounts,
-}
-
-/// Rows in the order of arrival, and their flights' names one after the other.
-#[derive(Debug, Default)]
-pub(crate) struct RowBlock {
-    pub(crate) rows: Vec<StagedRow>,
-    pub(crate) names: String,
-}
-
-/// A stored row.
-#[derive(Debug)]
-pub(crate) struct StagedRow {
-    pub(crate) unit: u32,
-    /// Which of its unit's places it was flown in.
-    pub(crate) place: u32,
-    /// Where its flight's name ends in the block.
-    pub(crate) name_end: u32,
-    pub(crate) departure_us: i64,
-    /// `NaN` for none.
-    pub(crate) gap_m: f64,
-    pub(crate) extras: FlightExtras,
-}
+pub struct HistoryBuilder(RowsByUnit<(StoredFlight, ())>);
 
 impl HistoryBuilder {
-    /// The columns a chunk may bring; `serial_number`, `departure_utc` and `gap_m` it must.
-    pub const COLUMNS: [&'static str; 14] = [
-        "serial_number",
-        "serial",
-        "part_number",
-        "tail_number",
-        "tail",
-        "position",
-        "flight_id",
-        "departure_utc",
-        "flight_hours",
-        "tail_hours_end",
-        "load_reversals",
-        "gap_m",
-        "gap_se_m",
-        "flags",
-    ];
-
-    /// The columns that the store's own rows bring.
-    pub(crate) fn of_store() -> Vec<&'static str> {
-        let stored = Self::COLUMNS.into_iter().filter(|name| !["serial", "tail", "flags"].contains(name));
-        stored.chain(["flags", OTHER_GAP, SETTINGS]).collect()
-    }
-
-    /// Adds the rows of a batch.
-    ///
-    /// # Errors
-    /// When a column that must be there is not, and the first cell that cannot be read.
-    pub fn add(&mut self, chunk: &TableBatch) -> Result<(), ingest::Error> {
-        let texts = TextColumn::of(chunk, &["flags"])?;
-        // A list without flags is written as `[]`.
-        let has_flags = |row: usize| texts.get(row).is_some_and(|flags| flags != "[]");
-        self.add_with_flags(chunk, &|row, gap_m, _| has_flags(row).then_some(gap_m))
-    }
-
-    fn add_with_flags(&mut self, chunk: &TableBatch, other_gap: OtherGap<'_>) -> Result<(), ingest::Error> {
-        chunk.column(&["serial_number", "serial"])?;
-        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?, other_gap)
-    }
-
-    /// Adds rows of the store.
-    ///
-    /// # Errors
-    /// The first cell that cannot be read.
-    pub(crate) fn add_store_batch(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
-        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
-        let is_disputed = |row: usize| flags.as_ref().is_some_and(|flags| disagree(flags, row));
-        let other_gap = |row, _, other_m: Option<f64>| other_m.filter(|_| is_disputed(row));
-        self.add_with_flags(&TableBatch::new(Path::new("results"), batch, 0), &other_gap)
-    }
-
-    fn rows(
-        &mut self,
-        chunk: &TableBatch,
-        position_keys: &KeyColumns,
-        flights: &TextColumn,
-        other_gap: OtherGap<'_>,
-    ) -> Result<(), ingest::Error> {
-        let column = |names: &[&str]| chunk.column(names).map(Some);
-        let (serial, departure) = (chunk.find(&["serial_number", "serial"]), column(&["departure_utc"])?);
-        let gaps_m = chunk.numbers(column(&["gap_m"])?)?;
-        let departures = chunk.timestamps(departure)?;
-        let [hours, meters, reversals, errors_m] =
-            ["flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
-                .map(|name| chunk.numbers(chunk.find(&[name])));
-        let (hours, meters, reversals, errors_m) = (hours?, meters?, reversals?, errors_m?);
-        let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
-        let mut seen = KeyCache::default();
-        let settings = TextColumn::of(chunk, &[SETTINGS])?;
-        for row in 0..chunk.len() {
-            let empty = |column| chunk.error(row, column, "it is empty".into());
-            let position_key = match seen.get(position_keys, row) {
-                Some(position_key) => position_key,
-                None => {
-                    let position_key =
-                        self.position_key(position_keys.key_at(row).ok_or_else(|| empty(serial))?);
-                    seen.put(position_keys, row, position_key);
-                    position_key
-                }
-            };
-            let departure_us = departures.is_valid(row).then(|| departures.value(row));
-            let departure_utc = departure_us.ok_or_else(|| empty(departure))?;
-            let departure_utc = Timestamp::from_microsecond(departure_utc)
-                .map_err(|e| chunk.error(row, departure, e.to_string()))?;
-            let said = FlightInput {
-                flight_id: flights.get(row),
-                departure_utc,
-                flight_hours: at(&hours, row),
-                tail_hours_end: at(&meters, row),
-                load_reversals: at(&reversals, row).map(|n| n as u64),
-                gap_m: at(&gaps_m, row),
-                gap_se_m: at(&errors_m, row),
-                disagreeing_gap_m: at(&gaps_m, row)
-                    .and_then(|gap_m| other_gap(row, gap_m, at(&others_m, row))),
-            };
-            self.push_row(position_key, &said);
-            if let Some(settings) = settings.get(row).filter(|_| said.gap_m.is_some()) {
-                let latest_us = said.departure_utc.as_microsecond();
-                self.units[position_key.unit].settings.add(settings, 1, latest_us);
-            }
-        }
-        Ok(())
-    }
-
     /// Adds a flight.
     pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
-        let position_key = self.position_key(who);
-        self.push_row(position_key, row);
+        let (unit, place) = self.0.of_unit(who);
+        let flown = FlightRow::new(row, place, &mut unit.names);
+        unit.rows.push(((flown, FlightExtras::of(row)), ()));
     }
 
-    fn push_row(&mut self, position_key: RowTarget, row: &FlightInput<'_>) {
-        if self.blocks.last().is_none_or(|block| block.rows.len() == BLOCK_ROWS) {
-            self.blocks.push(RowBlock { rows: Vec::with_capacity(BLOCK_ROWS), names: String::new() });
-        }
-        let last = self.blocks.len() - 1;
-        let (block, unit) = (&mut self.blocks[last], &mut self.units[position_key.unit]);
-        let name = row.flight_id.unwrap_or_default();
-        block.names.push_str(name);
-        block.rows.push(StagedRow {
-            unit: position_key.unit as u32,
-            place: position_key.place,
-            name_end: block.names.len() as u32,
-            departure_us: row.departure_utc.as_microsecond(),
-            gap_m: row.gap_m.unwrap_or(f64::NAN),
-            extras: FlightExtras::of(row),
+    /// The histories of a table made elsewhere.
+    pub fn into_external(self) -> Histories {
+        histories(self.0.into_parts(), false).0
+    }
+
+    /// The histories of the store, whose flights belong to rows of the installations table.
+    pub fn into_store(self) -> Histories {
+        histories(self.0.into_parts(), true).0
+    }
+}
+
+/// Adds rows of an estimates table.
+///
+/// # Errors
+/// A column that must be there and is not, and the first cell that cannot be read.
+pub(crate) fn add_external(
+    rows: &mut RowsByUnit<(StoredFlight, ())>,
+    chunk: &TableBatch,
+) -> Result<(), ingest::Error> {
+    let columns = FlightColumns::external(chunk)?;
+    rows.add_rows(chunk, |row, unit, place| {
+        let flight = columns.flight(row, unit, place)?;
+        unit.rows.push((flight, ()));
+        Ok(())
+    })
+}
+
+/// Adds rows of the store.
+///
+/// # Errors
+/// The first cell that cannot be read.
+pub(crate) fn add_stored(
+    rows: &mut RowsByUnit<(StoredFlight, ())>,
+    chunk: &TableBatch,
+    batch: &RecordBatch,
+) -> Result<(), ingest::Error> {
+    let columns = FlightColumns::stored(chunk, batch)?;
+    rows.add_rows(chunk, |row, unit, place| {
+        let flight = columns.flight(row, unit, place)?;
+        unit.rows.push((flight, ()));
+        Ok(())
+    })
+}
+
+/// The histories of units, and what else `R` holds of each flight, by unit in the order of the flights.
+pub(crate) fn histories<R: Send>(
+    parts: PartsByUnit<(StoredFlight, R)>,
+    is_booked: bool,
+) -> (Histories, BTreeMap<UnitKey, Vec<R>>) {
+    let parts: Vec<_> = parts.into_iter().collect();
+    let history = |(name, parts): (UnitKey, Vec<UnitRows<_>>)| {
+        let rows = UnitRows::concatenated(parts, |((flown, _), _), places, names| {
+            FlightRow::relocate(flown, places, names);
         });
-        unit.rows += 1;
-        unit.bytes += name.len();
+        let (history, further) = History::of_rows(rows);
+        ((name.clone(), history), (name, further))
+    };
+    let (units, further): (Vec<_>, Vec<_>) = parts.into_par_iter().map(history).unzip();
+    (Histories::new(units.into_iter().collect(), is_booked), further.into_iter().collect())
+}
+
+/// The columns of some rows that a history is made from.
+pub(crate) struct FlightColumns<'a> {
+    chunk: &'a TableBatch,
+    departure: usize,
+    departures: TimestampMicrosecondArray,
+    flights: TextColumn,
+    gaps_m: Float64Array,
+    errors_m: Float64Array,
+    hours: Float64Array,
+    meters: Float64Array,
+    reversals: Float64Array,
+    /// The gaps of the other estimator, m.
+    others_m: Float64Array,
+    settings: TextColumn,
+    flags: Flags,
+}
+
+/// Quality flags of the gaps.
+enum Flags {
+    /// A record of an external table with any flag contradicts itself, so that it alone confirms nothing.
+    External(TextColumn),
+    /// A record of the store whose estimators disagree has the gap of the other one.
+    Stored(Option<ListArray>),
+}
+
+impl<'a> FlightColumns<'a> {
+    /// Those of an estimates table.
+    ///
+    /// # Errors
+    /// When a column that must be there is not, or has another type.
+    pub(crate) fn external(chunk: &'a TableBatch) -> Result<Self, ingest::Error> {
+        chunk.column(&["serial_number", "serial"])?;
+        Self::of(chunk, Flags::External(TextColumn::of(chunk, &["flags"])?))
     }
 
-    fn position_key(&mut self, who: RowKey<'_>) -> RowTarget {
-        let unit = self.unit(who.part_number, who.serial_number);
-        RowTarget { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
+    /// Those of the store's records.
+    ///
+    /// # Errors
+    /// As [`FlightColumns::external`].
+    pub(crate) fn stored(chunk: &'a TableBatch, batch: &RecordBatch) -> Result<Self, ingest::Error> {
+        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
+        Self::of(chunk, Flags::Stored(flags))
     }
 
-    /// Index of a unit. Most tables have one unit's rows together, or the units in one order in every run.
-    fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
-        let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
-        let units = &self.units;
-        let follows = self.follows.get(self.last).copied();
-        let expected = [Some(self.last), follows].into_iter().flatten();
-        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|u| is(&u.name))) {
-            self.last = unit;
-            return unit;
+    fn of(chunk: &'a TableBatch, flags: Flags) -> Result<Self, ingest::Error> {
+        let numbers = |name: &str| chunk.numbers(chunk.find(&[name]));
+        let departure = chunk.column(&["departure_utc"])?;
+        Ok(Self {
+            chunk,
+            departure,
+            departures: chunk.timestamps(Some(departure))?,
+            flights: TextColumn::of(chunk, &["flight_id"])?,
+            gaps_m: chunk.numbers(Some(chunk.column(&["gap_m"])?))?,
+            errors_m: numbers("gap_se_m")?,
+            hours: numbers("flight_hours")?,
+            meters: numbers("tail_hours_end")?,
+            reversals: numbers("load_reversals")?,
+            others_m: numbers(OTHER_GAP)?,
+            settings: TextColumn::of(chunk, &[SETTINGS])?,
+            flags,
+        })
+    }
+
+    /// The flight of a row in a place of its unit, which takes its name and counts its settings.
+    ///
+    /// # Errors
+    /// A departure that is missing or that no calendar has.
+    pub(crate) fn flight<R>(
+        &self,
+        row: usize,
+        unit: &mut UnitRows<R>,
+        place: u32,
+    ) -> Result<StoredFlight, ingest::Error> {
+        let wrong = |detail: String| self.chunk.error(row, Some(self.departure), detail);
+        let departure_us = self.departures.is_valid(row).then(|| self.departures.value(row));
+        let departure_us = departure_us.ok_or_else(|| wrong("it is empty".into()))?;
+        let departure_utc = Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
+        let gap_m = at(&self.gaps_m, row);
+        if let Some(settings) = self.settings.get(row).filter(|_| gap_m.is_some()) {
+            unit.settings.add(settings, 1, departure_us);
         }
-        let known = self.by_serial.get(serial_number);
-        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].name)));
-        let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
-        self.follows[self.last] = unit;
-        self.last = unit;
-        unit
+        let input = FlightInput {
+            flight_id: self.flights.get(row),
+            departure_utc,
+            flight_hours: at(&self.hours, row),
+            tail_hours_end: at(&self.meters, row),
+            load_reversals: at(&self.reversals, row).map(|n| n as u64),
+            gap_m,
+            gap_se_m: at(&self.errors_m, row),
+            disagreeing_gap_m: gap_m.and_then(|gap_m| self.other_gap_m(row, gap_m)),
+        };
+        Ok((FlightRow::new(&input, place, &mut unit.names), FlightExtras::of(&input)))
     }
 
-    fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
-        let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
-        self.by_serial.entry(name.1.clone()).or_default().push(unit);
-        self.units.push(UnitEntry { name, ..UnitEntry::default() });
-        self.follows.push(0);
-        unit
+    /// The gap that contradicts that of a row, m.
+    fn other_gap_m(&self, row: usize, gap_m: f64) -> Option<f64> {
+        match &self.flags {
+            // A list without flags is written as `[]`.
+            Flags::External(texts) => texts.get(row).filter(|flags| *flags != "[]").map(|_| gap_m),
+            Flags::Stored(flags) => {
+                let has_flags = |flags: &&ListArray| flags.is_valid(row) && flags.value_length(row) > 0;
+                let flags = flags.as_ref().filter(has_flags)?.value(row);
+                let is_disputed = flags.as_string_opt::<i32>()?.iter().any(|flag| flag == Some(DISAGREE));
+                at(&self.others_m, row).filter(|_| is_disputed)
+            }
+        }
     }
-}
-
-/// A unit, and one of its places.
-#[derive(Debug, Clone, Copy)]
-struct RowTarget {
-    unit: usize,
-    place: u32,
-}
-
-/// The gap that contradicts that of a row, from the row, its gap and that of the other estimator, m; a record of an external
-/// table with any flag contradicts itself, so that it alone confirms nothing.
-type OtherGap<'a> = &'a dyn Fn(usize, f64, Option<f64>) -> Option<f64>;
-
-/// Whether the flags of a row hold the disagreement of the estimators.
-fn disagree(flags: &ListArray, row: usize) -> bool {
-    if flags.is_null(row) || flags.value_length(row) == 0 {
-        return false;
-    }
-    let flags = flags.value(row);
-    flags.as_string_opt::<i32>().is_some_and(|flags| flags.iter().any(|flag| flag == Some(DISAGREE)))
-}
-
-/// The number of a row.
-pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
-    numbers.is_valid(row).then(|| numbers.value(row))
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{ArrayRef, ListBuilder, StringArray, StringBuilder, TimestampMicrosecondArray};
+    use arrow::array::{ArrayRef, Int64Array, ListBuilder, StringArray, StringBuilder};
+    use arrow::compute::cast;
+    use arrow::datatypes::DataType;
 
     use super::*;
+    use crate::error::Error;
+    use crate::fleet::unit_rows::of_parts;
 
     /// A standard error of 3 µm and a distance of 4 µm between the estimators make 5 µm.
     #[test]
@@ -283,14 +254,165 @@ mod tests {
             (OTHER_GAP, numbers([34e-6; 3])),
             ("flags", Arc::new(flags.finish())),
         ];
-        let mut builder = HistoryBuilder::default();
-        builder.add_store_batch(RecordBatch::try_from_iter(columns).unwrap()).unwrap();
-        let histories = builder.into_store();
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        let mut rows = RowsByUnit::default();
+        add_batch(&mut rows, &batch).unwrap();
+        let histories = histories(rows.into_parts(), true).0;
         let history = histories.get(&(None, "S".into())).unwrap();
         let errors: Vec<f64> =
             history.flights().iter().map(|flown| history.extras(flown).gap_se_m().unwrap() * 1e6).collect();
         assert!((errors[0] - 5.0).abs() < 1e-9 && (errors[1] - 3.0).abs() < 1e-9, "{errors:?}");
         let at = |us| Timestamp::from_microsecond(us).unwrap();
         assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
+    }
+
+    fn chunk(batch: &RecordBatch) -> TableBatch {
+        TableBatch::new("results".as_ref(), batch.clone(), 0)
+    }
+
+    fn add_batch(
+        rows: &mut RowsByUnit<(StoredFlight, ())>,
+        batch: &RecordBatch,
+    ) -> Result<(), ingest::Error> {
+        add_stored(rows, &chunk(batch), batch)
+    }
+
+    /// Pseudo-random whole numbers below a bound.
+    fn chances() -> impl FnMut(u64) -> u64 {
+        let mut state = 7_u64;
+        move |bound| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % bound
+        }
+    }
+
+    /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
+    type Cells = ([Option<String>; 5], i64, Option<f64>);
+
+    /// Serial numbers of two parts, units that move about, names with a blank, and flights that arrive late.
+    fn rows() -> Vec<Cells> {
+        let mut chance = chances();
+        let mut row = |at: i64| {
+            let mut text = |name: &str, count| (chance(9) > 0).then(|| format!("{name}{}", chance(count)));
+            let (part, tail, position, flight) =
+                (text("P", 2), text("T", 3), text("place ", 2), text(" F", 40));
+            let serial = Some(format!("S{}", chance(4)));
+            let departure_us = 1_000_000 * (at - chance(20) as i64);
+            ([part, serial, tail, position, flight], departure_us, (chance(5) > 0).then(|| chance(90) as f64))
+        };
+        (0..600).map(&mut row).collect()
+    }
+
+    fn batch(rows: &[Cells], texts: &DataType) -> RecordBatch {
+        let names = ["part_number", "serial_number", "tail_number", "position", "flight_id"];
+        let text = |column: usize| {
+            let plain: StringArray = rows.iter().map(|(texts, ..)| texts[column].as_deref()).collect();
+            cast(&plain, texts).unwrap()
+        };
+        let departures: TimestampMicrosecondArray = rows.iter().map(|row| Some(row.1)).collect();
+        let gaps_m: Float64Array = rows.iter().map(|row| row.2).collect();
+        let reversals: Int64Array = rows.iter().map(|row| row.2.map(|gap| gap as i64)).collect();
+        let numbers: [(&str, ArrayRef); 3] = [
+            ("departure_utc", Arc::new(departures)),
+            ("gap_m", Arc::new(gaps_m)),
+            ("load_reversals", Arc::new(reversals)),
+        ];
+        let texts = names.into_iter().enumerate().map(|(column, name)| (name, text(column)));
+        RecordBatch::try_from_iter(texts.chain(numbers)).unwrap()
+    }
+
+    /// Each row by itself, as the tables mean it.
+    fn one_by_one(rows: &[Cells]) -> Histories {
+        let mut gathering = HistoryBuilder::default();
+        for ([part, serial, tail, position, flight], departure_us, gap_m) in rows {
+            let who = RowKey {
+                part_number: part.as_deref(),
+                serial_number: serial.as_deref().unwrap(),
+                tail_number: tail.as_deref(),
+                position: position.as_deref(),
+            };
+            let row = FlightInput {
+                flight_id: flight.as_deref().map(str::trim),
+                departure_utc: Timestamp::from_microsecond(*departure_us).unwrap(),
+                flight_hours: None,
+                tail_hours_end: None,
+                load_reversals: gap_m.map(|gap| gap as u64),
+                gap_m: *gap_m,
+                gap_se_m: None,
+                disagreeing_gap_m: None,
+            };
+            gathering.put(who, &row);
+        }
+        gathering.into_store()
+    }
+
+    #[test]
+    fn rows_of_the_store_and_of_a_foreign_table_are_what_each_of_them_is_by_itself() {
+        let rows = rows();
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (mut stored, mut plain) = (RowsByUnit::default(), RowsByUnit::default());
+        // In other parts names have other codes.
+        for some in rows.chunks(230) {
+            add_batch(&mut stored, &batch(some, &coded)).unwrap();
+            add_external(&mut plain, &chunk(&batch(some, &DataType::Utf8))).unwrap();
+        }
+        let expected = row_texts(&one_by_one(&rows));
+        assert_eq!(row_texts(&histories(stored.into_parts(), true).0), expected);
+        assert_eq!(row_texts(&histories(plain.into_parts(), true).0), expected);
+    }
+
+    /// All that is known of all units.
+    fn row_texts(histories: &Histories) -> Vec<String> {
+        let of_unit = |(name, history): (&UnitKey, &History)| {
+            let flight = |f: &FlightRow| {
+                format!("{f:?} {:?} {:?} {:?}", history.place(f), history.flight_id(f), history.extras(f))
+            };
+            format!("{name:?} {:?}", history.flights().iter().map(flight).collect::<Vec<_>>())
+        };
+        histories.iter().map(of_unit).collect()
+    }
+
+    /// The order of parts decides, not that of the workers, of whom there may be more than parts or units.
+    #[test]
+    fn any_number_of_workers_brings_together_what_one_does() {
+        let rows = rows();
+        let expected = row_texts(&one_by_one(&rows));
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
+            let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
+            let put = |rows: &mut RowsByUnit<(StoredFlight, ())>, part: usize| {
+                add_batch(rows, &parts[part]).unwrap();
+                Ok(())
+            };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
+            let found = pool.install(|| histories(of_parts(parts.len(), put).unwrap(), true).0);
+            assert!(row_texts(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
+        }
+        assert!(of_parts::<StoredFlight>(0, |_, _| Ok(())).unwrap().is_empty());
+    }
+
+    /// Independent of the order of the workers, the first error of the table is returned.
+    #[test]
+    fn of_several_errors_the_first_is_returned() {
+        let refuse = |_: &mut RowsByUnit<(StoredFlight, ())>, part: usize| match part {
+            0..3 => Ok(()),
+            first => {
+                let empty = RecordBatch::new_empty(Arc::new(arrow::datatypes::Schema::empty()));
+                let error = TableBatch::new("t".as_ref(), empty, first).error(0, None, "bad".into());
+                Err(Error::refused(error.diagnostic()))
+            }
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let error = pool.install(|| of_parts(24, refuse)).unwrap_err();
+        assert!(format!("{error:?}").contains("row: Some(4)"), "{error:?}");
+    }
+
+    #[test]
+    fn a_row_without_a_serial_number_is_reported_by_its_number() {
+        let mut rows = rows();
+        rows[17].0[1] = Some("  ".into());
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let error = add_batch(&mut RowsByUnit::default(), &batch(&rows, &coded)).unwrap_err();
+        assert_eq!(error.diagnostic().location().unwrap(), "column `serial_number`, row 18");
     }
 }

@@ -5,10 +5,10 @@ use std::path::Path;
 use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
-use crate::fleet::builder::HistoryBuilder;
+use crate::fleet::builder;
 use crate::fleet::histories::Histories;
-use crate::fleet::merge::of_parts;
 use crate::fleet::row_keys::KeyColumns;
+use crate::fleet::unit_rows::of_parts;
 use jiff::Timestamp;
 
 /// A unit and a day.
@@ -28,11 +28,12 @@ pub struct AsOfQuery {
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Histories, Error> {
-    let table = TableSplits::open(file, Some(&HistoryBuilder::COLUMNS), &KeyColumns::COLUMNS).map_err(bad)?;
-    of_parts(table.len(), false, |gathering, some| {
-        let mut chunks = table.batches(some).map_err(bad)?;
-        chunks.try_for_each(|chunk| gathering.add(&chunk?)).map_err(bad)
-    })
+    let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS).map_err(bad)?;
+    let parts = of_parts(table.len(), |rows, part| {
+        let mut chunks = table.batches(part..part + 1).map_err(bad)?;
+        chunks.try_for_each(|chunk| builder::add_external(rows, &chunk?)).map_err(bad)
+    })?;
+    Ok(builder::histories(parts, false).0)
 }
 
 /// The histories of an estimates table in memory.
@@ -40,9 +41,8 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    of_parts(chunks.len(), false, |gathering, some| {
-        chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
-    })
+    let parts = of_parts(chunks.len(), |rows, part| builder::add_external(rows, &chunks[part]).map_err(bad))?;
+    Ok(builder::histories(parts, false).0)
 }
 
 /// Reads a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.

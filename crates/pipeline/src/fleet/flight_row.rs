@@ -18,6 +18,9 @@ pub struct FlightInput<'a> {
     pub disagreeing_gap_m: Option<f64>,
 }
 
+/// A flight, and its secondary columns.
+pub(crate) type StoredFlight = (FlightRow, FlightExtras);
+
 /// A flight as a unit's history keeps it, in 32 bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct FlightRow {
@@ -26,23 +29,35 @@ pub struct FlightRow {
     gap_m: f64,
     /// Which of its unit's places it was flown in.
     pub(crate) place: u32,
-    /// How many of its unit's rows came before it, in the order of arrival.
+    /// Which of its unit's flights it is, by departure.
     pub(crate) row: u32,
     /// Where its name begins and ends among its unit's names; at one place where it has none.
     name: [u32; 2],
 }
 
 impl FlightRow {
-    /// A flight whose name is not known yet: the gap `NaN` for none, and how many of its unit's rows came before it.
-    pub(crate) fn new(departure_us: i64, gap_m: f64, place: u32, row: u32) -> Self {
-        Self { departure_us, gap_m, place, row, name: [0, 0] }
+    /// A flight in a place of its unit; its name is appended to those of the unit's other flights.
+    pub(crate) fn new(row: &FlightInput<'_>, place: u32, names: &mut String) -> Self {
+        let begin = names.len() as u32;
+        names.push_str(row.flight_id.unwrap_or_default());
+        Self {
+            departure_us: row.departure_utc.as_microsecond(),
+            gap_m: row.gap_m.unwrap_or(f64::NAN),
+            place,
+            row: 0,
+            name: [begin, names.len() as u32],
+        }
     }
 
-    /// The same with its name, which is appended to the names of the unit's other flights.
-    pub(crate) fn named(self, name: &str, names: &mut String) -> Self {
-        let begin = names.len() as u32;
-        names.push_str(name);
-        Self { name: [begin, names.len() as u32], ..self }
+    /// The same among more flights: its place has another number, and its name comes after others.
+    pub(crate) fn relocate(&mut self, places: &[u32], names: u32) {
+        self.place = places[self.place as usize];
+        self.name = self.name.map(|at| at + names);
+    }
+
+    /// The same with its number among the unit's flights.
+    pub(crate) fn numbered(self, row: u32) -> Self {
+        Self { row, ..self }
     }
 
     /// Its name among those of its unit's flights.
@@ -87,20 +102,6 @@ impl FlightExtras {
             tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
             gap_se_m: signed_error(row),
             load_reversals: row.load_reversals.unwrap_or(u64::MAX),
-        }
-    }
-
-    pub(crate) fn to_bits(self) -> [u64; 4] {
-        let Self { flight_hours, tail_hours_end, gap_se_m, load_reversals } = self;
-        [flight_hours.to_bits(), tail_hours_end.to_bits(), gap_se_m.to_bits(), load_reversals]
-    }
-
-    pub(crate) fn from_bits([flight_hours, tail_hours_end, gap_se_m, load_reversals]: [u64; 4]) -> Self {
-        Self {
-            flight_hours: f64::from_bits(flight_hours),
-            tail_hours_end: f64::from_bits(tail_hours_end),
-            gap_se_m: f64::from_bits(gap_se_m),
-            load_reversals,
         }
     }
 

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use records::Installation;
 
-use crate::fleet::extras::UnitExtras;
-use crate::fleet::flight_row::{FlightExtras, FlightRow};
+use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
 use crate::fleet::settings_counts::SettingsCounts;
+use crate::fleet::unit_rows::UnitRows;
 
 /// Part number where known, and serial number.
 pub type UnitKey = (Option<String>, String);
@@ -74,7 +74,7 @@ pub struct History {
     places: Vec<TailPosition>,
     flights: Vec<FlightRow>,
     /// Their secondary columns; empty once they were [dropped](History::drop_secondary).
-    extras: UnitExtras,
+    extras: Vec<FlightExtras>,
     /// The flights' names, one after the other.
     names: String,
     /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
@@ -126,12 +126,12 @@ impl History {
 
     /// Secondary columns of one of them.
     pub fn extras(&self, flown: &FlightRow) -> FlightExtras {
-        self.extras.row(flown.row)
+        self.extras[flown.row as usize]
     }
 
     /// Frees the secondary columns, which are not needed from now on.
     pub(crate) fn drop_secondary(&mut self) {
-        self.extras = UnitExtras::default();
+        self.extras = Vec::new();
     }
 
     /// Where one of them was flown.
@@ -154,43 +154,24 @@ impl History {
         installations.iter().find(is_here).copied()
     }
 
-    /// One with positions, and capacity for a number of flights and bytes of their names.
-    pub(crate) fn with_capacity(
-        places: Positions,
-        flights: usize,
-        names: usize,
-        settings: SettingsCounts,
-    ) -> Self {
-        Self {
-            places: places.0,
-            flights: Vec::with_capacity(flights),
-            extras: UnitExtras::default(),
-            names: String::with_capacity(names),
-            disputed_us: Vec::new(),
-            settings,
-        }
-    }
-
-    /// Appends a flight.
-    pub(crate) fn put(&mut self, flown: FlightRow, name: &str) {
-        self.flights.push(flown.named(name, &mut self.names));
-    }
-
-    /// Adds the secondary columns, and sorts the rows, so that the result does not depend on their order of arrival.
-    pub(crate) fn finish(mut self, extras: UnitExtras) -> Self {
-        self.extras = extras;
-        let (places, names) = (&self.places, &self.names);
+    /// The history of a unit's rows, each with what else `R` holds of it; sorted, so that it does not depend on the order of
+    /// arrival.
+    pub(crate) fn of_rows<R>(rows: UnitRows<(StoredFlight, R)>) -> (Self, Vec<R>) {
+        let UnitRows { places: Positions(places), names, settings, mut rows } = rows;
         let place = |flown: &FlightRow| &places[flown.place as usize];
-        let order = |a: &FlightRow, b: &FlightRow| {
-            let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(names).cmp(&b.name_in(names)));
+        let order = |((a, _), _): &(StoredFlight, R), ((b, _), _): &(StoredFlight, R)| {
+            let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(&names).cmp(&b.name_in(&names)));
             a.departure_us().cmp(&b.departure_us()).then_with(rest)
         };
-        if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
-            self.flights.sort_by(order);
+        if !rows.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
+            rows.sort_by(order);
         }
-        let is_disputed = |flown: &&FlightRow| self.extras(flown).is_disputed();
-        self.disputed_us = self.flights.iter().filter(is_disputed).map(FlightRow::departure_us).collect();
-        self
+        let disputed = rows.iter().filter(|((_, extras), _)| extras.is_disputed());
+        let disputed_us = disputed.map(|((flown, _), _)| flown.departure_us()).collect();
+        let (stored, further): (Vec<StoredFlight>, Vec<R>) = rows.into_iter().unzip();
+        let numbered = |((flown, extras), row): (StoredFlight, u32)| (flown.numbered(row), extras);
+        let (flights, extras) = stored.into_iter().zip(0..).map(numbered).unzip();
+        (Self { places, flights, extras, names, disputed_us, settings }, further)
     }
 }
 

@@ -74,15 +74,6 @@ impl<T: Copy> KeyCache<T> {
         of_code.filter(|(before, _)| keys.are_same(*before, row)).map(|(_, found)| found)
     }
 
-    /// The result for a row's position key, found once for the rows that share it.
-    pub(crate) fn get_or(&mut self, keys: &KeyColumns, row: usize, find: impl FnOnce() -> T) -> T {
-        self.get(keys, row).unwrap_or_else(|| {
-            let found = find();
-            self.put(keys, row, found);
-            found
-        })
-    }
-
     /// Caches the result for a row's position key.
     pub(crate) fn put(&mut self, keys: &KeyColumns, row: usize, found: T) {
         self.last = Some((row, found));

@@ -362,7 +362,7 @@ impl Planner<'_> {
             Some(WorkReason::Asked)
         } else if !stat.is_some_and(|stat| stat.is_of(account)) {
             Some(WorkReason::ContentChanged)
-        } else if account.config_digest.as_deref() != Some(&settings) {
+        } else if account.config_digest.as_deref() != Some(&settings) || self.is_forbidden(account) {
             Some(WorkReason::SettingChanged)
         } else if self.is_orphan(account) {
             Some(WorkReason::OwnerGone)
@@ -374,11 +374,17 @@ impl Planner<'_> {
             Some(WorkReason::SettingChanged)
         } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(WorkReason::Retry)
-        } else if self.request.verify_content && account.outcome.is_success() {
+        } else if self.request.verify_content {
             Some(WorkReason::Verify)
         } else {
             None
         }
+    }
+
+    /// Whether `logs.tails` forbids the tail of a log that was processed.
+    fn is_forbidden(&self, account: &LogRecord) -> bool {
+        let tail = account.tail_number.as_ref().and_then(|tail| TailNumber::new(tail).ok());
+        tail.is_some_and(|tail| self.config.document.logs.forbidden_by(&account.log_path, &tail).is_some())
     }
 
     /// A log that yielded its flight to another log, which no longer owns it.

@@ -12,7 +12,7 @@ use records::{Installations, PartNumber, Quantity, QuantityRow};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
-use crate::assess::trends::{self, ReportAssessments, UnitSelection};
+use crate::assess::trends::{self, ReportAssessments, StoreAssessment, UnitSelection};
 use crate::error::Error;
 use crate::findings::work_requests;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
@@ -46,8 +46,9 @@ pub fn compose(
     let StoreContents { histories, mut extras, store_version } = StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors } =
+    let ReportAssessments { fleet, drawn, before, past, priors } =
         trends::assess_for_report(config, installations, &histories, ask, &days, store)?;
+    let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
     checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));

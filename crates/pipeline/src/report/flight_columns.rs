@@ -1,7 +1,6 @@
 //! What the report shows of flights, read from the columns of the store that hold it.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use arrow::array::{Array, AsArray, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
@@ -10,10 +9,11 @@ use records::Quantity;
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::fleet::builder::{HistoryBuilder, at};
+use crate::fleet::builder::{self, FlightColumns};
+use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
-use crate::fleet::parallel_scan::read_each;
-use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+use crate::fleet::row_keys::TextColumn;
+use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
 
 /// Columns of numbers that a page shows and no assessment needs.
 const NUMBERS: [&str; 7] =
@@ -22,7 +22,7 @@ const NUMBERS: [&str; 7] =
 /// All flights of all units.
 pub(super) struct StoreContents {
     pub(super) histories: Histories,
-    /// Further columns of each unit's flights, in the order of arrival, which each flight's `row` counts.
+    /// Further columns of each unit's flights, by departure: each flight's `row` is its place among them.
     pub(super) extras: BTreeMap<UnitKey, Vec<FlightExtras>>,
     pub(super) store_version: u64,
 }
@@ -50,67 +50,40 @@ impl StoreContents {
     /// Reads the flights that departed until a time, with it.
     pub(super) fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
         let until_utc = last.and_then(|last| last.checked_add(SignedDuration::from_micros(1)).ok());
-        let mut columns = HistoryBuilder::of_store();
+        let mut columns = builder::stored_columns();
         columns.extend(NUMBERS.into_iter().chain(["reason"]));
         columns.extend(Quantity::ALL.map(Quantity::as_str));
         columns.sort_unstable();
         columns.dedup();
         let scan = store.scan_columns(&Query { until_utc, ..Query::default() }, &columns)?;
-        let (mut gathering, mut further) = (HistoryBuilder::default(), ExtrasReader::default());
-        read_each(&scan, |batch| {
-            further.add(batch)?;
-            gathering.add_store_batch(batch.clone())
-        })?;
-        let unit = |(name, unit): (UnitKey, usize)| {
-            let mut extras = std::mem::take(&mut further.units[unit]);
-            extras.shrink_to_fit();
-            (name, extras)
+        let (histories, extras) = builder::histories(of_store(&scan, add)?, true);
+        Ok(Self { histories, extras, store_version: scan.version() })
+    }
+}
+
+fn add(
+    rows: &mut RowsByUnit<(StoredFlight, FlightExtras)>,
+    chunk: &TableBatch,
+    batch: &RecordBatch,
+) -> Result<(), ingest::Error> {
+    let flights = FlightColumns::stored(chunk, batch)?;
+    let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+    let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
+    let quantities = Quantity::ALL.map(|quantity| column(quantity.as_str()));
+    let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let reasons = TextColumn::of(chunk, &["reason"])?;
+    let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
+    rows.add_rows(chunk, |row, unit, place| {
+        let extras = FlightExtras {
+            numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
+            reason: reasons.get(row).map(Into::into),
+            flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
+            quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
         };
-        let extras = further.names.into_iter().map(unit).collect();
-        Ok(Self { histories: gathering.into_store(), extras, store_version: scan.version() })
-    }
-}
-
-/// Further columns while their rows come in.
-#[derive(Default)]
-struct ExtrasReader {
-    names: BTreeMap<UnitKey, usize>,
-    units: Vec<Vec<FlightExtras>>,
-}
-
-impl ExtrasReader {
-    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-        let keys = KeyColumns::of(&chunk)?;
-        let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-        let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
-        let quantities = Quantity::ALL.map(|quantity| column(quantity.as_str()));
-        let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let reasons = TextColumn::of(&chunk, &["reason"])?;
-        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
-        let mut seen = KeyCache::default();
-        for row in 0..chunk.len() {
-            let Some(who) = keys.key_at(row) else { continue };
-            let unit = seen.get_or(&keys, row, || self.unit(who));
-            self.units[unit].push(FlightExtras {
-                numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
-                reason: reasons.get(row).map(Into::into),
-                flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
-                quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
-            });
-        }
+        let flight = flights.flight(row, unit, place)?;
+        unit.rows.push((flight, extras));
         Ok(())
-    }
-
-    /// Index of a unit.
-    fn unit(&mut self, who: RowKey<'_>) -> usize {
-        let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
-        let units = &mut self.units;
-        *self.names.entry(name).or_insert_with(|| {
-            units.push(Vec::new());
-            units.len() - 1
-        })
-    }
+    })
 }
 
 /// The flags of a row.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use ::report::{Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
 use job::Config;
+use job::flight_log::FlightLog;
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 use store::{Query, Store};
@@ -48,7 +49,7 @@ pub fn draw(
     installations: &Arc<Installations>,
     store: &Store,
 ) -> Result<FlightPlots, Error> {
-    let mut logs = BTreeMap::<String, Vec<Wanted>>::new();
+    let mut logs = BTreeMap::<StoredLog, Vec<Wanted>>::new();
     let (mut chosen, mut left_out) = (0, 0);
     for unit in by_urgency(report) {
         let (view, first) = (&report.units[unit], report.units[unit].flights.len());
@@ -75,7 +76,7 @@ pub fn draw(
     }
     let drawn: Vec<Result<Vec<(Wanted, Page)>, Diagnostic>> = logs
         .into_par_iter()
-        .map(|(log, wanted)| of_log(&log, &wanted, report, config, installations))
+        .map(|(stored, wanted)| of_log(&stored, &wanted, report, config, installations))
         .collect();
     let mut plots = FlightPlots { left_out, ..FlightPlots::default() };
     for pages in drawn {
@@ -102,12 +103,15 @@ fn by_urgency(report: &Report) -> Vec<usize> {
     chosen
 }
 
+/// Path of a log, and the digest that it had when its records were stored.
+type StoredLog = (String, String);
+
 /// Logs of a unit's flights from one on, by tail and flight.
 fn log_paths(
     unit: &UnitView,
     first: usize,
     store: &Store,
-) -> Result<BTreeMap<(String, String), String>, Error> {
+) -> Result<BTreeMap<(String, String), StoredLog>, Error> {
     let Some(first) = unit.flights.get(first) else { return Ok(BTreeMap::new()) };
     let query = Query {
         serial_number: Some(unit.row.serial_number.clone()),
@@ -116,22 +120,29 @@ fn log_paths(
         ..Query::default()
     };
     let key = |record: records::GapRecord| {
-        let flight = record.flight;
-        ((flight.tail_number.to_string(), flight.flight_id.to_string()), record.provenance.log_path)
+        let (flight, source) = (record.flight, record.provenance);
+        let key = (flight.tail_number.to_string(), flight.flight_id.to_string());
+        (key, (source.log_path, source.log_digest))
     };
     Ok(store.records(&query)?.into_iter().map(key).collect())
 }
 
 fn of_log(
-    log: &str,
+    (log, digest): &StoredLog,
     wanted: &[Wanted],
     report: &Report,
     config: &Arc<Config>,
     installations: &Arc<Installations>,
 ) -> Result<Vec<(Wanted, Page)>, Diagnostic> {
-    let (name, of_log, units) = (log.to_owned(), Arc::clone(config), Arc::clone(installations));
+    let (name, digest, of_log, units) =
+        (log.clone(), digest.clone(), Arc::clone(config), Arc::clone(installations));
     let plots = within_time_limit(log, config, move || {
         let files = discover::stored_log(&of_log, &name);
+        if FlightLog::open(&files, &name, &of_log, &units)?.digest != digest {
+            let what = "the log, or which of its columns are read, has changed since its records were stored";
+            let hint = "its flights are not drawn; `freeplay run` stores them anew";
+            return Err(Diagnostic::new("log_changed", what).in_file(&name).hint(hint));
+        }
         estimate_plots::of_log(&files, &name, &of_log, &units, None)
     })?;
     let page = |wanted: &Wanted| {

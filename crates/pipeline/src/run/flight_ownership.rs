@@ -174,6 +174,7 @@ impl<'a> OwnershipLedger<'a> {
             match self.claim(&account, &new, other, is_same, is_held_by_run) {
                 Claim::Takes => {
                     if is_held_by_run {
+                        report.uncount(&owner, &record.position);
                         displaced.entry(owner).or_insert(is_same);
                     }
                     kept.push(record);

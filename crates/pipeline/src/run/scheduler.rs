@@ -119,7 +119,7 @@ pub(crate) fn execute_run(
     inspections::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?;
-    let mut writer = acquire_lock(&store, context)?;
+    let mut writer = store.lock(&context.holder, context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let started_utc = Timestamp::now();
@@ -176,20 +176,6 @@ pub(crate) fn execute_run(
     };
     report.follow_up = follow_up.run(findings, &mut writer);
     Ok(report)
-}
-
-/// Acquires the store's lock; it waits in short intervals so that a signal is handled.
-fn acquire_lock(store: &Store, context: &Context<'_>) -> Result<Writer, Error> {
-    const TURN: Duration = Duration::from_millis(200);
-    let deadline = context.wait.map(|wait| Instant::now() + wait);
-    loop {
-        let left = deadline.map(|d| d.saturating_duration_since(Instant::now()));
-        match store.lock(&context.holder, left.map(|left| left.min(TURN))) {
-            Err(store::Error::Held { .. })
-                if left.is_some_and(|left| left > TURN) && !context.stop.load(Ordering::Relaxed) => {}
-            ended => return Ok(ended?),
-        }
-    }
 }
 
 /// Number of workers: one per core, also for one log, whose actuators are spread over them.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use records::time::days_between;
-use records::{Diagnostic, GapRecord, Installations, Status};
+use records::{Diagnostic, GapRecord, Installations, Position, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 
 use crate::assess::changes::UnitChange;
@@ -162,6 +162,9 @@ pub struct RunSummary {
     /// Number of tails without data for longer than `trend.stale_after_days` before now.
     #[serde(skip)]
     pub quiet_now: usize,
+    /// Number of installed units whose newest gap is older than `trend.stale_after_days` before now.
+    #[serde(skip)]
+    pub stale_now: usize,
     /// Newest departure of all logs.
     #[serde(skip)]
     pub newest_departure_utc: Option<Timestamp>,
@@ -199,8 +202,10 @@ pub struct RunSummary {
 /// Outcome of one log.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct LogCounts {
-    estimated: usize,
-    refused: BTreeMap<String, usize>,
+    /// Tail, id and departure.
+    flight: (Option<String>, Option<String>, Option<Timestamp>),
+    /// Reason of each position without a gap, and none of the others.
+    records: BTreeMap<Position, Option<String>>,
     diagnostics: Vec<Diagnostic>,
     duration_s: f64,
 }
@@ -252,6 +257,7 @@ impl RunSummary {
             recent,
             followed,
             states,
+            stale_now,
             work_list,
             mapping_faults,
             notes,
@@ -266,7 +272,9 @@ impl RunSummary {
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
         self.samples_repeated = repeated_samples::detect(&recent);
         (self.trends, self.changed, self.states) = (now, changes.changed, states);
-        (self.work_list, self.mapping_faults, self.notes) = (work_list, mapping_faults, notes);
+        self.stale_now = stale_now;
+        (self.work_list, self.mapping_faults) = (work_list, mapping_faults);
+        self.notes.extend(notes);
     }
 
     /// Adds what the status of all logs shows about the aircraft.
@@ -280,27 +288,29 @@ impl RunSummary {
         self.newest_departure_utc = accounts.clone().filter_map(|account| account.departure_utc).max();
         self.quiet = quiet(accounts.clone(), days, self.newest_departure_utc);
         self.quiet_now = quiet(accounts.clone(), days, Some(Timestamp::now())).len();
+        self.notes.extend(coverage::departures_in_another_zone(config, accounts.clone()));
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }
 
     pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {
-        let mut counted = LogCounts {
+        let outcome = |record: &GapRecord| {
+            let is_refused = record.estimate.status == Status::Refused;
+            let reason = is_refused.then(|| record.estimate.reason.clone().unwrap_or_default());
+            (record.position.clone(), reason)
+        };
+        let counted = LogCounts {
+            flight: (account.tail_number.clone(), account.flight_id.clone(), account.departure_utc),
+            records: records.iter().map(outcome).collect(),
             diagnostics: diagnostics.to_vec(),
             duration_s: account.duration_s,
-            ..LogCounts::default()
         };
-        for record in records {
-            match record.estimate.status {
-                Status::Estimated => counted.estimated += 1,
-                Status::Withdrawn => {}
-                Status::Refused => {
-                    let reason = record.estimate.reason.clone().unwrap_or_default();
-                    *counted.refused.entry(reason).or_default() += 1;
-                }
-            }
-        }
         self.logs.insert(account.log_path.clone(), counted);
+    }
+
+    /// Takes back the record of a position that another log of the run has replaced.
+    pub(crate) fn uncount(&mut self, log: &str, position: &Position) {
+        self.logs.get_mut(log).into_iter().for_each(|counted| drop(counted.records.remove(position)));
     }
 
     /// Adds up the logs, in the order of their names.
@@ -308,11 +318,14 @@ impl RunSummary {
         self.took_s = took_s;
         self.done = self.logs.len();
         self.duplicates.sort_by(|a, b| a.log.cmp(&b.log));
+        let with_records = self.logs.values().filter(|counted| !counted.records.is_empty());
+        self.flights = with_records.map(|counted| &counted.flight).collect::<BTreeSet<_>>().len();
         for (log, counted) in &self.logs {
-            self.flights += usize::from(counted.estimated > 0 || !counted.refused.is_empty());
-            self.estimated += counted.estimated;
-            for (reason, count) in &counted.refused {
-                *self.refused.entry(reason.clone()).or_default() += count;
+            for outcome in counted.records.values() {
+                match outcome {
+                    Some(reason) => *self.refused.entry(reason.clone()).or_default() += 1,
+                    None => self.estimated += 1,
+                }
             }
             let error =
                 |diagnostic: &Diagnostic| LogError { log: log.clone(), diagnostic: diagnostic.clone() };

@@ -333,7 +333,7 @@ def work(
     serial: str | None = None,
     part: str | None = None,
 ) -> Table:
-    """Work requests by urgency, without closed ones unless asked: the rows of ``freeplay work list``."""
+    """Work requests by the date until when, without closed ones unless asked: the rows of ``freeplay work list``."""
     return _freeplay.work(load(config), status, [tail, serial, part])
 
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 
 use crate::assessment::trend_row::{ChangePoint, TrendRow};
-use crate::time::days_between;
+use crate::time::day_text;
 
 /// What a unit's state asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,14 +135,8 @@ impl TrendRow {
 
     /// A date for readers, as seen on `as_of_utc`.
     pub fn day(&self, at: Timestamp) -> String {
-        day_text(self.as_of_utc, at)
+        day_text(at, self.as_of_utc)
     }
-}
-
-/// A date for readers: `28 Dec`, with its year where it is more than 300 days from `now`.
-pub fn day_text(now: Timestamp, at: Timestamp) -> String {
-    let is_near = days_between(now, at).abs() <= 300.0;
-    at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
 }
 
 /// Rank of state `normal`; one less is a normal unit with another quantity to inspect.

@@ -164,7 +164,7 @@ row! {
 
 row! {
     /// One followed quantity of one unit at a date; all numbers in the unit that ends the quantity's name.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct QuantityRow {
         /// Part number of the unit.
         pub part_number: Option<String>,
@@ -220,7 +220,7 @@ impl QuantityRow {
 
 row! {
     /// A change of a followed quantity, with whose it is and the evidence.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct QuantityChange {
         /// Column of the records that changed.
         pub quantity: &'static str,

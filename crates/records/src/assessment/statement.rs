@@ -50,13 +50,22 @@ impl TrendRow {
             ("95 %", self.not_after_utc, self.crossing_hours_p95),
         ];
         let text = |(share, at, hours): (&str, Option<_>, Option<f64>)| match (at, hours) {
-            (Some(at), _) if at <= self.as_of_utc => Some(format!("{share} by now")),
             (Some(at), _) => Some(format!("{share} by {}", self.day(at))),
             (None, Some(hours)) => Some(format!("{share} within {hours:.0} FH")),
             (None, None) => None,
         };
         let dates: Vec<String> = dates.into_iter().filter_map(text).collect();
         (!dates.is_empty()).then(|| dates.join(", "))
+    }
+
+    /// Why, how sure, and everything that limits the trust in it, as one text: `152.7 of 150.0 µm, over since 6 Nov; 87 %
+    /// over now; 2 of the latest 12 gaps are flagged`.
+    pub fn statement_text(&self) -> String {
+        let why = self.why_text();
+        let conditions = self.conditions.iter().map(|condition| condition.replace('_', " "));
+        let others = conditions.chain(self.caveats.0.iter().cloned()).filter(|other| !why.contains(other));
+        let others: Vec<String> = self.chance_text().into_iter().chain(others).collect();
+        std::iter::once(why.clone()).chain(others).collect::<Vec<_>>().join("; ")
     }
 
     /// The last change of the gap that neither wear nor the books explain.
@@ -215,6 +224,9 @@ mod tests {
     fn caveats_stay_apart_from_the_words() {
         let mut row = row("act", "above_limit");
         row.caveats = NoColumn(vec!["2 of 12 gaps are flagged".to_owned()]);
+        row.conditions = vec!["friction_rising".to_owned()];
         assert!(!row.why_text().contains("flagged"));
+        let all = "159.1 of 180.0 µm; friction rising; 2 of 12 gaps are flagged";
+        assert_eq!(row.statement_text(), all);
     }
 }

@@ -102,7 +102,8 @@ row! {
         pub crossing_flights_p50: Option<f64>,
         /// Flights to `limit_m`, latest (95 %).
         pub crossing_flights_p95: Option<f64>,
-        /// Date on which `limit_m` is reached, earliest (5 %): from the last flight on, at `hours_per_day`.
+        /// Date on which `limit_m` is reached, earliest (5 %): from the last flight on, at `hours_per_day`. It does not move
+        /// with `as_of_utc`, and may have passed.
         pub not_before_utc: Option<Timestamp>,
         /// Date on which `limit_m` is reached, median.
         pub likely_utc: Option<Timestamp>,

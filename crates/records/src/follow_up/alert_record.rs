@@ -18,10 +18,13 @@ pub enum AlertStatus {
     Sent,
     /// The message may or may not have been received: the run was killed, or the receiver did not answer in time.
     Unconfirmed,
+    /// A person has taken the message back.
+    Dropped,
 }
 
 impl AlertStatus {
-    const ALL: [Self; 5] = [Self::Recorded, Self::Pending, Self::Sending, Self::Sent, Self::Unconfirmed];
+    const ALL: [Self; 6] =
+        [Self::Recorded, Self::Pending, Self::Sending, Self::Sent, Self::Unconfirmed, Self::Dropped];
 
     /// Value of the `status` column.
     pub fn as_str(self) -> &'static str {
@@ -31,7 +34,13 @@ impl AlertStatus {
             Self::Sending => "sending",
             Self::Sent => "sent",
             Self::Unconfirmed => "unconfirmed",
+            Self::Dropped => "dropped",
         }
+    }
+
+    /// Whether the message has not been received, or perhaps not.
+    pub fn is_unsent(self) -> bool {
+        matches!(self, Self::Pending | Self::Sending | Self::Unconfirmed)
     }
 
     fn parse(text: &str) -> Result<Self, String> {
@@ -74,7 +83,7 @@ stored_row! {
         pub as_of_utc: Timestamp,
         /// The message, JSON: what is sent in every attempt.
         pub message: Option<String>,
-        /// `recorded`, `pending`, `sending`, `sent` or `unconfirmed`.
+        /// `recorded`, `pending`, `sending`, `sent`, `unconfirmed` or `dropped`.
         pub status: AlertStatus,
         /// Attempts to send the message.
         pub attempts: i64,

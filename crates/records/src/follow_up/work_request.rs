@@ -26,6 +26,8 @@ row! {
         pub quantity: String,
         /// Reason of the latest known state.
         pub finding: Option<String>,
+        /// Date until when, of the present assessment of an open request: `due_utc` of the trend.
+        pub due_utc: Option<Timestamp>,
         /// Date of the assessment that opened the request.
         pub opened_utc: Timestamp,
         /// Who acknowledged, deferred or closed it last; `freeplay` when a table closed it.

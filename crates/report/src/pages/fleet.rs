@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use askama::Template;
-use records::assessment::action::{counts_text, day_text, state_rank};
+use records::assessment::action::{counts_text, state_rank};
 use records::report_rows::{ReportInspectionRow, ReportTailRow};
 use records::time::days_between;
 
-use crate::format::{NO_DATA, count, counted, date, micrometres, micrometres_or, or_no_data, rate, unbroken};
+use crate::format::{count, counted, date, micrometres, micrometres_or, or_no_data, rate, unbroken};
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
@@ -106,17 +106,9 @@ pub fn fleet_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Erro
     Ok(pages)
 }
 
-/// Date of the report, and age of the newest log.
-fn freshness(report: &Report) -> String {
-    let Some(now) = report.as_of_utc else { return NO_DATA.to_owned() };
-    let newest = report.newest_departure_utc.map_or_else(
-        || "no log".to_owned(),
-        |at| match days_between(at, now) {
-            ..1.0 => format!("newest log {}", day_text(now, at)),
-            days => format!("newest log {}, {} old", day_text(now, at), counted(days as usize, "day")),
-        },
-    );
-    format!("{}, {newest}", now.strftime("%a %-d %b %Y %H:%M UTC"))
+/// Date of the report.
+fn heading(report: &Report) -> String {
+    or_no_data(report.as_of_utc, |at| at.strftime("%a %-d %b %Y %H:%M UTC").to_string())
 }
 
 /// What the installed units ask for, counted.

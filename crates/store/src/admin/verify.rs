@@ -12,12 +12,13 @@ use records::GapRecord;
 
 use crate::delta::data_file;
 use crate::delta::file_stats::{self, Stats};
+use crate::delta::log_digests;
 use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::{frame, scan};
-use crate::write::writer::{key_columns, keys_of};
+use crate::write::writer::{Writer, key_columns, keys_of};
 use records::LogRecord;
 use records::RecordKey;
 
@@ -61,6 +62,23 @@ impl Store {
             findings.push(Diagnostic::new("store_records_missing", more));
         }
         Ok(findings)
+    }
+}
+
+impl Writer {
+    /// Gives the commits of other programs the digests that Freeplay's own have: they were meant. Returns their number.
+    ///
+    /// # Errors
+    /// When a log cannot be listed or read, or a digest cannot be written.
+    pub fn accept_foreign(&mut self) -> Result<usize, Error> {
+        let mut accepted = 0;
+        for table in self.store().existing_tables() {
+            for file in table.damaged_log_files()?.1 {
+                log_digests::add(&table.location, &file)?;
+                accepted += 1;
+            }
+        }
+        Ok(accepted)
     }
 }
 
@@ -123,7 +141,9 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
 fn foreign_commit(table: &Table, file: &Path) -> Diagnostic {
     Diagnostic::new("store_file_foreign", "a commit was written by another program and carries no digest")
         .in_file(table.location.display_path(file).display())
-        .hint("let only Freeplay write into the store; compare the records with the logs")
+        .hint(
+            "compare the records with the logs; if the commit was meant, `freeplay store verify --accept-foreign` accepts it",
+        )
 }
 
 fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {

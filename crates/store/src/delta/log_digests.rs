@@ -103,6 +103,14 @@ impl LogDigests {
     }
 }
 
+/// Adds the digest of a log file that another program wrote.
+pub(crate) fn add(table: &Location, file: &Path) -> Result<(), Error> {
+    let content = std::fs::read(file).map_err(Error::io(file, "read"))?;
+    let digests = table.join(DIGESTS);
+    let name = format!("{}.{}", log_file(file).unwrap_or_default(), blake3::hash(&content).to_hex());
+    digests.create(&digests.dir().join(name), &[])
+}
+
 /// Deletes the digests of log files that the log clean-up has deleted.
 pub(crate) fn prune(table: &Location) -> Result<(), Error> {
     let listed = LogDigests::list(table)?;

@@ -1,5 +1,6 @@
 //! Answers: each is made from one version of a table, so it shows whole commits only.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use arrow::array::RecordBatch;
@@ -55,6 +56,17 @@ impl Store {
             Some((PartNumber::new(part?).ok()?, SerialNumber::new(serial?).ok()?))
         };
         Ok(parts.iter().zip(serials.iter()).filter_map(named).collect())
+    }
+
+    /// The different values of a column of texts, in order.
+    ///
+    /// # Errors
+    /// As [`Store::records`]; [`Error::Frame`] when there is no such column.
+    pub fn distinct(&self, column: &str) -> Result<BTreeSet<String>, Error> {
+        let schema = scan::only(&GapRecord::schema(), &[column])?;
+        let rows = self.read_rows(&self.gaps.snapshot()?, &Query::default(), &schema)?;
+        let counts = frame::counts(&frame::frame(&rows, &[column])?, column)?;
+        Ok(counts.into_iter().map(|(value, _)| value).collect())
     }
 
     /// The newest account of every log, by name.

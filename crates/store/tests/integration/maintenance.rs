@@ -40,6 +40,30 @@ fn a_sound_store_has_no_findings_and_is_counted() {
     assert_eq!(info.last_completed.unwrap().run_id, "b");
 }
 
+/// A commit of another program that replaces a data file by a copy under a name of its own.
+#[test]
+fn a_foreign_commit_is_found_until_it_is_accepted_and_its_file_is_compacted() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    let log = dir.path().join("gaps/_delta_log");
+    let newest = fs::read_to_string(log.join("00000000000000000006.json")).unwrap();
+    let line = newest.lines().find(|line| line.starts_with("{\"add\"")).unwrap();
+    let mut add: serde_json::Value = serde_json::from_str(line).unwrap();
+    let path = add["add"]["path"].as_str().unwrap().to_owned();
+    fs::copy(dir.path().join("gaps").join(&path), dir.path().join("gaps/foreign.parquet")).unwrap();
+    add["add"]["path"] = "foreign.parquet".into();
+    let remove =
+        format!("{{\"remove\":{{\"path\":\"{path}\",\"deletionTimestamp\":1,\"dataChange\":true}}}}");
+    fs::write(log.join("00000000000000000007.json"), format!("{remove}\n{add}\n")).unwrap();
+    let store = writer.store().clone();
+    assert_eq!(codes(&store), ["store_file_foreign", "store_file_foreign"]);
+    assert_eq!(writer.accept_foreign().unwrap(), 1);
+    assert_eq!(codes(&store), ["store_file_foreign"], "the data file");
+    writer.compact().unwrap();
+    assert_eq!(store.verify(), []);
+    assert_eq!(store.info().unwrap().records, 36);
+}
+
 /// Two commits of one row each per run: after fifty runs the run table alone needs a compaction, and the first
 /// compaction is sufficient.
 #[test]

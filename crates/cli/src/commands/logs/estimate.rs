@@ -13,7 +13,7 @@ use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
-use crate::table::{self, count, number, text};
+use crate::table::{self, count, number, or_dash, text, unit_name};
 
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
 use crate::commands::results::query::{flags_text, load};
@@ -95,40 +95,20 @@ fn configured_parts(config: &Config) -> String {
 }
 
 fn page(found: &[EstimateRow]) -> String {
-    let columns = [
-        text("log", 3),
-        text("position", 0),
-        text("part / serial", 2),
-        number("gap [µm]", 0),
-        number("SE [µm]", 3),
-        number("mid-range [µm]", 4),
-        number("load reversals", 6),
-        number("load [N]", 5),
-        number("NIS", 7),
-        text("flags", 1),
+    let unit = |r: &EstimateRow| unit_name(r.part_number.as_deref(), &or_dash(r.serial_number.as_deref()));
+    let columns: &table::Columns<'_, EstimateRow> = &[
+        (text("log", 3), &|r| or_dash(r.log_path.as_deref())),
+        (text("position", 0), &|r| or_dash(r.position.as_deref())),
+        (text("part / serial", 2), &unit),
+        (number("gap [µm]", 0), &|r| table::micrometres(r.estimate.gap_m)),
+        (number("SE [µm]", 3), &|r| table::micrometres(r.estimate.gap_se_m)),
+        (number("mid-range [µm]", 4), &|r| table::micrometres(r.estimate.gap_midrange_m)),
+        (number("load reversals", 6), &|r| r.estimate.load_reversals.to_string()),
+        (number("load [N]", 5), &|r| load(&r.estimate)),
+        (number("NIS", 7), &|r| r.estimate.nis.map_or_else(table::empty_cell, |n| format!("{n:.2}"))),
+        (text("flags", 1), &|r| flags_text(&r.estimate)),
     ];
-    let cells = |r: &EstimateRow| {
-        let e = &r.estimate;
-        let known = |t: &Option<String>| t.clone().unwrap_or_else(table::empty_cell);
-        vec![
-            known(&r.log_path),
-            known(&r.position),
-            format!("{} / {}", known(&r.part_number), known(&r.serial_number)),
-            table::micrometres(e.gap_m),
-            table::micrometres(e.gap_se_m),
-            table::micrometres(e.gap_midrange_m),
-            e.load_reversals.to_string(),
-            load(e),
-            e.nis.map_or_else(table::empty_cell, |n| format!("{n:.2}")),
-            flags_text(e),
-        ]
-    };
-    let head = format!("{}; nothing was stored\n", count(found.len(), "estimate"));
-    if found.is_empty() {
-        head
-    } else {
-        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
-    }
+    format!("{}; nothing was stored\n", count(found.len(), "estimate")) + &table::of(found, columns)
 }
 
 /// Writes per-sample filter output of every actuator of the logs.

@@ -8,7 +8,7 @@ use crate::args::DiffArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
-use crate::table::{self, count, number, text};
+use crate::table::{self, count, number, text, unit_name};
 
 /// Compares two stores.
 ///
@@ -43,34 +43,21 @@ fn page(diff: &StoreDiff) -> String {
             largest * 1e6
         );
     }
-    if rows.is_empty() {
-        return head;
-    }
-    let columns = [
-        text("departure [UTC]", 3),
-        text("tail", 1),
-        text("flight", 2),
-        text("position", 0),
-        text("part / serial", 4),
-        number("before [µm]", 0),
-        number("after [µm]", 0),
-        number("change [µm]", 0),
-        text("status before", 5),
-        text("status after", 5),
+    let columns: &table::Columns<'_, DiffRow> = &[
+        (text("departure [UTC]", 3), &|r| {
+            r.departure_utc.get(..16).unwrap_or(&r.departure_utc).replace('T', " ")
+        }),
+        (text("tail", 1), &|r| r.tail_number.clone()),
+        (text("flight", 2), &|r| r.flight_id.clone()),
+        (text("position", 0), &|r| r.position.clone()),
+        (text("part / serial", 4), &|r| unit_name(Some(&r.part_number), &r.serial_number)),
+        (number("before [µm]", 0), &|r| table::micrometres(r.gap_m_before)),
+        (number("after [µm]", 0), &|r| table::micrometres(r.gap_m_after)),
+        (number("change [µm]", 0), &|r| {
+            r.gap_change_m.map_or_else(table::empty_cell, |change| format!("{:+.3}", change * 1e6))
+        }),
+        (text("status before", 5), &|r| r.status_before.clone().unwrap_or_else(|| "absent".into())),
+        (text("status after", 5), &|r| r.status_after.clone().unwrap_or_else(|| "absent".into())),
     ];
-    let cells = |r: &DiffRow| {
-        vec![
-            r.departure_utc.get(..16).unwrap_or(&r.departure_utc).replace('T', " "),
-            r.tail_number.clone(),
-            r.flight_id.clone(),
-            r.position.clone(),
-            format!("{} / {}", r.part_number, r.serial_number),
-            table::micrometres(r.gap_m_before),
-            table::micrometres(r.gap_m_after),
-            r.gap_change_m.map_or_else(table::empty_cell, |c| format!("{:+.3}", c * 1e6)),
-            r.status_before.clone().unwrap_or_else(|| "absent".into()),
-            r.status_after.clone().unwrap_or_else(|| "absent".into()),
-        ]
-    };
-    head + &table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
+    head + &table::of(rows, columns)
 }

@@ -13,7 +13,7 @@ use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::table::{self, number, text};
 
-use crate::commands::context::{KnownNames, check_name, load_with_installations};
+use crate::commands::context::{KnownNames, load_with_installations};
 
 /// Explains one record.
 ///
@@ -31,10 +31,10 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
     let found = match pipeline::inspect::explain::explain(&config, &installations, &store, &key) {
         Ok(found) => found,
         Err(error) => {
-            let known = KnownNames::read(&config);
-            check_name("flight", Some(&args.flight), known.flights())?;
-            check_name("position", Some(&args.position), known.positions())?;
-            check_name("tail", args.tail.as_deref(), known.tails())?;
+            let known = KnownNames::of(&config);
+            known.check(&["flight_id"], Some(&args.flight))?;
+            known.check(&["position"], Some(&args.position))?;
+            known.check(&["tail_number"], args.tail.as_deref())?;
             return Err(error.into());
         }
     };

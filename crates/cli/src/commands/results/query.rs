@@ -1,6 +1,6 @@
 //! `query`: lists stored records by tail, serial, flight or position.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use arrow::array::{RecordBatch, StringArray};
@@ -8,22 +8,20 @@ use arrow::datatypes::{DataType, Field, Schema};
 use clap::ValueEnum;
 use ingest::mapping::column_pattern::nearest;
 use job::Config;
+use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::inspect::explain::remedy;
 use records::row_schema::to_batch;
-use records::{GapRecord, PartNumber};
-use store::Query;
+use records::{GapEstimate, GapRecord, Installations};
+use store::{Query, Store};
 
-use crate::args::{Global, QueryArgs, QueryKey};
+use crate::args::{Format, Global, QueryArgs, QueryKey};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
-use crate::sparkline::sparkline;
 use crate::table::{self, count, number, text};
 
-use crate::commands::context::{KnownNames, check_name, check_range, load_with_installations};
-
-/// Minimum number of estimates for a history line.
-const LEAST_HISTORY: usize = 3;
+use crate::commands::context::{KnownNames, called, check_range, load_with_installations};
+use crate::commands::results::trend;
 
 /// Prints the matching records, oldest first.
 ///
@@ -32,34 +30,57 @@ const LEAST_HISTORY: usize = 3;
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
     let (config, installations) = load_with_installations(global)?;
-    let query = query_of(args, &config)?;
-    let records = pipeline::open_store(&config, &installations)?.records(&query)?;
+    let known = KnownNames::of(&config);
+    let query = query_of(args, &known)?;
+    let store = pipeline::open_store(&config, &installations)?;
+    let records = store.records(&query)?;
     if records.is_empty() {
-        check_names(&query, &KnownNames::read(&config))?;
+        for (column, name) in selected(&query).into_iter().chain([("part_number", &query.part_number)]) {
+            known.check(&[column], name.as_deref())?;
+        }
     }
+    let verdict = match args.rows.format() {
+        Format::Table => verdict(&query, &config, &installations, &store)?,
+        _ => String::new(),
+    };
     row_output::write_rows(
         &args.rows,
         output,
         || with_remedies(to_batch(&records).map_err(store::Error::from)?, &records),
-        || page(&records, &config),
+        || verdict + &page(&records),
     )?;
     if records.is_empty() {
+        let names = selected(&query).into_iter().filter_map(|(column, name)| Some((column, name.as_ref()?)));
+        let names = names.map(|(column, name)| format!("{} `{name}`", called(column)));
         output.note(&format!(
             "no record of {}{}; list the store's contents with `freeplay store info`",
-            selected(&query),
+            names.collect::<Vec<_>>().join(", "),
             range(args)
         ));
     }
     Ok(Code::Success)
 }
 
-/// Refuses an unknown name of the selection.
-fn check_names(query: &Query, known: &KnownNames) -> Result<(), Failure> {
-    check_name("tail", query.tail_number.as_deref(), known.tails())?;
-    check_name("serial number", query.serial_number.as_deref(), known.serials())?;
-    check_name("flight", query.flight_id.as_deref(), known.flights())?;
-    check_name("position", query.position.as_deref(), known.positions())?;
-    check_name("part number", query.part_number.as_deref(), known.parts())
+/// What is due on the selected tail or unit, and what limits the trust in it; nothing for other selections.
+fn verdict(
+    query: &Query,
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+) -> Result<String, Failure> {
+    const MAX_RANK: u8 = 1;
+    if query.tail_number.is_none() && query.serial_number.is_none() {
+        return Ok(String::new());
+    }
+    let ask = UnitSelection {
+        tail_number: query.tail_number.clone(),
+        serial_number: query.serial_number.clone(),
+        part_number: query.part_number.clone(),
+        as_of_utc: None,
+    };
+    let found = trends::assess_store_with_quantities(config, installations, store, &ask)?;
+    let is_one_unit = query.serial_number.is_some();
+    Ok(if found.now.is_empty() { String::new() } else { trend::page(&found, is_one_unit, MAX_RANK) + "\n" })
 }
 
 /// The searched range as text.
@@ -70,21 +91,19 @@ fn range(args: &QueryArgs) -> String {
     [part, since, until].into_iter().flatten().collect()
 }
 
-/// The selected names as text.
-fn selected(query: &Query) -> String {
-    let names = [
-        ("tail", &query.tail_number),
-        ("serial", &query.serial_number),
-        ("flight", &query.flight_id),
+/// The selected names, by column.
+fn selected(query: &Query) -> [(&'static str, &Option<String>); 4] {
+    [
+        ("tail_number", &query.tail_number),
+        ("serial_number", &query.serial_number),
+        ("flight_id", &query.flight_id),
         ("position", &query.position),
-    ];
-    let names = names.iter().filter_map(|(word, name)| Some(format!("{word} `{}`", name.as_ref()?)));
-    names.collect::<Vec<_>>().join(", ")
+    ]
 }
 
 /// The selection: by options, by a word and a value, or by a value alone that a tail, serial number, flight or position has.
-fn query_of(args: &QueryArgs, config: &Config) -> Result<Query, Failure> {
-    let base = Query {
+fn query_of(args: &QueryArgs, known: &KnownNames) -> Result<Query, Failure> {
+    let mut query = Query {
         tail_number: args.tail.clone(),
         serial_number: args.serial.clone(),
         flight_id: args.flight.clone(),
@@ -95,84 +114,51 @@ fn query_of(args: &QueryArgs, config: &Config) -> Result<Query, Failure> {
         until_utc: args.departures.until,
         last: args.last,
     };
-    let by = |by: QueryKey, id: &str| {
-        let id = Some(id.to_owned());
-        match by {
-            QueryKey::Tail => Query { tail_number: id, ..base.clone() },
-            QueryKey::Serial => Query { serial_number: id, ..base.clone() },
-            QueryKey::Flight => Query { flight_id: id, ..base.clone() },
-            QueryKey::Position => Query { position: id, ..base.clone() },
+    let (column, id) = match (args.first.as_deref(), args.second.clone()) {
+        (None, _) => return Ok(query),
+        (Some(word), Some(id)) => (QueryKey::from_str(word, false).map_err(|_| unknown_word(word))?, id),
+        (Some(id), None) => {
+            let keys = QueryKey::value_variants();
+            let columns: Vec<&str> = keys.iter().map(|key| key.column()).collect();
+            known.check(&columns, Some(id))?;
+            let key = keys.iter().find(|key| known.names(key.column()).contains(id));
+            (key.copied().unwrap_or(QueryKey::Position), id.to_owned())
         }
     };
-    match (args.first.as_deref(), args.second.as_deref()) {
-        (None, _) => Ok(base),
-        (Some(word), Some(id)) => match QueryKey::from_str(word, false) {
-            Ok(key) => Ok(by(key, id)),
-            Err(_) => {
-                const WORDS: [&str; 4] = ["tail", "serial", "flight", "position"];
-                let near =
-                    nearest(word, WORDS).map(|near| format!("; the nearest is '{near}'")).unwrap_or_default();
-                let what = format!("records cannot be selected by `{word}`{near}");
-                let hint = format!("possible are {}, e.g. `freeplay query tail N412FP`", WORDS.join(", "));
-                Err(Failure::usage("unknown_name", what, &hint))
-            }
-        },
-        (Some(id), None) => {
-            let known = KnownNames::read(config);
-            let key = if known.tails().any(|name| name == id) {
-                QueryKey::Tail
-            } else if known.serials().any(|name| name == id) {
-                QueryKey::Serial
-            } else if known.flights().any(|name| name == id) {
-                QueryKey::Flight
-            } else {
-                let positions =
-                    known.tails().chain(known.serials()).chain(known.flights()).chain(known.positions());
-                check_name("tail, serial number, flight or position", Some(id), positions)?;
-                QueryKey::Position
-            };
-            Ok(by(key, id))
-        }
+    match column {
+        QueryKey::Tail => query.tail_number = Some(id),
+        QueryKey::Serial => query.serial_number = Some(id),
+        QueryKey::Flight => query.flight_id = Some(id),
+        QueryKey::Position => query.position = Some(id),
     }
+    Ok(query)
+}
+
+fn unknown_word(word: &str) -> Failure {
+    const WORDS: [&str; 4] = ["tail", "serial", "flight", "position"];
+    let near = nearest(word, WORDS).map(|near| format!("; the nearest is '{near}'")).unwrap_or_default();
+    let what = format!("records cannot be selected by `{word}`{near}");
+    let hint = format!("possible are {}, e.g. `freeplay query tail N412FP`", WORDS.join(", "));
+    Failure::usage("unknown_name", what, &hint)
 }
 
 /// Records as a table.
-pub(crate) fn page(records: &[GapRecord], config: &Config) -> String {
-    let columns = [
-        text("departure [UTC]", 0),
-        text("tail", 3),
-        text("flight", 2),
-        text("position", 1),
-        text("part / serial", 2),
-        number("gap [µm]", 0),
-        number("mid-range [µm]", 5),
-        number("load reversals", 7),
-        number("load [N]", 6),
-        text("flags", 0),
+pub(crate) fn page(records: &[GapRecord]) -> String {
+    let interval = |e: &GapEstimate| e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low));
+    let columns: &table::Columns<'_, GapRecord> = &[
+        (text("departure [UTC]", 0), &|r| r.flight.departure_utc.strftime("%Y-%m-%d %H:%M").to_string()),
+        (text("tail", 3), &|r| r.flight.tail_number.to_string()),
+        (text("flight", 4), &|r| r.flight.flight_id.to_string()),
+        (text("position", 1), &|r| r.position.to_string()),
+        (text("serial", 0), &|r| r.serial_number.to_string()),
+        (number("gap ± 90 % [µm]", 0), &|r| table::gap(r.estimate.gap_m, interval(&r.estimate))),
+        (text("part", 5), &|r| r.part_number.to_string()),
+        (number("mid-range [µm]", 6), &|r| table::micrometres(r.estimate.gap_midrange_m)),
+        (number("load reversals", 8), &|r| r.estimate.load_reversals.to_string()),
+        (number("load [N]", 7), &|r| load(&r.estimate)),
+        (text("flags", 0), &|r| flags_text(&r.estimate)),
     ];
-    let cells = |r: &GapRecord| {
-        let e = &r.estimate;
-        vec![
-            r.flight.departure_utc.strftime("%Y-%m-%d %H:%M").to_string(),
-            r.flight.tail_number.to_string(),
-            r.flight.flight_id.to_string(),
-            r.position.to_string(),
-            format!("{} / {}", r.part_number, r.serial_number),
-            table::gap(e.gap_m, e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low))),
-            table::micrometres(e.gap_midrange_m),
-            e.load_reversals.to_string(),
-            load(e),
-            flags_text(e),
-        ]
-    };
-    let head = format!("{}\n", count(records.len(), "record"));
-    if records.is_empty() {
-        head
-    } else {
-        let head = format!("{}; ± is half the 90 % interval\n", count(records.len(), "record"));
-        let table = table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>());
-        head + &table + &remedies(records) + &sketches(records, config)
-    }
+    count(records.len(), "record") + "\n" + &table::of(records, columns) + &remedies(records)
 }
 
 /// One line per rejection code of these records, with its remedy.
@@ -184,7 +170,7 @@ fn remedies(records: &[GapRecord]) -> String {
 }
 
 /// Rejection code of an estimate.
-fn rejection_code(e: &records::GapEstimate) -> Option<&str> {
+fn rejection_code(e: &GapEstimate) -> Option<&str> {
     e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
 }
 
@@ -199,41 +185,13 @@ fn with_remedies(batch: RecordBatch, records: &[GapRecord]) -> Result<RecordBatc
     batch.map_err(|e| Failure::from(std::io::Error::other(e)))
 }
 
-/// One line per unit with a history in these records: sparkline, first and last gap.
-fn sketches(records: &[GapRecord], config: &Config) -> String {
-    let mut units: BTreeMap<(&PartNumber, &str), Vec<f64>> = BTreeMap::new();
-    for r in records {
-        let key = (&r.part_number, r.serial_number.as_str());
-        units.entry(key).or_default().extend(r.estimate.gap_m);
-    }
-    units.retain(|_, gaps_m| gaps_m.len() >= LEAST_HISTORY);
-    let rows: Vec<Vec<String>> = units
-        .iter()
-        .map(|((part, serial), gaps_m)| {
-            let ends = [gaps_m.first(), gaps_m.last()].map(|gap_m| table::micrometres(gap_m.copied()));
-            let limit_m = config.limit_m(Some(part));
-            vec![
-                format!("{part} / {serial}"),
-                sparkline(gaps_m, limit_m),
-                ends.join(" → "),
-                gaps_m.len().to_string(),
-            ]
-        })
-        .collect();
-    if rows.is_empty() {
-        return String::new();
-    }
-    let columns = [text("part / serial", 0), text("history", 0), text("gap [µm]", 0), number("estimates", 0)];
-    format!("\n{}", table::layout(&columns, &rows))
-}
-
 /// Load band of an estimate, N.
-pub(crate) fn load(e: &records::GapEstimate) -> String {
+pub(crate) fn load(e: &GapEstimate) -> String {
     e.load_p05_n.zip(e.load_p95_n).map_or_else(table::empty_cell, |(low, high)| format!("{low:.0}…{high:.0}"))
 }
 
 /// Rejection reason or quality flags.
-pub(crate) fn flags_text(e: &records::GapEstimate) -> String {
+pub(crate) fn flags_text(e: &GapEstimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
         records::Status::Refused => format!("refused: {reason}"),
         records::Status::Estimated | records::Status::Withdrawn => reason.clone(),

@@ -31,7 +31,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     let program = format!("Freeplay {VERSION}");
     let mut report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
-        let known = KnownNames::read(&config);
+        let known = KnownNames::of(&config);
         known.check_units(&args.units)?;
         let what = format!("no unit{} has flown; {}", selection(&ask), known.searched());
         let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";

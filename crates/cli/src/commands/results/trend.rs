@@ -1,19 +1,23 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
+use jiff::Timestamp;
 use job::Config;
+use pipeline::State;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
-use pipeline::findings::monitoring::mapping_faults::MappingFault;
+use pipeline::findings::monitoring::coverage;
 use records::uncertainty::NORMAL_95;
 use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
-use crate::output::{Output, escape};
+use crate::output::Output;
 use crate::row_output;
-use crate::sparkline::sparkline;
-use crate::table::{self, count, number, state_mark, text};
+use crate::sparkline::{SCALE, sparkline};
+use crate::table::{self, count, number, or_dash, state_mark, text, unit_name};
 
 use crate::commands::context::{KnownNames, load_trend_context, note_future, selection};
 
@@ -28,56 +32,49 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if args.quantities || args.changes {
         return quantities(args, &ask, &config, &installations, output);
     }
-    let (mut mapping_faults, mut notes) = (Vec::new(), Vec::new());
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => {
             let store = pipeline::open_store(&config, &installations)?;
-            let found = trends::assess_store_with_quantities(&config, &installations, &store, &ask)?;
-            (mapping_faults, notes) = (found.mapping_faults, found.notes);
-            found.now
+            trends::assess_store_with_quantities(&config, &installations, &store, &ask)?
         }
         (estimates, queries) => {
             let histories = match estimates {
                 Some(file) => pipeline::fleet::external_estimates::read(file)?,
                 None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
             };
-            match queries {
+            let now = match queries {
                 Some(file) => {
                     let queries = pipeline::fleet::external_estimates::queries(file)?;
                     trends::assess_queries(&config, &installations, histories, &queries)?
                 }
-                None => {
-                    let found = trends::assess_histories(&config, &installations, histories, &ask)?;
-                    notes = pipeline::findings::monitoring::coverage::notes(&found, &config);
-                    found
-                }
-            }
+                None => trends::assess_histories(&config, &installations, histories, &ask)?,
+            };
+            let newest = now.iter().filter_map(|row| row.latest_utc).max();
+            let today = args.as_of.unwrap_or_else(Timestamp::now);
+            let notes = match queries {
+                Some(_) => Vec::new(),
+                None => coverage::notes(&now, newest, today, &config),
+            };
+            StoreAssessment { now, notes, ..StoreAssessment::default() }
         }
     };
-    let mut nothing = None;
-    if found.is_empty() && args.queries.is_none() {
+    let mut nothing = "no unit was queried\n".to_owned();
+    if found.now.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
-            Some(file) => {
-                KnownNames::new(pipeline::fleet::external_estimates::read(file)?, Installations::default())
-            }
-            None => KnownNames::read(&config),
+            Some(file) => KnownNames::Estimates(pipeline::fleet::external_estimates::read(file)?),
+            None => KnownNames::of(&config),
         };
         known.check_units(&args.units)?;
-        nothing = Some(format!("no unit{} has flown; {}\n", selection(&ask), known.searched()));
+        nothing = format!("no unit{} has flown; {}\n", selection(&ask), known.searched());
     }
+    let shows_all = args.all || args.queries.is_some() || args.units.serial.is_some();
     row_output::write_rows(
         &args.rows,
         output,
-        || row_output::batch(&found),
-        || page(&found, &mapping_faults, &notes, nothing),
+        || row_output::batch(&found.now),
+        || if found.now.is_empty() { nothing } else { page(&found, shows_all, u8::MAX) },
     )?;
     Ok(Code::Success)
-}
-
-/// Reason of the state, with the states of the other followed quantities.
-fn reason_and_conditions(row: &TrendRow) -> String {
-    let conditions = row.conditions.iter().map(|state| state.replace('_', " "));
-    row.reason.iter().cloned().chain(conditions).collect::<Vec<_>>().join("; ")
 }
 
 /// Prints the followed quantities of the units, or what changed.
@@ -92,7 +89,7 @@ fn quantities(
     let StoreAssessment { now: units, followed, .. } =
         trends::assess_store_with_quantities(config, installations, &store, ask)?;
     if units.is_empty() {
-        let known = KnownNames::read(config);
+        let known = KnownNames::of(config);
         known.check_units(&args.units)?;
     }
     if args.changes {
@@ -106,43 +103,28 @@ fn quantities(
 }
 
 fn quantities_page(rows: &[QuantityRow]) -> String {
-    let columns = [
-        text("part / serial", 0),
-        text("quantity", 0),
-        number("flights", 5),
-        number("level", 0),
-        number("SE", 2),
-        text("unit", 1),
-        number("change", 1),
-        number("limit", 4),
-        number("per 1000 FH", 3),
-        number("steps", 6),
-        text("state", 0),
-    ];
-    let cells = |row: &QuantityRow| {
-        let quantity = Quantity::from_name(row.quantity);
-        let (unit, factor) = quantity.map_or(("", 1.0), Quantity::display_unit);
-        let value = |value: Option<f64>, sign: bool| {
-            value.map_or_else(table::empty_cell, |v| significant(v * factor, sign))
-        };
-        vec![
-            format!("{} / {}", row.part_number.as_deref().unwrap_or("–"), row.serial_number),
-            quantity.map_or(row.quantity, Quantity::label).to_owned(),
-            row.flights.to_string(),
-            value(row.level, false),
-            value(row.level_se, false),
-            unit.to_owned(),
-            value(row.change, true),
-            value(row.change_limit, false),
-            value(row.rate_per_hour.map(|rate| rate * 1000.0), true),
-            row.steps.len().to_string(),
-            row.state.unwrap_or_default().replace('_', " "),
-        ]
-    };
     if rows.is_empty() {
         return "no unit was selected\n".to_owned();
     }
-    table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
+    let quantity = |row: &QuantityRow| Quantity::from_name(row.quantity);
+    let unit = |row: &QuantityRow| quantity(row).map_or(("", 1.0), Quantity::display_unit);
+    let value = |row: &QuantityRow, value: Option<f64>, sign: bool| {
+        value.map_or_else(table::empty_cell, |value| significant(value * unit(row).1, sign))
+    };
+    let columns: &table::Columns<'_, QuantityRow> = &[
+        (text("part / serial", 0), &|r| unit_name(r.part_number.as_deref(), &r.serial_number)),
+        (text("quantity", 0), &|r| quantity(r).map_or(r.quantity, Quantity::label).to_owned()),
+        (number("flights", 5), &|r| r.flights.to_string()),
+        (number("level", 0), &|r| value(r, r.level, false)),
+        (number("SE", 2), &|r| value(r, r.level_se, false)),
+        (text("unit", 1), &|r| unit(r).0.to_owned()),
+        (number("change", 1), &|r| value(r, r.change, true)),
+        (number("limit", 4), &|r| value(r, r.change_limit, false)),
+        (number("per 1000 FH", 3), &|r| value(r, r.rate_per_hour.map(|rate| rate * 1000.0), true)),
+        (number("steps", 6), &|r| r.steps.len().to_string()),
+        (text("state", 0), &|r| r.state.unwrap_or_default().replace('_', " ")),
+    ];
+    table::of(rows, columns)
 }
 
 /// A number with three significant digits.
@@ -156,93 +138,85 @@ fn changes_page(changes: &[QuantityChange], units: usize) -> String {
     if changes.is_empty() {
         return format!("nothing but the gap changed on {}\n", count(units, "unit"));
     }
-    let columns = [
-        text("since", 0),
-        text("scope", 0),
-        text("part / serial or tail", 0),
-        text("position", 3),
-        text("state", 2),
-        text("evidence", 0),
-    ];
-    let cells = |change: &QuantityChange| {
-        let part = change.part_number.as_deref();
-        let name = match (&change.serial_number, &change.tail_number) {
-            (Some(serial), _) => format!("{} / {serial}", part.unwrap_or("–")),
-            (None, Some(tail)) => tail.clone(),
-            (None, None) => part.unwrap_or("–").to_owned(),
-        };
-        vec![
-            change.since_utc.strftime("%Y-%m-%d").to_string(),
-            change.scope.to_owned(),
-            name,
-            change.positions.join(", "),
-            change.state.unwrap_or_default().replace('_', " "),
-            change.evidence.clone(),
-        ]
+    let name = |change: &QuantityChange| match (&change.serial_number, &change.tail_number) {
+        (Some(serial), _) => unit_name(change.part_number.as_deref(), serial),
+        (None, Some(tail)) => tail.clone(),
+        (None, None) => or_dash(change.part_number.as_deref()),
     };
-    table::layout(&columns, &changes.iter().map(cells).collect::<Vec<_>>())
+    let columns: &table::Columns<'_, QuantityChange> = &[
+        (text("since", 0), &|c| c.since_utc.strftime("%Y-%m-%d").to_string()),
+        (text("scope", 0), &|c| c.scope.to_owned()),
+        (text("part / serial or tail", 0), &name),
+        (text("position", 3), &|c| c.positions.join(", ")),
+        (text("state", 2), &|c| c.state.unwrap_or_default().replace('_', " ")),
+        (text("evidence", 0), &|c| c.evidence.clone()),
+    ];
+    table::of(changes, columns)
 }
 
-fn page(
-    found: &[TrendRow],
-    mapping_faults: &[MappingFault],
-    notes: &[String],
-    nothing: Option<String>,
-) -> String {
-    let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
-        return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
-    };
+/// The units of an assessment with what limits the trust in it; normal units are only counted unless `shows_all`.
+pub(crate) fn page(found: &StoreAssessment, shows_all: bool, max_rank: u8) -> String {
+    let as_of = found.now.iter().map(|row| row.as_of_utc).max().unwrap_or_default();
     let as_of = as_of.strftime("%Y-%m-%d %H:%M UTC");
-    let head = format!("{} as of {as_of}; ± is half the 90 % interval\n", count(found.len(), "unit"));
-    let faults = mapping_faults.iter().map(|fault| format!("mapping  {}\n", escape(&fault.to_string())));
-    let notes = notes.iter().map(|note| format!("note     {}\n", escape(note)));
-    head + &unit_table(found.iter().collect()) + &faults.chain(notes).collect::<String>()
+    let mut page = format!("{} as of {as_of}: {}\n", count(found.now.len(), "unit"), by_state(&found.now));
+    let faults = found.mapping_faults.iter().map(ToString::to_string);
+    for note in faults.chain(found.notes.iter().cloned()) {
+        page.push_str(&table::labelled("! ", &note));
+    }
+    let (shown, folded): (Vec<&TrendRow>, Vec<&TrendRow>) =
+        found.now.iter().partition(|row| shows_all || needs_attention(row));
+    page.push_str(&unit_table(shown, max_rank));
+    if !folded.is_empty() {
+        let _ = writeln!(page, "not shown: {}; all with `freeplay trend --all`", by_state(folded));
+    }
+    page
 }
 
-/// Units by urgency, with action and date.
-pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
-    units.sort_by(|a, b| a.urgency().partial_cmp(&b.urgency()).unwrap_or(Ordering::Equal));
-    let columns = [
-        text("state", 0),
-        text("tail", 0),
-        text("position", 0),
-        text("part / serial", 1),
-        number("gap [µm]", 0),
-        number("records", 8),
-        number("latest [µm]", 9),
-        number("limit [µm]", 3),
-        text("action", 4),
-        text("due by", 0),
-        text("history", 2),
-        number("rate [nm/FH]", 5),
-        text("trend", 7),
-        number("5 % [FH]", 6),
-        number("median [FH]", 8),
-        number("95 % [FH]", 9),
-        number("flights", 10),
-        text("reason", 0),
-    ];
-    let cells = |r: &&TrendRow| {
-        vec![
-            state_mark(r.state),
-            r.tail_number.clone().unwrap_or_else(table::empty_cell),
-            r.position.clone().unwrap_or_else(table::empty_cell),
-            format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
-            table::gap(r.gap_m, r.gap_se_m.map(|se_m| NORMAL_95 * se_m)),
-            r.gap_records.map_or_else(table::empty_cell, |n| n.to_string()),
-            table::micrometres(r.latest_gap_m),
-            table::micrometres(r.limit_m),
-            r.action.map_or_else(table::empty_cell, |action| action.replace('_', " ")),
-            r.due_text().unwrap_or_else(table::empty_cell),
-            sparkline(&r.sketch_m.0, r.limit_m),
-            r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),
-            r.trend.to_owned(),
-            table::hours(r.crossing_hours_p05),
-            table::hours(r.crossing_hours_p50),
-            table::hours(r.crossing_hours_p95),
-            r.flights.to_string(),
-            reason_and_conditions(r),
-        ]
+/// Whether a unit asks for something: it is neither normal without a finding nor removed.
+fn needs_attention(row: &TrendRow) -> bool {
+    row.action.is_some() || row.state.is_some_and(|state| state != State::Normal.as_str())
+}
+
+/// Numbers of units by state, most urgent first, and how many normal ones have a caveat.
+pub(crate) fn by_state<'r>(rows: impl IntoIterator<Item = &'r TrendRow>) -> String {
+    let mut states = BTreeMap::<_, usize>::new();
+    let mut with_caveats = 0;
+    for row in rows {
+        let state = row.state.and_then(State::from_word);
+        *states.entry(state).or_default() += 1;
+        with_caveats += usize::from(state == Some(State::Normal) && !row.caveats.0.is_empty());
+    }
+    let of_state = |(state, n): (&Option<State>, &usize)| match state {
+        Some(State::Normal) if with_caveats > 0 => format!("{n} normal ({with_caveats} with caveats)"),
+        state => format!("{n} {}", state.map_or("removed", State::as_str)),
     };
-    table::layout(&columns, &units.iter().map(cells).collect::<Vec<_>>())
+    states.iter().rev().map(of_state).collect::<Vec<_>>().join(", ")
+}
+
+/// Units by urgency, with date, reason and certainty; without the columns above a rank.
+pub(crate) fn unit_table(mut units: Vec<&TrendRow>, max_rank: u8) -> String {
+    units.sort_by(|a, b| a.urgency().partial_cmp(&b.urgency()).unwrap_or(Ordering::Equal));
+    let or_dash_number = |value: Option<f64>, factor: f64| {
+        value.map_or_else(table::empty_cell, |value| format!("{:.1}", value * factor))
+    };
+    let columns: &table::Columns<'_, TrendRow> = &[
+        (text("state", 0), &|r| state_mark(r.state)),
+        (text("due", 0), &|r| or_dash(r.due_text().as_deref())),
+        (text("tail", 0), &|r| or_dash(r.tail_number.as_deref())),
+        (text("position", 0), &|r| or_dash(r.position.as_deref())),
+        (text("serial", 0), &|r| r.serial_number.clone()),
+        (number("gap ± 90 % [µm]", 2), &|r| table::gap(r.gap_m, r.gap_se_m.map(|se_m| NORMAL_95 * se_m))),
+        (text("part", 3), &|r| or_dash(r.part_number.as_deref())),
+        (text(SCALE, 1), &|r| sparkline(&r.sketch_m.0, r.limit_m)),
+        (text("action", 4), &|r| or_dash(r.action.map(|action| action.replace('_', " ")).as_deref())),
+        (number("limit [µm]", 5), &|r| table::micrometres(r.limit_m)),
+        (number("rate [nm/FH]", 6), &|r| or_dash_number(r.rate_m_per_hour, 1e9)),
+        (number("5 % [FH]", 7), &|r| table::hours(r.crossing_hours_p05)),
+        (number("50 % [FH]", 8), &|r| table::hours(r.crossing_hours_p50)),
+        (number("95 % [FH]", 8), &|r| table::hours(r.crossing_hours_p95)),
+        (number("flights", 9), &|r| r.flights.to_string()),
+        (text("why, and how sure", 0), &|r| r.statement_text()),
+    ];
+    let kept: Vec<_> = columns.iter().copied().filter(|(column, _)| column.rank <= max_rank).collect();
+    table::of(units, &kept)
 }

@@ -100,6 +100,8 @@ fn text(report: &RunSummary, code: Code, completed_before: Option<f64>) -> Strin
     if !report.is_partial() {
         gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet_now as f64);
     }
+    let stale = report.stale_now as f64;
+    gauge("units_stale", "Installed units without a gap for unusually long before now.", stale);
     if let Some(newest) = report.newest_departure_utc {
         let newest = newest.as_millisecond() as f64 / 1e3;
         gauge("newest_departure_timestamp_seconds", "Newest departure of all logs.", newest);

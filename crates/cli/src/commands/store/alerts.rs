@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use job::Config;
 use pipeline::findings::finding::GAP;
 use records::{AlertRecord, AlertStatus};
 use store::{Holder, Store};
@@ -10,22 +11,18 @@ use crate::args::RowFormatArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
-use crate::table::{self, count, number, text};
+use crate::table::{self, count, number, or_dash, text, unit_name};
 
-/// Lists alerts, or makes one due again.
+/// Lists alerts.
 ///
 /// # Errors
-/// If the store cannot be read or written, or no message with the identifier is unconfirmed.
+/// If the store cannot be read.
 pub(crate) fn alerts(
     store: &Store,
     is_unsent: bool,
-    resend: Option<&str>,
     format: &RowFormatArgs,
     output: &Output,
 ) -> Result<Code, Failure> {
-    if let Some(id) = resend {
-        return send_again(store, id, output);
-    }
     let mut found = store.alerts()?;
     // A change without a message has one row; the states of a baseline are no messages.
     let messages: BTreeSet<String> =
@@ -33,13 +30,59 @@ pub(crate) fn alerts(
     found
         .retain(|row| !row.channel.is_empty() || (row.kind == "change" && !messages.contains(&row.alert_id)));
     if is_unsent {
-        found.retain(|row| !matches!(row.status, AlertStatus::Sent | AlertStatus::Recorded));
+        found.retain(|row| row.status.is_unsent());
     }
     row_output::write_rows(format, output, || row_output::batch(&found), || page(&found))?;
     Ok(Code::Success)
 }
 
-fn send_again(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
+/// Takes back the unsent messages of a channel, and makes them due in another one if it is given.
+///
+/// # Errors
+/// If the store cannot be read or written, the other channel is not configured, or no message is unsent.
+pub(crate) fn drop_unsent(
+    store: &Store,
+    config: &Config,
+    channel: &str,
+    to: Option<&str>,
+    output: &Output,
+) -> Result<Code, Failure> {
+    let channels = &config.document.alerts;
+    if let Some(to) = to.filter(|to| !channels.contains_key(*to) || *to == channel) {
+        let what = format!("no other channel `{to}` is configured");
+        let known: Vec<&str> = channels.keys().map(String::as_str).collect();
+        return Err(Failure::usage("no_such_alert", what, &format!("channels are {}", known.join(", "))));
+    }
+    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let rows = store.alerts()?;
+    let is_known = |id: &str| rows.iter().any(|row| row.alert_id == id && Some(row.channel.as_str()) == to);
+    let unsent = rows.iter().filter(|row| row.channel == channel && row.status.is_unsent());
+    let dropped: Vec<AlertRecord> =
+        unsent.map(|row| AlertRecord { status: AlertStatus::Dropped, ..row.clone() }).collect();
+    if dropped.is_empty() {
+        let what = format!("no unsent message of a channel `{channel}`");
+        return Err(Failure::usage("no_such_alert", what, "`freeplay store alerts --unsent` lists them"));
+    }
+    let due = |to: &str| -> Vec<AlertRecord> {
+        let moved = dropped.iter().filter(|row| !is_known(&row.alert_id)).cloned();
+        let status = AlertStatus::Pending;
+        moved
+            .map(|row| AlertRecord { channel: to.to_owned(), status, attempts: 0, error: None, ..row })
+            .collect()
+    };
+    let due = to.map(due).unwrap_or_default();
+    let sends = to.map(|to| format!("; the next run sends {} through `{to}`", due.len())).unwrap_or_default();
+    let dropped_count = count(dropped.len(), "message");
+    writer.write_alerts(&[dropped, due].concat())?;
+    output.write_result(&format!("took back {dropped_count} of `{channel}`{sends}\n"))?;
+    Ok(Code::Success)
+}
+
+/// Makes an unconfirmed alert due again.
+///
+/// # Errors
+/// If the store cannot be read or written, or no message with the identifier is unconfirmed.
+pub(crate) fn resend(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
     let mut writer = store.lock(&Holder::this_process(), None)?;
     let mut rows = store.alerts()?;
     rows.retain(|row| row.alert_id == id && row.status == AlertStatus::Unconfirmed);
@@ -57,40 +100,29 @@ fn page(found: &[AlertRecord]) -> String {
     if found.is_empty() {
         return "no alert\n".to_owned();
     }
-    let columns = [
-        text("alert", 2),
-        text("part / serial", 0),
-        text("tail", 3),
-        text("change", 0),
-        text("channel", 0),
-        text("status", 0),
-        number("attempts", 4),
-        text("error", 5),
-    ];
-    let cells = |row: &AlertRecord| {
-        let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+    let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+    let change = |row: &AlertRecord| {
         let change = format!("{} → {}", word(&row.from_state), word(&row.to_state));
-        let change = match row.kind.as_str() {
+        match row.kind.as_str() {
             "change" if row.quantity == GAP => change,
             "change" => format!("{}: {change}", row.quantity),
             kind => kind.to_owned(),
-        };
-        let unit = match (&row.serial_number, &row.part_number) {
-            (Some(serial), part) => format!("{} / {serial}", part.as_deref().unwrap_or("–")),
-            (None, Some(part)) => part.clone(),
-            (None, None) => table::empty_cell(),
-        };
-        vec![
-            row.alert_id.clone(),
-            unit,
-            row.tail_number.clone().unwrap_or_else(table::empty_cell),
-            change,
-            if row.channel.is_empty() { table::empty_cell() } else { row.channel.clone() },
-            row.status.as_str().to_owned(),
-            row.attempts.to_string(),
-            row.error.clone().unwrap_or_else(table::empty_cell),
-        ]
+        }
     };
-    let head = format!("{}\n", count(found.len(), "row"));
-    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    let unit = |row: &AlertRecord| match (&row.serial_number, &row.part_number) {
+        (Some(serial), part) => unit_name(part.as_deref(), serial),
+        (None, part) => or_dash(part.as_deref()),
+    };
+    let channel = |row: &AlertRecord| Some(row.channel.clone()).filter(|channel| !channel.is_empty());
+    let columns: &table::Columns<'_, AlertRecord> = &[
+        (text("alert", 2), &|r| r.alert_id.clone()),
+        (text("part / serial", 0), &unit),
+        (text("tail", 3), &|r| or_dash(r.tail_number.as_deref())),
+        (text("change", 0), &change),
+        (text("channel", 0), &|r| or_dash(channel(r).as_deref())),
+        (text("status", 0), &|r| r.status.as_str().to_owned()),
+        (number("attempts", 4), &|r| r.attempts.to_string()),
+        (text("error", 5), &|r| or_dash(r.error.as_deref())),
+    ];
+    count(found.len(), "row") + "\n" + &table::of(found, columns)
 }

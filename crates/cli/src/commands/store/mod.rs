@@ -33,11 +33,13 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
     match &args.command {
         StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, output),
         StoreCommand::Runs { run, last, rows } => runs::runs(&store, run.as_deref(), *last, rows, output),
-        StoreCommand::Alerts { unsent, resend, rows } => {
-            alerts::alerts(&store, *unsent, resend.as_deref(), rows, output)
+        StoreCommand::Alerts { resend: Some(id), .. } => alerts::resend(&store, id, output),
+        StoreCommand::Alerts { drop: Some(channel), to, .. } => {
+            alerts::drop_unsent(&store, &config, channel, to.as_deref(), output)
         }
+        StoreCommand::Alerts { unsent, rows, .. } => alerts::alerts(&store, *unsent, rows, output),
         StoreCommand::Files { table } => files(&store, *table, output),
-        StoreCommand::Verify => verify(&store, output),
+        StoreCommand::Verify { accept_foreign } => verify(&store, *accept_foreign, output),
         StoreCommand::Compact => compact(&store, output),
         StoreCommand::Forget(args) => forget(&store, args, output),
         StoreCommand::Export { rows } => export(&config, rows, output),
@@ -168,7 +170,11 @@ fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_j
     }))
 }
 
-fn verify(store: &Store, output: &Output) -> Result<Code, Failure> {
+fn verify(store: &Store, accepts_foreign: bool, output: &Output) -> Result<Code, Failure> {
+    if accepts_foreign {
+        let accepted = store.lock(&Holder::this_process(), None)?.accept_foreign()?;
+        output.write_result(&format!("accepted {} of other programs\n", count(accepted, "commit")))?;
+    }
     let findings = store.verify();
     if findings.is_empty() {
         output.write_result(&format!(
@@ -230,7 +236,7 @@ fn export(config: &Config, format: &RowFormatArgs, output: &Output) -> Result<Co
             format,
             output,
             || Ok(to_batch(&records).map_err(store::Error::from)?),
-            || query::page(&records, config),
+            || query::page(&records),
         )?;
     } else {
         let batch = store.scan(&Query::default())?;

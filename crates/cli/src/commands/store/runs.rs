@@ -11,7 +11,7 @@ use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::span;
 use crate::row_output;
-use crate::table::{self, count, number, text};
+use crate::table::{self, count, number, or_dash, text};
 
 records::row! {
     /// A run as an output row.
@@ -123,33 +123,23 @@ fn in_row(run: &RunRecord, is_held: bool) -> Run {
 }
 
 fn page(runs: &[Run]) -> String {
-    let columns = [
-        text("run", 0),
-        text("ended", 0),
-        text("duration", 4),
-        number("found", 2),
-        number("unchanged", 3),
-        number("processed", 0),
-        number("estimated", 1),
-        number("refused", 1),
-        number("failed", 0),
-        number("not processed", 1),
-    ];
-    let cells = |run: &Run| {
-        let counts =
-            [run.found, run.known, run.done, run.estimated, run.refused, run.errors, run.not_reached];
-        let took = run.finished_utc.map_or_else(table::empty_cell, |end| {
-            span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default())
-        });
-        let words = [run.run_id.clone(), status_text(run.ended).to_owned(), took];
-        words.into_iter().chain(counts.map(|n| n.to_string())).collect()
+    let took = |run: &Run| {
+        let end = run.finished_utc?;
+        Some(span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default()))
     };
-    let head = format!("{}\n", count(runs.len(), "run"));
-    if runs.is_empty() {
-        head
-    } else {
-        head + &table::layout(&columns, &runs.iter().map(cells).collect::<Vec<_>>())
-    }
+    let columns: &table::Columns<'_, Run> = &[
+        (text("run", 0), &|r| r.run_id.clone()),
+        (text("ended", 0), &|r| status_text(r.ended).to_owned()),
+        (text("duration", 4), &|r| or_dash(took(r).as_deref())),
+        (number("found", 2), &|r| r.found.to_string()),
+        (number("unchanged", 3), &|r| r.known.to_string()),
+        (number("processed", 0), &|r| r.done.to_string()),
+        (number("estimated", 1), &|r| r.estimated.to_string()),
+        (number("refused", 1), &|r| r.refused.to_string()),
+        (number("failed", 0), &|r| r.errors.to_string()),
+        (number("not processed", 1), &|r| r.not_reached.to_string()),
+    ];
+    count(runs.len(), "run") + "\n" + &table::of(runs, columns)
 }
 
 fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
@@ -206,37 +196,19 @@ fn class(log: &LogRecord) -> &'static str {
 }
 
 fn log_page(logs: &[Log]) -> String {
-    let columns = [
-        text("class", 0),
-        text("log", 0),
-        text("reason", 1),
-        text("tail", 4),
-        text("flight", 3),
-        number("estimated", 2),
-        number("refused", 2),
-        number("time [s]", 5),
+    let columns: &table::Columns<'_, Log> = &[
+        (text("class", 0), &|l| l.class.replace('_', " ")),
+        (text("log", 0), &|l| l.log_path.clone()),
+        (text("reason", 1), &|l| l.reason.clone().unwrap_or_default()),
+        (text("tail", 4), &|l| or_dash(l.tail_number.as_deref())),
+        (text("flight", 3), &|l| or_dash(l.flight_id.as_deref())),
+        (number("estimated", 2), &|l| l.estimated.to_string()),
+        (number("refused", 2), &|l| l.refused.to_string()),
+        (number("time [s]", 5), &|l| format!("{:.1}", l.duration_s)),
     ];
-    let cells = |log: &Log| {
-        let name = |text: Option<&str>| text.map_or_else(table::empty_cell, str::to_owned);
-        vec![
-            log.class.replace('_', " "),
-            log.log_path.clone(),
-            log.reason.clone().unwrap_or_default(),
-            name(log.tail_number.as_deref()),
-            name(log.flight_id.as_deref()),
-            log.estimated.to_string(),
-            log.refused.to_string(),
-            format!("{:.1}", log.duration_s),
-        ]
-    };
     let mut classes = Reasons::new();
     for log in logs {
         *classes.entry(log.class.replace('_', " ")).or_default() += 1;
     }
-    let head = format!("{} ({})\n", count(logs.len(), "log"), words(&classes));
-    if logs.is_empty() {
-        head
-    } else {
-        head + &table::layout(&columns, &logs.iter().map(cells).collect::<Vec<_>>())
-    }
+    format!("{} ({})\n", count(logs.len(), "log"), words(&classes)) + &table::of(logs, columns)
 }

@@ -501,9 +501,7 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
         quantity: quantity.as_str(),
         scope: ChangeScope::Tail.as_str(),
         kind: "drift",
-        part_number: None,
         tail_number: Some(tail.to_owned()),
-        serial_number: None,
         positions,
         units: known.len() as i64,
         units_able: known.len() as i64,
@@ -519,6 +517,7 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
             shown_range(quantity, &shares, known.first().map_or(1.0, |(s, _)| s.scale)),
             ChangeScope::Tail.cause(),
         ),
+        ..QuantityChange::default()
     }
 }
 
@@ -534,15 +533,10 @@ pub(crate) fn gap_row(row: &TrendRow) -> QuantityRow {
         quantity: Quantity::GapM.as_str(),
         flights: row.estimates,
         outliers: row.outliers,
-        since_utc: None,
-        baseline: None,
         level: row.gap_m,
         level_se: row.gap_se_m,
-        change: None,
-        change_se: None,
         rate_per_hour: row.rate_m_per_hour,
         rate_se_per_hour: spread.map(|half| half / records::uncertainty::NORMAL_95),
-        change_limit: None,
         steps: row
             .change_points
             .iter()
@@ -554,8 +548,7 @@ pub(crate) fn gap_row(row: &TrendRow) -> QuantityRow {
                 scope: if c.tail_wide { ChangeScope::Tail } else { ChangeScope::Unit }.as_str(),
             })
             .collect(),
-        state: None,
-        reason: None,
+        ..QuantityRow::default()
     }
 }
 

@@ -40,8 +40,8 @@ struct Deviation<'a> {
     share: f64,
 }
 
-/// What differs, in words: tails first, then units.
-pub(crate) fn notes(rows: &[QuantityRow]) -> Vec<String> {
+/// What differs of the selected units, in words: tails first, then units.
+pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> bool) -> Vec<String> {
     let (mut tails, mut units) = (Vec::new(), Vec::new());
     for quantity in COMPARED {
         let found = deviations(rows, quantity);
@@ -49,10 +49,14 @@ pub(crate) fn notes(rows: &[QuantityRow]) -> Vec<String> {
         let is_tails = |deviation: &&Deviation<'_>| {
             deviation.row.tail_number.as_deref().is_some_and(|tail| of_tails.contains_key(tail))
         };
-        units.extend(found.iter().filter(|d| d.share.abs() > 1.0 && !is_tails(d)).map(unit_note));
+        let is_unit = |d: &&Deviation<'_>| d.share.abs() > 1.0 && !is_tails(d) && is_selected(d.row);
+        units.extend(found.iter().filter(is_unit).map(unit_note));
         // Innovations grow with every fault of a sensor: a tail that is named has its reason.
         let is_named = |tail: &str| tails.iter().any(|(named, _)| named == tail);
-        let new = of_tails.iter().filter(|(tail, _)| quantity != Quantity::Nis || !is_named(tail));
+        let new = of_tails.iter().filter(|(tail, members)| {
+            let is_new = quantity != Quantity::Nis || !is_named(tail);
+            is_new && members.iter().any(|d| is_selected(d.row))
+        });
         let new: Vec<_> = new.map(|(tail, members)| ((*tail).to_owned(), tail_note(tail, members))).collect();
         tails.extend(new);
     }
@@ -228,11 +232,13 @@ mod tests {
     #[test]
     fn a_unit_and_a_tail_that_always_differed_are_named_and_no_other() {
         for seed in 0..50 {
-            let unit =
-                notes(&fleet(seed, |tail, position| if (tail, position) == (3, 1) { 0.7 } else { 1.0 }));
+            let rows = fleet(seed, |tail, position| if (tail, position) == (3, 1) { 0.7 } else { 1.0 });
+            let unit = notes(&rows, |_| true);
             assert_eq!(unit.len(), 1, "{unit:?}");
+            let of_others = notes(&rows, |row| row.tail_number.as_deref() != Some("T3"));
+            assert!(of_others.is_empty(), "{of_others:?}");
             assert!(unit[0].starts_with("T3 p1 (P / 3-1): stiffness 3"), "{unit:?}");
-            let tail = notes(&fleet(seed, |tail, _| if tail == 5 { 1.3 } else { 1.0 }));
+            let tail = notes(&fleet(seed, |tail, _| if tail == 5 { 1.3 } else { 1.0 }), |_| true);
             assert_eq!(tail.len(), 1, "{tail:?}");
             assert!(tail[0].starts_with("T5: stiffness of its units reads 6"), "{tail:?}");
         }
@@ -249,7 +255,7 @@ mod tests {
                 // A limit that is a share of the unit's own level hides nothing.
                 row.change_limit = row.level;
             }
-            notes(&rows)
+            notes(&rows, |_| true)
         };
         assert!(of(Quantity::StiffnessNPerM).is_empty());
         let found = of(Quantity::LoadZeroN);
@@ -258,11 +264,11 @@ mod tests {
 
     #[test]
     fn of_a_thousand_sound_units_at_most_one_is_named() {
-        let named: usize = (0..250).map(|seed| notes(&fleet(seed + 1_000, |_, _| 1.0)).len()).sum();
+        let named: usize = (0..250).map(|seed| notes(&fleet(seed + 1_000, |_, _| 1.0), |_| true).len()).sum();
         assert!(named <= 12, "{named} of 12,000");
         // Fewer peers than a spread needs are compared with nothing.
         let few: Vec<QuantityRow> =
             fleet(1, |tail, _| if tail == 0 { 2.0 } else { 1.0 }).into_iter().take(8).collect();
-        assert!(notes(&few).is_empty());
+        assert!(notes(&few, |_| true).is_empty());
     }
 }

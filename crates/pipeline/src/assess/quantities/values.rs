@@ -1,9 +1,7 @@
 //! Values of the followed quantities, read from the store.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use arrow::array::RecordBatch;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
@@ -11,10 +9,8 @@ use store::{Query, Store};
 
 use crate::error::Error;
 use crate::findings::monitoring::median;
-use crate::fleet::builder::at;
 use crate::fleet::histories::{Positions, TailPosition, UnitKey};
-use crate::fleet::parallel_scan::read_each;
-use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey};
+use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
 const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
@@ -93,13 +89,39 @@ pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error
         "load_p95_n",
     ];
     let columns: Vec<&str> = keys.into_iter().chain(numbers).collect();
-    let mut found = Reader::default();
-    read_each(&store.scan_columns(&query, &columns)?, |batch| found.add(batch))?;
-    let unit = |(name, unit): (UnitKey, usize)| {
-        let (places, flights) = std::mem::take(&mut found.units[unit]);
-        (name, UnitValues::new(places, flights))
+    let parts = of_store(&store.scan_columns(&query, &columns)?, |rows, chunk, _| add(rows, chunk))?;
+    let unit = |(name, parts)| {
+        let rows = UnitRows::concatenated(parts, |flight: &mut FlightValues, places, _| {
+            flight.place = places[flight.place as usize];
+        });
+        (name, UnitValues::new(rows.places, rows.rows))
     };
-    Ok(found.names.into_iter().map(unit).collect())
+    Ok(parts.into_iter().map(unit).collect())
+}
+
+fn add(rows: &mut RowsByUnit<FlightValues>, chunk: &TableBatch) -> Result<(), ingest::Error> {
+    let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+    let (temperatures, lows, highs) =
+        (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
+    let mut columns = Vec::with_capacity(READ.len());
+    for (quantity, error) in READ {
+        columns.push((numbers(quantity.as_str())?, numbers(error)?));
+    }
+    let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
+    rows.add_rows(chunk, |row, unit, place| {
+        let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
+        unit.rows.push(FlightValues {
+            departure_us: departures.value(row),
+            place,
+            temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
+            load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
+            values: std::array::from_fn(|k| {
+                let (values, errors) = &columns[k];
+                (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)
+            }),
+        });
+        Ok(())
+    })
 }
 
 /// The same by position: all flights there, under the unit that flew there last.
@@ -127,55 +149,4 @@ pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
         of_units.insert(name, (last_us, UnitValues::new(places, flights)));
     }
     of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
-}
-
-/// Values while their rows come in.
-#[derive(Default)]
-struct Reader {
-    names: BTreeMap<UnitKey, usize>,
-    units: Vec<(Positions, Vec<FlightValues>)>,
-}
-
-impl Reader {
-    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-        let keys = KeyColumns::of(&chunk)?;
-        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-        let (temperatures, lows, highs) =
-            (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
-        let mut columns = Vec::with_capacity(READ.len());
-        for (quantity, error) in READ {
-            columns.push((numbers(quantity.as_str())?, numbers(error)?));
-        }
-        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
-        let mut seen = KeyCache::default();
-        for row in 0..chunk.len() {
-            let Some(who) = keys.key_at(row) else { continue };
-            let (unit, place) = seen.get_or(&keys, row, || self.place(who));
-            let values = std::array::from_fn(|k| {
-                let (values, errors) = &columns[k];
-                (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)
-            });
-            let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
-            self.units[unit].1.push(FlightValues {
-                departure_us: departures.value(row),
-                place,
-                temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
-                load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
-                values,
-            });
-        }
-        Ok(())
-    }
-
-    /// Index of a unit, and of one of its positions.
-    fn place(&mut self, who: RowKey<'_>) -> (usize, u32) {
-        let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
-        let units = &mut self.units;
-        let unit = *self.names.entry(name).or_insert_with(|| {
-            units.push(Default::default());
-            units.len() - 1
-        });
-        (unit, self.units[unit].0.number(who.tail_number, who.position))
-    }
 }

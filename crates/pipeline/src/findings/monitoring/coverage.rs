@@ -5,14 +5,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
 use job::Config;
-use records::assessment::action::day_text;
-use records::time::days_between;
+
+use records::time::{day_text, days_between};
 use records::{Installations, PartNumber, TrendRow};
 use serde::Serialize;
 use store::LogRecord;
 
-/// Limits and hours that the assessments of some units lack, in words.
-pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
+/// Limits, hours and new logs that the assessments of some units lack, in words.
+///
+/// `newest_log` is the departure of the newest log of these units, and `today` the date from which its age counts.
+pub fn notes(
+    rows: &[TrendRow],
+    newest_log: Option<Timestamp>,
+    today: Timestamp,
+    config: &Config,
+) -> Vec<String> {
     let installed = || rows.iter().filter(|row| row.removed_utc.is_none());
     let mut without_limit = BTreeMap::<&str, usize>::new();
     for row in installed().filter(|row| row.limit_m.is_none()) {
@@ -28,20 +35,27 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             units(of_logs)
         ));
     }
-    let newest = installed().filter_map(|row| Some((row.latest_utc?, row.as_of_utc))).max();
-    if let Some((at, as_of)) = newest.filter(|(at, as_of)| days_between(*at, *as_of) > QUIET_DAYS) {
-        let mut rates: Vec<f64> = installed().filter_map(|row| row.hours_per_day).collect();
-        rates.sort_by(f64::total_cmp);
-        let assumed = match (rates.first(), rates.last()) {
-            (Some(least), Some(most)) if most - least < 0.1 => format!("{most:.1} FH a day"),
-            (Some(least), Some(most)) => format!("{least:.1} to {most:.1} FH a day, each unit's own rate"),
-            _ => "no usage".to_owned(),
-        };
-        notes.push(format!("no flight known since {}: dates assume {assumed}", day_text(as_of, at)));
-    }
+    let as_of = rows.first().map(|row| row.as_of_utc);
+    notes.extend(newest_log.zip(as_of).and_then(|(at, as_of)| age_of(at, as_of, today)));
     notes.extend(flights_table_ends(rows, config));
     notes.extend(look_alikes(rows));
     notes
+}
+
+/// Age of the newest log from the first day on, and what that means for dates.
+fn age_of(newest_log: Timestamp, as_of: Timestamp, today: Timestamp) -> Option<String> {
+    let age = days_between(newest_log, today) as i64;
+    let age = match age {
+        ..1 => return None,
+        1 => "1 day".to_owned(),
+        _ => format!("{age} days"),
+    };
+    let dates = if days_between(as_of, today) < 1.0 {
+        "since then, usage goes on at each unit's own rate"
+    } else {
+        "states are those of the newest record (`trend.as_of`)"
+    };
+    Some(format!("newest log {}, {age} old; {dates}", day_text(newest_log, today)))
 }
 
 /// Units of one part whose serial numbers look alike: one of them may be misspelt.
@@ -98,7 +112,7 @@ fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
     ))
 }
 
-/// Days without a record from which a note states that usage is assumed to go on.
+/// Days by which logs may go on after the end of the flights table.
 const QUIET_DAYS: f64 = 3.0;
 
 fn units(count: usize) -> String {
@@ -114,6 +128,35 @@ fn no_limit(part: &str, count: usize, config: &Config) -> String {
     let near = nearest(part, config.parts.keys().map(PartNumber::as_str));
     let near = near.map(|near| format!(" (nearest: {near})")).unwrap_or_default();
     format!("part {part} is not configured{near}: {lost}; add `[part.\"{part}\"]`, or correct its name")
+}
+
+/// Departures of the flights table that differ from those of the logs by one number of hours: another time zone.
+pub(crate) fn departures_in_another_zone<'a>(
+    config: &Config,
+    accounts: impl Iterator<Item = &'a LogRecord>,
+) -> Option<String> {
+    const QUARTER_S: i64 = 900;
+    const MIN_FLIGHTS: usize = 3;
+    let offset = |account: &LogRecord| {
+        let (tail, id, at) =
+            (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
+        Some(config.flights.of(tail, id, at)?.departure_utc.duration_since(at).as_secs())
+    };
+    let (mut by_offset, mut all) = (BTreeMap::<i64, usize>::new(), 0);
+    for offset_s in accounts.filter_map(offset) {
+        all += 1;
+        *by_offset.entry(offset_s).or_default() += 1;
+    }
+    let (offset_s, flights) = by_offset.into_iter().max_by_key(|(_, flights)| *flights)?;
+    let is_zone = offset_s != 0 && offset_s % QUARTER_S == 0;
+    (is_zone && flights >= MIN_FLIGHTS && 2 * flights > all).then(|| {
+        let hours = offset_s as f64 / 3600.0;
+        let table = config.document.logs.flights.as_deref().unwrap_or_default();
+        format!(
+            "{table}: {flights} of {all} departures are {hours:+} h from those of the logs, which count; write them in UTC, or \
+             with their offset (2026-10-01T08:00-05:00), since those of flights without a log may be on the wrong day"
+        )
+    })
 }
 
 /// Installed positions whose channels no log has, with the number of their aircraft.

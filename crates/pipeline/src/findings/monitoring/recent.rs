@@ -1,18 +1,16 @@
 //! Diagnostics of the last months in addition to gaps, by position: innovations and rejections.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use arrow::array::RecordBatch;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Status;
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::fleet::builder::at;
-use crate::fleet::parallel_scan::read_each;
-use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+use crate::fleet::histories::TailPosition;
+use crate::fleet::row_keys::TextColumn;
+use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
 
 /// Maximum age of the flights: some months.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
@@ -63,69 +61,48 @@ pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagn
     let since_utc = until.checked_sub(LOOKED_BACK).ok();
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
     let query = Query { since_utc, until_utc, ..Query::default() };
-    let mut found = Found::default();
-    read_each(&store.scan_columns(&query, &COLUMNS)?, |batch| found.add(batch))?;
-    Ok(found.in_order())
+    let parts = of_store(&store.scan_columns(&query, &COLUMNS)?, |rows, chunk, _| add(rows, chunk))?;
+    let mut found = RecentDiagnostics::new();
+    for ((part_number, serial_number), parts) in parts {
+        for part in parts {
+            for (place, flight) in part.rows {
+                let TailPosition { tail_number, position } = part.places.get(place).clone();
+                let key = PositionKey {
+                    tail_number: tail_number.unwrap_or_default(),
+                    position: position.unwrap_or_default(),
+                    part_number: part_number.clone().unwrap_or_default(),
+                    serial_number: serial_number.clone(),
+                };
+                found.entry(key).or_default().push(flight);
+            }
+        }
+    }
+    for flights in found.values_mut() {
+        flights.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
+    }
+    Ok(found)
 }
 
-/// Looks while their rows come in.
-#[derive(Default)]
-struct Found {
-    by_seat: BTreeMap<PositionKey, usize>,
-    diagnostics: Vec<Vec<FlightDiagnostics>>,
-}
-
-impl Found {
-    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-        let (keys, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
-        let nis = chunk.numbers(Some(chunk.column(&["nis"])?))?;
-        let stiffness = chunk.numbers(Some(chunk.column(&["stiffness_n_per_m"])?))?;
-        let (statuses, reasons) =
-            (TextColumn::of(&chunk, &["status"])?, TextColumn::of(&chunk, &["reason"])?);
-        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
-        let mut seen = KeyCache::default();
-        for row in 0..chunk.len() {
-            let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-            let Some(who) = keys.key_at(row) else { continue };
-            let of_position = seen.get_or(&keys, row, || self.of_position(who));
-            self.diagnostics[of_position].push(FlightDiagnostics {
+fn add(rows: &mut RowsByUnit<(u32, FlightDiagnostics)>, chunk: &TableBatch) -> Result<(), ingest::Error> {
+    let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+    let texts = |name: &str| TextColumn::of(chunk, &[name]);
+    let (nis, stiffness) = (numbers("nis")?, numbers("stiffness_n_per_m")?);
+    let (flights, statuses, reasons) = (texts("flight_id")?, texts("status")?, texts("reason")?);
+    let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
+    rows.add_rows(chunk, |row, unit, place| {
+        let is_refused = statuses.get(row) == Some(Status::Refused.as_str());
+        if let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) {
+            let flight = FlightDiagnostics {
                 departure_utc,
                 flight_id: flights.get(row).unwrap_or_default().into(),
                 nis: at(&nis, row),
                 stiffness_n_per_m: at(&stiffness, row),
-                rejection: reasons
-                    .get(row)
-                    .filter(|_| statuses.get(row) == Some(Status::Refused.as_str()))
-                    .map(Into::into),
-            });
+                rejection: reasons.get(row).filter(|_| is_refused).map(Into::into),
+            };
+            unit.rows.push((place, flight));
         }
         Ok(())
-    }
-
-    fn of_position(&mut self, who: RowKey<'_>) -> usize {
-        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
-        let position = PositionKey {
-            tail_number: text(who.tail_number),
-            position: text(who.position),
-            part_number: text(who.part_number),
-            serial_number: who.serial_number.to_owned(),
-        };
-        let diagnostics = &mut self.diagnostics;
-        *self.by_seat.entry(position).or_insert_with(|| {
-            diagnostics.push(Vec::new());
-            diagnostics.len() - 1
-        })
-    }
-
-    fn in_order(mut self) -> RecentDiagnostics {
-        let in_order = |(position, of_position): (PositionKey, usize)| {
-            let mut diagnostics = std::mem::take(&mut self.diagnostics[of_position]);
-            diagnostics.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
-            (position, diagnostics)
-        };
-        self.by_seat.into_iter().map(in_order).collect()
-    }
+    })
 }
 
 /// The newest departure of all.

@@ -1,0 +1,201 @@
+//! Rows of many units, grouped by unit while they come in, from tables of any length.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use arrow::array::{Array, Float64Array, RecordBatch};
+use ingest::tables::TableBatch;
+use rayon::prelude::*;
+use store::ColumnScan;
+
+use crate::error::Error;
+use crate::fleet::histories::{Positions, UnitKey};
+use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey};
+use crate::fleet::settings_counts::SettingsCounts;
+
+/// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
+const SHARES: usize = 4;
+
+/// Rows of one unit, in the order of arrival.
+#[derive(Debug)]
+pub(crate) struct UnitRows<R> {
+    /// Where the unit was; a row holds the number of its place.
+    pub(crate) places: Positions,
+    /// Flights' names one after the other, for readers that keep them.
+    pub(crate) names: String,
+    /// Gaps by the settings that they were estimated with, for readers that count them.
+    pub(crate) settings: SettingsCounts,
+    pub(crate) rows: Vec<R>,
+}
+
+impl<R> Default for UnitRows<R> {
+    fn default() -> Self {
+        let (names, settings) = (String::new(), SettingsCounts::default());
+        Self { places: Positions::default(), names, settings, rows: Vec::new() }
+    }
+}
+
+impl<R> UnitRows<R> {
+    /// One after the other. `moved` is given each row, the new numbers of the places of its part, and the number of bytes of
+    /// names before that part.
+    pub(crate) fn concatenated(parts: Vec<Self>, moved: impl Fn(&mut R, &[u32], u32)) -> Self {
+        let mut all = Self::default();
+        all.rows.reserve_exact(parts.iter().map(|part| part.rows.len()).sum());
+        all.names.reserve_exact(parts.iter().map(|part| part.names.len()).sum());
+        for mut part in parts {
+            let places = all.places.numbers(&part.places);
+            let names = all.names.len() as u32;
+            part.rows.iter_mut().for_each(|row| moved(row, &places, names));
+            all.rows.append(&mut part.rows);
+            all.names.push_str(&part.names);
+            all.settings.add_all(&part.settings);
+        }
+        all
+    }
+}
+
+/// Rows by unit, while they come in. `R` is what is kept of a row.
+#[derive(Debug)]
+pub(crate) struct RowsByUnit<R> {
+    /// Units by serial number; a serial number is unique only with its part number.
+    by_serial: HashMap<String, Vec<usize>>,
+    units: Vec<(UnitKey, UnitRows<R>)>,
+    last: usize,
+    /// The unit that came after each the last time.
+    follows: Vec<usize>,
+}
+
+/// A unit, and one of its places.
+#[derive(Debug, Clone, Copy)]
+struct Seat {
+    unit: usize,
+    place: u32,
+}
+
+/// The parts of each unit's rows, in the order of the parts of the table.
+pub(crate) type PartsByUnit<R> = BTreeMap<UnitKey, Vec<UnitRows<R>>>;
+
+impl<R> Default for RowsByUnit<R> {
+    fn default() -> Self {
+        Self { by_serial: HashMap::new(), units: Vec::new(), last: 0, follows: Vec::new() }
+    }
+}
+
+impl<R> RowsByUnit<R> {
+    /// Reads the rows of a table: `read` is given the number of a row, the rows of its unit, to which it adds, and the number
+    /// of its place.
+    ///
+    /// # Errors
+    /// A row without a serial number, and the first error of `read`.
+    pub(crate) fn add_rows(
+        &mut self,
+        chunk: &TableBatch,
+        mut read: impl FnMut(usize, &mut UnitRows<R>, u32) -> Result<(), ingest::Error>,
+    ) -> Result<(), ingest::Error> {
+        let keys = KeyColumns::of(chunk)?;
+        let serial = chunk.find(&["serial_number", "serial"]);
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let seat = match seen.get(&keys, row) {
+                Some(seat) => seat,
+                None => {
+                    let empty = || chunk.error(row, serial, "it is empty".into());
+                    let seat = self.seat(keys.key_at(row).ok_or_else(empty)?);
+                    seen.put(&keys, row, seat);
+                    seat
+                }
+            };
+            read(row, &mut self.units[seat.unit].1, seat.place)?;
+        }
+        Ok(())
+    }
+
+    /// The rows of a unit, and the number of the place of one that comes.
+    pub(crate) fn of_unit(&mut self, who: RowKey<'_>) -> (&mut UnitRows<R>, u32) {
+        let seat = self.seat(who);
+        (&mut self.units[seat.unit].1, seat.place)
+    }
+
+    fn seat(&mut self, who: RowKey<'_>) -> Seat {
+        let unit = self.unit(who.part_number, who.serial_number);
+        Seat { unit, place: self.units[unit].1.places.number(who.tail_number, who.position) }
+    }
+
+    /// Index of a unit. Most tables have one unit's rows together, or the units in one order in every run.
+    fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
+        let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
+        let units = &self.units;
+        let follows = self.follows.get(self.last).copied();
+        let expected = [Some(self.last), follows].into_iter().flatten();
+        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|u| is(&u.0))) {
+            self.last = unit;
+            return unit;
+        }
+        let known = self.by_serial.get(serial_number);
+        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].0)));
+        let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
+        self.follows[self.last] = unit;
+        self.last = unit;
+        unit
+    }
+
+    fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
+        let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
+        self.by_serial.entry(name.1.clone()).or_default().push(unit);
+        self.units.push((name, UnitRows::default()));
+        self.follows.push(0);
+        unit
+    }
+
+    /// The rows of each unit.
+    pub(crate) fn into_parts(self) -> PartsByUnit<R> {
+        self.units.into_iter().map(|(name, rows)| (name, vec![rows])).collect()
+    }
+}
+
+/// The rows of a table in several parts by unit, added by all workers in shares: the same result as if one worker had added
+/// all parts in order.
+///
+/// # Errors
+/// The first of the parts' errors.
+pub(crate) fn of_parts<R: Send>(
+    parts: usize,
+    put: impl Fn(&mut RowsByUnit<R>, usize) -> Result<(), Error> + Sync,
+) -> Result<PartsByUnit<R>, Error> {
+    let share = parts.div_ceil(SHARES * rayon::current_num_threads()).max(1);
+    let shares: Vec<usize> = (0..parts).step_by(share).collect();
+    let rows = |first: &usize| {
+        let mut rows = RowsByUnit::default();
+        (*first..parts.min(first + share)).try_for_each(|part| put(&mut rows, part))?;
+        Ok(rows)
+    };
+    let of_shares: Vec<Result<RowsByUnit<R>, Error>> = shares.par_iter().map(rows).collect();
+    let mut found = PartsByUnit::new();
+    for rows in of_shares {
+        for (name, rows) in rows?.units {
+            found.entry(name).or_default().push(rows);
+        }
+    }
+    Ok(found)
+}
+
+/// The rows of the store by unit; `put` adds a batch.
+///
+/// # Errors
+/// When a part cannot be read, and what `put` cannot take.
+pub(crate) fn of_store<R: Send>(
+    scan: &ColumnScan,
+    put: impl Fn(&mut RowsByUnit<R>, &TableBatch, &RecordBatch) -> Result<(), ingest::Error> + Sync,
+) -> Result<PartsByUnit<R>, Error> {
+    of_parts(scan.len(), |rows, part| {
+        scan.read(part)?.iter().try_for_each(|batch| {
+            let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
+            put(rows, &chunk, batch).map_err(|e| Error::refused(e.diagnostic()))
+        })
+    })
+}
+
+/// The number of a row.
+pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
+    numbers.is_valid(row).then(|| numbers.value(row))
+}
