@@ -14,8 +14,9 @@ use pipeline::assess::changes::{Cause, UnitChange};
 use pipeline::findings::monitoring::recorder_change::RecorderChange;
 use pipeline::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use pipeline::fleet::histories::Histories;
+use pipeline::logs::plan::StandingError;
 use pipeline::run::scheduler::{self, Context};
-use pipeline::run::summary::LogError;
+use pipeline::run::summary::{DuplicateLog, LogError};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::Quantity;
 use records::TrendRow;
@@ -253,10 +254,7 @@ fn failures(report: &RunSummary, page: &mut String) {
             lines.dedup();
         }
     }
-    lines.iter().take(MAX_SHOWN).for_each(|text| line(page, "", text));
-    if let Some(more @ 1..) = lines.len().checked_sub(MAX_SHOWN) {
-        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
-    }
+    first_lines(page, "", lines, MAX_SHOWN, "");
 }
 
 /// Lists the units of the tables of work that were never installed, and the installations that are still to come.
@@ -287,40 +285,44 @@ fn some_of(
     all: impl IntoIterator<Item: ToString, IntoIter: ExactSizeIterator>,
     page: &mut String,
 ) {
-    const MAX_SHOWN: usize = 5;
+    first_lines(page, head, all, MAX_FINDINGS, noun);
+}
+
+/// Findings of one kind that are printed.
+const MAX_FINDINGS: usize = 5;
+
+/// Prints the first of some lines, each after a label, and how many more there are.
+fn first_lines(
+    page: &mut String,
+    head: &str,
+    all: impl IntoIterator<Item: ToString, IntoIter: ExactSizeIterator>,
+    most: usize,
+    noun: &str,
+) {
     let all = all.into_iter();
-    let more = all.len().saturating_sub(MAX_SHOWN);
-    all.take(MAX_SHOWN).for_each(|finding| line(page, head, &finding.to_string()));
+    let more = all.len().saturating_sub(most);
+    all.take(most).for_each(|text| line(page, head, &text.to_string()));
     if more > 0 {
-        line(
-            page,
-            "",
-            &format!("and {}, all in `freeplay run --json`", count(more, &format!("more {noun}"))),
-        );
+        let more =
+            if noun.is_empty() { format!("{more} more") } else { count(more, &format!("more {noun}")) };
+        line(page, "", &format!("and {more}, all in `freeplay run --json`"));
     }
 }
 
 /// Lists the logs that are copies of others.
 fn duplicates(report: &RunSummary, page: &mut String) {
-    const MAX_SHOWN: usize = 5;
-    for (at, copy) in report.duplicates.iter().take(MAX_SHOWN).enumerate() {
-        if at == 0 {
-            let text = format!(
-                "{} with the samples of another log; not used",
-                count(report.duplicates.len(), "log")
-            );
-            line(page, "duplicates", &text);
-        }
-        line(page, "", &format!("{}  copy of {}", escape(&copy.log), escape(&copy.owner)));
+    let copies = &report.duplicates;
+    if copies.is_empty() {
+        return;
     }
-    if let Some(more @ 1..) = report.duplicates.len().checked_sub(MAX_SHOWN) {
-        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
-    }
+    let text = format!("{} with the samples of another log; not used", count(copies.len(), "log"));
+    line(page, "duplicates", &text);
+    let name = |copy: &DuplicateLog| format!("{}  copy of {}", copy.log, copy.owner);
+    first_lines(page, "", copies.iter().map(name), MAX_FINDINGS, "");
 }
 
 /// Logs that failed in earlier runs and have not changed since.
 fn standing_errors(report: &RunSummary, page: &mut String) {
-    const MAX_SHOWN: usize = 5;
     let logs = &report.standing_errors;
     if logs.is_empty() {
         return;
@@ -328,15 +330,13 @@ fn standing_errors(report: &RunSummary, page: &mut String) {
     let text =
         format!("{} of earlier runs; after fixing them: `freeplay run --retry`", count(logs.len(), "log"));
     line(page, "still failed", &text);
-    for error in logs.iter().take(MAX_SHOWN) {
+    let name = |error: &StandingError| {
         // A duplicate names the log that owns its flight.
         let detail = error.detail.lines().find(|line| line.contains("another log holds the same flight"));
-        let detail = detail.map(|line| format!("  {}", escape(line.trim()))).unwrap_or_default();
-        line(page, "", &format!("{}  {}{detail}", escape(&error.log), error.code));
-    }
-    if let Some(more @ 1..) = logs.len().checked_sub(MAX_SHOWN) {
-        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
-    }
+        let detail = detail.map(|line| format!("  {}", line.trim())).unwrap_or_default();
+        format!("{}  {}{detail}", error.log, error.code)
+    };
+    first_lines(page, "", logs.iter().map(name), MAX_FINDINGS, "");
 }
 
 /// Run summary as text.
@@ -407,16 +407,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             "remaining",
             &format!("{} not processed; the next run processes them", count(report.not_reached, "log")),
         );
-        for log in report.not_reached_logs.iter().take(10) {
-            line(&mut page, "", &escape(log));
-        }
-        if report.not_reached > 10 {
-            line(
-                &mut page,
-                "",
-                &format!("and {} more, all in `freeplay run --json`", report.not_reached - 10),
-            );
-        }
+        first_lines(&mut page, "", &report.not_reached_logs, 10, "");
     }
     if !report.quiet.is_empty() {
         let tails: Vec<String> = report
