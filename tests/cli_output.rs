@@ -181,6 +181,12 @@ fn rows_come_as_table_json_csv_and_parquet() {
     assert_eq!(csv.lines().count(), 13);
     let gap: f64 = csv.lines().nth(1).unwrap().split(',').nth(12).unwrap().parse().unwrap();
     assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both formats hold bitwise identical values");
+    let flags = csv.lines().next().unwrap().split(',').position(|name| name == "flags").unwrap();
+    for (line, row) in csv.lines().skip(1).zip(&json) {
+        let joined: Vec<_> =
+            row["flags"].as_array().unwrap().iter().filter_map(|flag| flag.as_str()).collect();
+        assert_eq!(line.split(',').nth(flags), Some(joined.join(";").as_str()));
+    }
     fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
     assert_eq!(crate::harness::Table::read(&fleet.path("all.parquet")).rows(), 12);
     assert!(fleet.run_ok(&["trend"]).contains(" units as of "));

@@ -1,6 +1,7 @@
 """Compares docs/dashboards with the models of Grafana and Prometheus."""
 
 import json
+import re
 
 import grafana_foundation_sdk.cog.plugins as plugins
 import promql_parser
@@ -22,6 +23,23 @@ def lost(given, kept, place: str = "") -> list[str]:
     return [] if given == kept else [f"{place} is {given!r}, kept as {kept!r}"]
 
 
+def check_panels(panels: list[dict]) -> None:
+    """Identifiers are unique, no panel overlaps another on a grid of 24 columns, and each target asks for one metric of the
+    chosen data source and machine."""
+    assert len({panel["id"] for panel in panels}) == len(panels)
+    taken: set[tuple[int, int]] = set()
+    for panel in panels:
+        x, y, w, h = (panel["gridPos"][key] for key in "xywh")
+        cells = {(column, row) for column in range(x, x + w) for row in range(y, y + h)}
+        assert cells and x + w <= 24 and not cells & taken, panel["title"]
+        taken |= cells
+        targets = panel["targets"]
+        assert len({target["refId"] for target in targets}) == len(targets), panel["title"]
+        for target in targets:
+            assert target["datasource"]["uid"] == "${datasource}", panel["title"]
+            assert len(re.findall(r'freeplay_\w+{instance=~"\$instance"}', target["expr"])) == 1, target["expr"]
+
+
 def dashboard() -> list[str]:
     """The dashboard survives Grafana's model; its expressions."""
     plugins.register_default_plugins()
@@ -29,6 +47,8 @@ def dashboard() -> list[str]:
         given = json.load(file)
     kept = json.loads(json.dumps(Dashboard.from_json(given), cls=JSONEncoder))
     assert lost(given, kept) == [], lost(given, kept)
+    assert [variable["name"] for variable in given["templating"]["list"]] == ["datasource", "instance"]
+    check_panels(given["panels"])
     return [target["expr"].replace("$instance", ".*") for panel in given["panels"] for target in panel["targets"]]
 
 
@@ -38,6 +58,7 @@ def rules() -> list[str]:
         groups = yaml.safe_load(file)["groups"]
     found = [rule for group in groups for rule in group["rules"]]
     assert all(set(rule) <= {"alert", "expr", "for", "labels", "annotations"} for rule in found)
+    assert all(set(rule["annotations"]) == {"summary", "remedy"} and rule["labels"].keys() == {"severity"} for rule in found)
     return [rule["expr"] for rule in found]
 
 

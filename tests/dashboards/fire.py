@@ -138,6 +138,8 @@ def check_rules(work: Path) -> int:
     with open("docs/dashboards/prometheus-rules.yml") as file:
         rules = {rule["alert"]: rule for group in yaml.safe_load(file)["groups"] for rule in group["rules"]}
     sound, bad = nights(work)
+    shown = set(re.findall(r"freeplay_\w+", Path("docs/dashboards/grafana.json").read_text()))
+    assert shown == set(sound), f"the dashboard shows all metrics and no other: {shown ^ set(sound)}"
     completed, newest = (sound[f"freeplay_{name}_timestamp_seconds"] for name in ("run_completed", "newest_departure"))
     # Nothing runs for 31 hours, nothing arrives for eight days, and nothing is written.
     at = {"FreeplayRunOverdue": completed + 31 * 3600, "FreeplayNoNewFlights": newest + 8 * 86400}

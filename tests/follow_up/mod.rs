@@ -1,22 +1,19 @@
-//! What follows from a run: alerts, work requests, and the dashboards of its metrics.
+//! What follows from a run: alerts and work requests.
 
 use std::sync::OnceLock;
 
-use crate::harness::{TestFleet, copy};
+use crate::harness::TestFleet;
 
 /// A copy of the small fleet with the results of all its logs.
 fn processed_fleet() -> TestFleet {
     static PROCESSED: OnceLock<TestFleet> = OnceLock::new();
-    let processed = PROCESSED.get_or_init(|| {
+    TestFleet::once(&PROCESSED, || {
         let fleet = TestFleet::sample();
         // No unit needs attention within one hour.
         fleet.configure(LONG_HORIZON, SHORT_HORIZON);
         fleet.run_ok(&["run", "--quiet"]);
         fleet
-    });
-    let fleet = TestFleet::empty();
-    copy(&processed.path(""), &fleet.path(""));
-    fleet
+    })
 }
 
 /// Two units could reach their limit within 500 hours, none within one (README).
@@ -24,6 +21,5 @@ const LONG_HORIZON: &str = "planning_horizon_hours = 500.0";
 const SHORT_HORIZON: &str = "planning_horizon_hours = 1.0";
 
 mod alerts;
-mod dashboards;
 mod same_story;
 mod work;

@@ -55,6 +55,21 @@ fn hostile_tables_are_refused_with_code_2() {
         assert_eq!(result.code, Some(2), "{}: {}", hostile.name, result.err);
         assert!(!result.err.contains("panic"), "{}: {}", hostile.name, result.err);
     }
+    // CSV: columns, rows and names beyond what any table has, each with a short answer.
+    let sound = std::fs::read_to_string(fleet.path("sample-data/installations.csv")).unwrap();
+    let columns: String = (0..200_000).map(|k| format!("c{k},")).collect();
+    let name = "p".repeat(1_000_000);
+    fleet.configure("table.parquet", "table.csv");
+    for (text, says) in [
+        (columns + &sound, "claims 200008 columns"),
+        (sound.clone() + &"N412FP,x,y,z,no date,,,\n".repeat(300_000), "299997 more"),
+        (format!("{sound}N412FP,{name},EMA-27-1040,1,2026-01-01,,,\n"), "a position of 1000000 bytes"),
+    ] {
+        std::fs::write(fleet.path("table.csv"), text).unwrap();
+        let result = limited(&fleet, "run", 1 << 20);
+        assert!(result.code == Some(2) && result.err.contains(says), "{says}: {}", result.err);
+        assert!(result.err.len() < 5000, "{says}: {} bytes", result.err.len());
+    }
 }
 
 #[cfg(unix)]
@@ -133,7 +148,7 @@ fn a_log_in_a_folder_of_other_tails_is_an_error_until_its_tail_is_allowed() {
     assert!(failed.out.contains("4 stored records of logs that failed now stay"), "{}", failed.out);
 }
 
-/// A pipe, and folders that hold links to each other, among the logs.
+/// A pipe, folders that hold links to each other, and two names that differ in bytes that are no text, among the logs.
 #[cfg(unix)]
 #[test]
 fn pipes_and_loops_are_named_and_the_logs_are_stored() {
@@ -145,6 +160,11 @@ fn pipes_and_loops_are_named_and_the_logs_are_stored() {
     }
     let pipe = folder.join("pipe.parquet");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    // Other systems refuse such names.
+    for (log, byte) in fleet.logs().iter().zip([0xfe, 0xff_u8]).filter(|_| cfg!(target_os = "linux")) {
+        let name = <std::ffi::OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(&[byte]).to_owned();
+        std::fs::rename(log, log.with_file_name(name).with_extension("parquet")).unwrap();
+    }
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
     assert!(result.out.contains("120 records of 30 flights"), "{}", result.out);

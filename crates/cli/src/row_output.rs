@@ -8,11 +8,12 @@ use arrow::array::{Array, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
 use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
 use arrow::json::writer::{JsonArray, LineDelimited, WriterBuilder as JsonWriter};
 use parquet::arrow::ArrowWriter;
 use records::Diagnostic;
 use records::row_schema::{Row, to_nullable_batch};
-use records::sanitize::escape_invisible;
+use records::sanitize::{csv_cell, escape_invisible};
 
 use crate::args::{Format, RowFormatArgs};
 use crate::exit::Failure;
@@ -121,7 +122,7 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
         Format::Csv => CsvWriter::new()
             .with_header(true)
             .build(&mut *out)
-            .write(&store::csv_safe(&flat(batch)?).map_err(|e| broken(&e))?)
+            .write(&csv_safe(&flat(batch)?).map_err(|e| broken(&e))?)
             .map_err(|e| broken(&e))?,
         Format::Parquet => {
             let fail = |e: parquet::errors::ParquetError| broken(&e.into());
@@ -133,11 +134,20 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
     Ok(out.flush()?)
 }
 
-fn broken(error: &arrow::error::ArrowError) -> Failure {
+fn broken(error: &ArrowError) -> Failure {
     if error.to_string().contains("Broken pipe") {
         return Failure::PipeClosed;
     }
     Failure::failed(Diagnostic::new("output_failed", format!("the output cannot be written: {error}")))
+}
+
+/// The same rows with text that no spreadsheet takes for a formula.
+fn csv_safe(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let safe = |column: &Arc<dyn Array>| -> Arc<dyn Array> {
+        let Some(texts) = column.as_string_opt::<i32>() else { return Arc::clone(column) };
+        Arc::new(texts.iter().map(|text| text.map(csv_cell)).collect::<StringArray>())
+    };
+    RecordBatch::try_new(batch.schema(), batch.columns().iter().map(safe).collect())
 }
 
 /// Flattens lists for CSV: scalar items are separated by semicolons, nested ones written as JSON.

@@ -4,7 +4,6 @@
 //! A file of a kilobyte may claim 2³¹ row groups, values or bytes. Each claim is compared with what the file can hold
 //! and with what any recorder writes. `docs/limits.md` lists the bounds; a configured one names its key.
 
-use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes of a footer: 1 KiB for each of 262,144 column chunks.
@@ -37,7 +36,8 @@ pub fn set_max_rows(rows: u64) {
 }
 
 /// A claim of a file beyond a bound.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the file claims {found} {what}, more than the limit of {most}")]
 pub struct Excess {
     /// What is counted.
     pub what: &'static str,
@@ -47,13 +47,6 @@ pub struct Excess {
     pub most: u64,
     /// The key that raises the bound.
     pub key: Option<&'static str>,
-}
-
-impl fmt::Display for Excess {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { what, found, most, .. } = self;
-        write!(f, "the file claims {found} {what}, more than the limit of {most}")
-    }
 }
 
 /// Compares a claim with its bound.

@@ -44,7 +44,6 @@ mod read;
 mod store_dir;
 mod write;
 
-pub use admin::export::{Format, csv_safe};
 pub use admin::info::Info;
 pub use delta::foreign_table::{LiveFile, live_files};
 pub use error::Error;

@@ -156,28 +156,33 @@ impl Log {
         let mapping = &self.mapping.identity;
         let fail = |fault| self.main.error(fault);
         let mut facts = facts(&self.main, mapping)?;
-        // A day has several flights: the time comes from the flights table, or from the clock.
-        let take_date = |facts: &mut IdentityFields| {
-            let date = identity::date_alone(facts.get(&IdentityField::DepartureUtc)?, mapping);
-            date.inspect(|_| drop(facts.remove(&IdentityField::DepartureUtc)))
-        };
-        let date = take_date(&mut facts);
-        let fill = |facts: &mut IdentityFields, found: IdentityFields| {
+        let date =
+            facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
+        if date.is_some() {
+            // A day has several flights: the time comes from the flights table, or from the clock.
+            facts.remove(&IdentityField::DepartureUtc);
+        }
+        // Adds what the flights table knows; its departure, an instant or a date, is not in the form of the log's.
+        let fill = |facts: &mut IdentityFields, mut found: IdentityFields| {
+            let departure = found.remove(&IdentityField::DepartureUtc);
             for (fact, text) in found {
                 facts.entry(fact).or_insert(text);
             }
+            departure.filter(|_| !facts.contains_key(&IdentityField::DepartureUtc))
         };
+        let instant = |text: Option<String>| text?.parse::<Timestamp>().ok();
         // Of several flights of one id, the one near noon of the date is that of the date.
         let noon = date.and_then(|date| date.at(12, 0, 0, 0).to_zoned(TimeZone::UTC).ok());
         let found = known(&facts, noon.map(|noon| noon.timestamp()));
-        fill(&mut facts, found);
-        let date = take_date(&mut facts).or(date);
-        if facts.contains_key(&IdentityField::DepartureUtc) {
-            return identity::read(&facts, mapping, None).map_err(fail);
+        let of_table = fill(&mut facts, found);
+        let date = of_table.as_ref().and_then(|text| text.parse().ok()).or(date);
+        let departure = instant(of_table);
+        if departure.is_some() || facts.contains_key(&IdentityField::DepartureUtc) {
+            return identity::read(&facts, mapping, departure).map_err(fail);
         }
         let clock = self.clock_span()?;
         let absolute = clock.and_then(|clock| clock.start(mapping)).transpose().map_err(fail)?;
-        let start = match (date, facts.get(&IdentityField::LandingUtc)) {
+        let mut start = match (date, facts.get(&IdentityField::LandingUtc)) {
             (Some(date), _) => Some(identity::departure_on(date, absolute, clock, mapping).map_err(fail)?),
             (None, Some(landing)) if absolute.is_none() => {
                 Some(identity::departure_before(landing, &facts, clock, mapping).map_err(fail)?)
@@ -186,8 +191,7 @@ impl Log {
         };
         if start.is_some() {
             let found = known(&facts, start);
-            fill(&mut facts, found);
-            take_date(&mut facts);
+            start = instant(fill(&mut facts, found)).or(start);
         }
         identity::read(&facts, mapping, start).map_err(fail)
     }

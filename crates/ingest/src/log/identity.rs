@@ -260,11 +260,7 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
     let local = match &mapping.departure_format {
         Some(format) => {
             let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
-            let parsed = match jiff::fmt::strtime::parse(format, text) {
-                Ok(parsed) => parsed,
-                // The flights table has instants of its own form.
-                Err(error) => return text.parse().map_err(|_| other(error)),
-            };
+            let parsed = jiff::fmt::strtime::parse(format, text).map_err(other)?;
             if let Ok(instant) = parsed.to_timestamp() {
                 return Ok(instant);
             }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+use std::str::Utf8Chunk;
 
 use ingest::LogFiles;
 use jiff::Timestamp;
@@ -324,8 +325,15 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 
+/// The path of a log in records and messages. Bytes that are no text are written as `%FF`, so that each file has a path of
+/// its own.
 fn log_path(config: &Config, path: &Path) -> String {
-    path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
+    let path = path.strip_prefix(&config.folder).unwrap_or(path);
+    let as_text = |chunk: Utf8Chunk<'_>| {
+        let others: String = chunk.invalid().iter().map(|byte| format!("%{byte:02X}")).collect();
+        chunk.valid().replace('\\', "/") + &others
+    };
+    path.as_os_str().as_encoded_bytes().utf8_chunks().map(as_text).collect()
 }
 
 #[cfg(test)]

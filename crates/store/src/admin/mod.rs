@@ -1,6 +1,5 @@
-//! Store administration: run log, summary, verification and export.
+//! Store administration: run log, summary, verification and withdrawal.
 
-pub(crate) mod export;
 pub(crate) mod follow_up;
 pub(crate) mod info;
 pub(crate) mod run_log;

@@ -4,25 +4,16 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path as FsPath, PathBuf};
 
-/// Writes a whole file under a new name. `false` when a file with other content has that name.
-pub(crate) fn create(path: &FsPath, content: &[u8]) -> io::Result<bool> {
-    create_parts(path, &[content])
-}
-
-/// Writes a whole file; replaces a file of the same name.
-pub(crate) fn replace(path: &FsPath, content: &[u8]) -> io::Result<()> {
-    replace_parts(path, &[content])
-}
-
 /// Makes the entries of a folder durable.
 pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
     if cfg!(unix) { File::open(dir)?.sync_all() } else { Ok(()) }
 }
 
-/// Only the link itself reports that the name is taken: other calls give `AlreadyExists` for other reasons.
+/// Writes a whole file under a new name. `false` when a file with other content has that name.
 ///
-/// A name that is taken by the same content counts as written, since the reply to an earlier link may have been lost.
-pub(crate) fn create_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
+/// Only the link itself reports that the name is taken: other calls give `AlreadyExists` for other reasons. A name that is
+/// taken by the same content counts as written, since the reply to an earlier link may have been lost.
+pub(crate) fn create(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
     let (dir, staged) = stage(path, parts)?;
     let linked = std::fs::hard_link(&staged, path);
     // Best effort: a staged file that is left is ignored by readers and replaced by the next write.
@@ -36,7 +27,8 @@ pub(crate) fn create_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
     Ok(is_ours)
 }
 
-pub(crate) fn replace_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
+/// Writes a whole file; replaces a file of the same name.
+pub(crate) fn replace(path: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
     let (dir, staged) = stage(path, parts)?;
     if let Err(error) = std::fs::rename(&staged, path) {
         let _ = std::fs::remove_file(&staged);
@@ -98,9 +90,9 @@ mod tests {
     fn an_existing_file_is_distinguished_from_one_with_the_same_content() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a");
-        assert!(create(&path, b"one").unwrap());
-        assert!(create(&path, b"one").unwrap(), "the same content counts as written");
-        assert!(!create(&path, b"two").unwrap());
+        assert!(create(&path, &[b"one"]).unwrap());
+        assert!(create(&path, &[b"one"]).unwrap(), "the same content counts as written");
+        assert!(!create(&path, &[b"two"]).unwrap());
         assert_eq!(std::fs::read(&path).unwrap(), b"one");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no staged file is left");
     }
@@ -112,7 +104,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("table");
         std::os::unix::fs::symlink(dir.path().join("nowhere"), &folder).unwrap();
-        let error = create(&folder.join("a"), b"one").unwrap_err();
+        let error = create(&folder.join("a"), &[b"one"]).unwrap_err();
         assert_ne!(error.kind(), io::ErrorKind::AlreadyExists);
     }
 }

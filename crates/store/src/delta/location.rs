@@ -188,9 +188,9 @@ impl Location {
     /// A file of that name with other content is damaged and is replaced: no commit can mean it.
     pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else {
-            return match durable_fs::create(path, content) {
+            return match durable_fs::create(path, &[content]) {
                 Ok(true) => Ok(()),
-                Ok(false) => durable_fs::replace(path, content).map_err(Error::io(path, "written")),
+                Ok(false) => durable_fs::replace(path, &[content]).map_err(Error::io(path, "written")),
                 Err(error) => Err(Error::io(path, "written")(error)),
             };
         };
@@ -207,7 +207,7 @@ impl Location {
         let path = self.dir.join(name);
         match &self.bucket {
             Some(bucket) => Ok(self.put(bucket, &path, content, PutMode::Overwrite)?),
-            None => durable_fs::replace(&path, content).map_err(Error::io(path, "written")),
+            None => durable_fs::replace(&path, &[content]).map_err(Error::io(path, "written")),
         }
     }
 

@@ -26,7 +26,7 @@ use deltalake::logstore::object_store::{
 use futures::stream::{self, BoxStream};
 use futures::{StreamExt, TryStreamExt};
 
-use crate::delta::durable_fs::{create_parts, replace_parts};
+use crate::delta::durable_fs;
 
 /// Folder of the log.
 pub(crate) const LOG: &str = "_delta_log";
@@ -70,12 +70,12 @@ impl LogStorage {
         let path = local.path_to_filesystem(location)?;
         let parts: Vec<&[u8]> = payload.iter().map(AsRef::as_ref).collect();
         match options.mode {
-            PutMode::Create if create_parts(&path, &parts).map_err(failed)? => {}
+            PutMode::Create if durable_fs::create(&path, &parts).map_err(failed)? => {}
             PutMode::Create => {
                 let source = io::Error::from(io::ErrorKind::AlreadyExists).into();
                 return Err(Error::AlreadyExists { path: location.to_string(), source });
             }
-            PutMode::Overwrite => replace_parts(&path, &parts).map_err(failed)?,
+            PutMode::Overwrite => durable_fs::replace(&path, &parts).map_err(failed)?,
             PutMode::Update(_) => return self.inner.put_opts(location, payload, options).await,
         }
         Ok(PutResult { e_tag: None, version: None })

@@ -1,11 +1,9 @@
 //! Public API of the store.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-#![allow(clippy::print_stdout, reason = "measurements are printed")]
 
 mod commits;
 mod crash_recovery;
-mod exports;
 mod fixtures;
 mod folder;
 mod fuzz;
@@ -13,4 +11,3 @@ mod maintenance;
 mod queries;
 mod round_trip;
 mod runs;
-mod timings;
