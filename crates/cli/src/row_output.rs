@@ -8,6 +8,7 @@ use arrow::array::{Array, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
 use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
 use arrow::json::writer::{JsonArray, LineDelimited, WriterBuilder as JsonWriter};
 use parquet::arrow::ArrowWriter;
 use records::Diagnostic;
@@ -133,7 +134,7 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
     Ok(out.flush()?)
 }
 
-fn broken(error: &arrow::error::ArrowError) -> Failure {
+fn broken(error: &ArrowError) -> Failure {
     if error.to_string().contains("Broken pipe") {
         return Failure::PipeClosed;
     }
@@ -176,4 +177,26 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
 /// If there are more rows than a batch can hold.
 pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
     to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
+}
+
+/// Columns of a batch in the order of their names; `texts` are columns that it does not have.
+///
+/// # Errors
+/// If a name is unknown.
+pub(crate) fn columns(
+    batch: &RecordBatch,
+    names: &[&str],
+    texts: &[(&str, StringArray)],
+) -> Result<RecordBatch, Failure> {
+    let column = |name: &&str| -> Result<(String, Arc<dyn Array>, bool), ArrowError> {
+        let added = texts.iter().find(|(added, _)| added == name);
+        let added = added.map(|(_, column)| Arc::new(column.clone()) as Arc<dyn Array>);
+        let column = match added {
+            Some(column) => column,
+            None => Arc::clone(batch.column(batch.schema().index_of(name)?)),
+        };
+        Ok(((*name).to_owned(), column, true))
+    };
+    let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>().map_err(|e| broken(&e))?;
+    RecordBatch::try_from_iter_with_nullable(columns).map_err(|e| broken(&e))
 }
