@@ -28,7 +28,8 @@ def mail(alert: dict, to: str, sender: str) -> email.message.EmailMessage:
     lines = [one_line, ""]
     for unit in alert.get("units", [alert]):
         lines.append(line(f"{unit['state']}: {unit['part_number']} / {unit['serial_number']}, {unit['tail_number']}"))
-        lines.append("    " + line(f"{unit['reason']}; work request {unit['work_request'] or 'none'}"))
+        why, due = unit.get("statement") or unit["reason"], unit.get("due_utc") or "without a date"
+        lines.append("    " + line(f"due {due}; {why}; work request {unit['work_request'] or 'none'}"))
     message.set_content("\n".join(lines) + "\n")
     return message
 

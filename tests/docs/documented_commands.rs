@@ -192,7 +192,7 @@ fn masked(text: &str) -> Vec<String> {
         (r"\d+(\.\d+)? ([kM]i?B|bytes)\b", "SIZE"),
         (r"\b[0-9a-f]{12,}\b", "DIGEST"),
         (r"\d+ workers?", "WORKERS"),
-        (r"\d+ days? old", "AGE"),
+        (r"newest log [^,]+, \d+ days? old", "AGE"),
         (r"slowest log +\S+ ", "slowest"),
         (r" +", " "),
     ];

@@ -187,3 +187,25 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
 pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
     to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
 }
+
+/// Columns of a batch in the order of their names; `texts` are columns that it does not have.
+///
+/// # Errors
+/// If a name is unknown.
+pub(crate) fn columns(
+    batch: &RecordBatch,
+    names: &[&str],
+    texts: &[(&str, StringArray)],
+) -> Result<RecordBatch, Failure> {
+    let column = |name: &&str| -> Result<(String, Arc<dyn Array>, bool), ArrowError> {
+        let added = texts.iter().find(|(added, _)| added == name);
+        let added = added.map(|(_, column)| Arc::new(column.clone()) as Arc<dyn Array>);
+        let column = match added {
+            Some(column) => column,
+            None => Arc::clone(batch.column(batch.schema().index_of(name)?)),
+        };
+        Ok(((*name).to_owned(), column, true))
+    };
+    let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>().map_err(|e| broken(&e))?;
+    RecordBatch::try_from_iter_with_nullable(columns).map_err(|e| broken(&e))
+}

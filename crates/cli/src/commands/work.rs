@@ -121,7 +121,7 @@ fn page(found: &[WorkRequest], units: &BTreeMap<UnitKey, TrendRow>) -> String {
     let counts = ["open", "acknowledged", "deferred", "closed"].map(|status| (with(status), status));
     let counts = counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, status)| format!("{n} {status}"));
     let head = format!("{}: {}\n", count(found.len(), "work request"), counts.collect::<Vec<_>>().join(", "));
-    let next = found.iter().find(|request| request.is_open()).map_or_else(String::new, |request| {
+    let next = found.iter().find(|request| request.status == "open").map_or_else(String::new, |request| {
         let id = &request.request_id;
         format!(
             "next: `freeplay work acknowledge {id}`, `defer {id} --until DATE --reason TEXT`, or\n      \

@@ -1,5 +1,6 @@
 //! Message of an alert: one JSON document, made once and sent unchanged in every attempt.
 
+use records::TrendRow;
 use records::sanitize::escape_cell;
 use serde_json::{Value, json};
 
@@ -66,6 +67,7 @@ pub(super) fn baseline(id: &str, known: &[&Finding], selected: &[&Finding], run_
 }
 
 fn unit_fields(finding: &Finding) -> Value {
+    let row = finding.assessment.as_ref();
     json!({
         "part_number": finding.unit.0,
         "serial_number": finding.serial_number(),
@@ -74,14 +76,14 @@ fn unit_fields(finding: &Finding) -> Value {
         "quantity": finding.quantity,
         "state": word(finding.state),
         "reason": finding.reason,
-        "statement": finding.statement,
-        "due_utc": finding.due_utc,
+        "statement": row.map(TrendRow::statement_text),
+        "due_utc": row.and_then(|row| row.due_utc),
         "since_utc": finding.since_utc,
         "as_of_utc": finding.as_of_utc,
-        "gap_m": finding.gap_m,
-        "limit_m": finding.limit_m,
-        "not_before_utc": finding.not_before_utc,
-        "likely_utc": finding.likely_utc,
+        "gap_m": row.and_then(|row| row.gap_m),
+        "limit_m": row.and_then(|row| row.limit_m),
+        "not_before_utc": row.and_then(|row| row.not_before_utc),
+        "likely_utc": row.and_then(|row| row.likely_utc),
         "work_request": finding.work_request,
     })
 }
@@ -100,8 +102,9 @@ fn change_text(from: Option<&str>, to: &Finding) -> String {
         _ => String::new(),
     };
     let quantity = if to.quantity == GAP { String::new() } else { format!("{} ", to.quantity) };
-    let due = to.due.as_deref().map(|due| format!(", due {due}")).unwrap_or_default();
-    let why = to.statement.as_ref().or(to.reason.as_ref());
+    let due = to.assessment.as_ref().and_then(TrendRow::due_text);
+    let due = due.map(|due| format!(", due {due}")).unwrap_or_default();
+    let why = to.assessment.as_ref().map(TrendRow::statement_text).or_else(|| to.reason.clone());
     let why = why.map(|why| format!(" ({why})")).unwrap_or_default();
     let name = match (to.serial_number(), &to.tail_number) {
         (Some(serial), _) => format!("{}{place}", unit_text(to.unit.0.as_deref(), serial)),

@@ -25,20 +25,13 @@ pub struct Finding {
     /// `None` of a unit that is not assessed or was removed.
     pub state: Option<&'static str>,
     pub reason: Option<String>,
-    /// Why and how sure, in a few words: [`TrendRow::statement_text`].
-    pub statement: Option<String>,
-    /// Until when something is to be done, for readers: [`TrendRow::due_text`].
-    pub due: Option<String>,
-    pub due_utc: Option<Timestamp>,
     /// First flight of a change that a tail or a part made; none for a unit's state.
     pub since_utc: Option<Timestamp>,
     pub as_of_utc: Timestamp,
     /// Departure of the unit's latest flight.
     pub latest_flight_utc: Option<Timestamp>,
-    pub gap_m: Option<f64>,
-    pub limit_m: Option<f64>,
-    pub not_before_utc: Option<Timestamp>,
-    pub likely_utc: Option<Timestamp>,
+    /// The assessment, of a gap.
+    pub assessment: Option<TrendRow>,
     /// The open work request about it.
     pub work_request: Option<String>,
     /// Why the state is another one than after the run before, where it is.
@@ -55,7 +48,6 @@ impl Finding {
             quantity: row.quantity,
             state: Some(row.state.unwrap_or(UNCHANGED)),
             reason: row.reason.clone(),
-            since_utc: None,
             as_of_utc: row.as_of_utc,
             ..Self::default()
         })
@@ -66,7 +58,6 @@ impl Finding {
         changes.iter().filter(|change| change.serial_number.is_none()).map(move |change| Self {
             unit: (change.part_number.clone(), String::new()),
             tail_number: change.tail_number.clone(),
-            position: None,
             quantity: change.quantity,
             state: change.state,
             reason: Some(change.evidence.clone()),
@@ -95,16 +86,9 @@ impl Finding {
             quantity: GAP,
             state: row.state,
             reason: row.reason.clone(),
-            statement: Some(row.statement_text()),
-            due: row.due_text(),
-            due_utc: row.due_utc,
-            since_utc: None,
             as_of_utc: row.as_of_utc,
             latest_flight_utc,
-            gap_m: row.gap_m,
-            limit_m: row.limit_m,
-            not_before_utc: row.not_before_utc,
-            likely_utc: row.likely_utc,
+            assessment: Some(row.clone()),
             ..Self::default()
         }
     }

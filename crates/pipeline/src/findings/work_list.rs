@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use ::report::StateBadge;
 use jiff::Timestamp;
 use job::Config;
 use records::{TrendRow, WorkRequest};
@@ -41,7 +40,7 @@ impl WorkSelection {
     }
 }
 
-/// The selected requests with the units of the open ones: closed requests last, the others by date until when, urgency and
+/// The selected requests with the units of the open ones: closed requests last, the others by date until when and
 /// age. An open request has the state, reason and date of its unit's present assessment, not those of the last run.
 ///
 /// # Errors
@@ -65,8 +64,7 @@ pub fn work_list(
             (request.finding, request.due_utc) = (row.reason.clone(), row.due_utc);
         }
     }
-    let urgency = |request: &WorkRequest| StateBadge::from_state(request.state.as_deref()).rank();
     let due = |request: &WorkRequest| request.due_utc.unwrap_or(Timestamp::MAX);
-    found.sort_by_key(|request| (!request.is_open(), due(request), urgency(request), request.opened_utc));
+    found.sort_by_key(|request| (!request.is_open(), due(request), request.opened_utc));
     Ok((found, units))
 }

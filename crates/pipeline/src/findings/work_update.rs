@@ -146,11 +146,7 @@ fn of_closed(
 }
 
 fn state_change(request: &WorkRequest, finding: &Finding, now: Timestamp) -> Option<WorkEvent> {
-    // An open request shows the finding of the latest run.
-    let is_other = |state: &&str| {
-        request.state.as_deref() != Some(state) || (request.is_open() && request.finding != finding.reason)
-    };
-    let state = finding.state.filter(is_other)?;
+    let state = finding.state.filter(|state| request.state.as_deref() != Some(state))?;
     Some(WorkEvent {
         event: WorkEventKind::StateChanged,
         state: Some(state.to_owned()),

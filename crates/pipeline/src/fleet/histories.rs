@@ -214,12 +214,6 @@ impl Histories {
         self.units.values().flat_map(History::tails)
     }
 
-    /// The positions of all flights; a position may come several times.
-    pub fn positions(&self) -> impl Iterator<Item = &str> {
-        let places = self.units.values().flat_map(|history| &history.places);
-        places.filter_map(|place| place.position.as_deref())
-    }
-
     /// A unit's flights.
     pub fn get(&self, name: &UnitKey) -> Option<&History> {
         self.units.get(name)

@@ -36,11 +36,8 @@ fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
         quantity: GAP,
         state,
         reason: Some("of a test".to_owned()),
-        since_utc: None,
         as_of_utc,
         latest_flight_utc: Some(as_of_utc),
-        gap_m: Some(1e-4),
-        limit_m: Some(1.5e-4),
         ..Finding::default()
     }
 }
@@ -343,8 +340,6 @@ fn tail_change(day: i64, as_of_day: i64) -> Finding {
         quantity: "skew_s",
         state: Some("recorder_moved"),
         since_utc: Some(at(day)),
-        gap_m: None,
-        limit_m: None,
         ..finding("", None, as_of_day)
     }
 }

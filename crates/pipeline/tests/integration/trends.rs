@@ -113,16 +113,17 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
     }
 }
 
-/// Silent for sixty days: usage has gone on at the unit's own rate, so dates count from the last flight.
+/// Silent for sixty days or four hundred: usage has gone on at the unit's own rate, so dates count from the last flight and
+/// stay when they have passed.
 #[test]
 fn dates_count_from_the_last_flight_at_the_units_own_rate() {
-    let as_of = day(259);
-    for row in assess(&flown(200), as_of) {
-        let dates = [row.not_before_utc, row.likely_utc, row.not_after_utc];
-        assert!(dates.into_iter().flatten().all(|date| date >= as_of), "{dates:?}");
+    let later = assess(&flown(200), day(599));
+    for (row, later) in assess(&flown(200), day(259)).iter().zip(later) {
         let hours = row.likely_utc.unwrap().duration_since(day(199)).as_secs_f64() / 3600.0;
         let expected = row.crossing_hours_p50.unwrap() / HOURS_A_DAY * 24.0;
         assert!((hours / expected - 1.0).abs() < 0.01, "{hours} h, {expected} h");
+        let moved = later.likely_utc.unwrap().duration_since(row.likely_utc.unwrap());
+        assert!(moved.abs() <= DAY, "{moved}");
     }
 }
 

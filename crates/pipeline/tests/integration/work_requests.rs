@@ -37,8 +37,6 @@ struct Desk {
     installations: Vec<Installation>,
     maintenance: MaintenanceLog,
     runs: usize,
-    /// Reason of all findings.
-    wording: String,
 }
 
 impl Desk {
@@ -66,7 +64,6 @@ impl Desk {
                 position: Some("aileron".to_owned()),
                 quantity: GAP,
                 state: *state,
-                reason: Some(self.wording.clone()),
                 since_utc: None,
                 as_of_utc: flight,
                 latest_flight_utc: Some(flight),
@@ -156,25 +153,6 @@ fn a_repair_that_did_not_help_opens_the_next_request_with_its_first_flight() {
     assert_eq!(desk.run_after("2026-03-02", flight, &[("7", Some("act"))]), ["maintained"]);
     assert_eq!(desk.run_after("2026-03-03", flight, &[("7", Some("act"))]), [""; 0], "no flight since");
     assert_eq!(desk.run("2026-03-04", &[("7", Some("act"))]), ["opened"]);
-}
-
-/// The finding of an open request is that of the latest run; a closed one keeps its own.
-#[test]
-fn an_open_request_shows_the_finding_of_the_latest_run() {
-    let mut desk = Desk::with(&[installation("7", "N1", "2026-01-01", None)]);
-    desk.wording = "480 FH left".to_owned();
-    desk.run("2026-03-01", &[("7", Some("plan"))]);
-    desk.wording = "248 FH left".to_owned();
-    assert_eq!(desk.run("2026-03-20", &[("7", Some("plan"))]), ["state_changed"]);
-    assert_eq!(desk.run("2026-03-21", &[("7", Some("plan"))]), [""; 0]);
-    assert_eq!(desk.requests("2026-03-21")[0].finding.as_deref(), Some("248 FH left"));
-    desk.repair("7", "2026-03-22", true);
-    desk.wording = "no record since the maintenance".to_owned();
-    let before = utc("2026-03-21T08:00:00Z");
-    assert_eq!(desk.run_after("2026-03-23", before, &[("7", Some("plan"))]), ["maintained"]);
-    desk.wording = "another".to_owned();
-    assert_eq!(desk.run_after("2026-03-24", before, &[("7", Some("plan"))]), [""; 0]);
-    assert_eq!(desk.requests("2026-03-24")[0].finding.as_deref(), Some("248 FH left"));
 }
 
 /// A repair before the finding, and one that is only planned, close nothing.

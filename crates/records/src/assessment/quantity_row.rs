@@ -3,7 +3,6 @@
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::gap_record::GapEstimate;
 use crate::row;
 
 /// A followed quantity, named like its column of the records; its unit ends the name.
@@ -51,22 +50,6 @@ impl Quantity {
             Self::LoadZeroN => "load_zero_n",
             Self::LoadDelayS => "load_delay_s",
             Self::Nis => "nis",
-        }
-    }
-
-    /// Its value in an estimate.
-    pub fn of_estimate(self, estimate: &GapEstimate) -> Option<f64> {
-        match self {
-            Self::GapM => estimate.gap_m,
-            Self::LostMotionM => estimate.lost_motion_m,
-            Self::StiffnessNPerM => estimate.stiffness_n_per_m,
-            Self::FrictionN => estimate.friction_n,
-            Self::FrictionDryN => estimate.friction_dry_n,
-            Self::FrictionLoadShare => estimate.friction_load_share,
-            Self::SkewS => estimate.skew_s,
-            Self::LoadZeroN => estimate.load_zero_n,
-            Self::LoadDelayS => estimate.load_delay_s,
-            Self::Nis => estimate.nis,
         }
     }
 

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
-use polars::prelude::{SortMultipleOptions, UniqueKeepStrategy};
-use records::{GapRecord, PartNumber, SerialNumber};
+use records::GapRecord;
 
 use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
@@ -39,23 +38,6 @@ impl Store {
     /// As [`Store::scan`]; [`Error::Value`] when a cell is not valid in its column.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         Ok(from_batch(&self.scan(query)?)?)
-    }
-
-    /// Every unit with a record, by part and serial number.
-    ///
-    /// # Errors
-    /// As [`Store::records`].
-    pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
-        let names = ["part_number", "serial_number"];
-        let schema = scan::only(&GapRecord::schema(), &names)?;
-        let rows = self.read_rows(&self.gaps.snapshot()?, &Query::default(), &schema)?;
-        let units = frame::frame(&rows, &names)?.unique_stable(None, UniqueKeepStrategy::Any, None)?;
-        let units = units.sort(names, SortMultipleOptions::default())?;
-        let [parts, serials] = [units.column(names[0])?.str()?, units.column(names[1])?.str()?];
-        let named = |(part, serial): (Option<&str>, Option<&str>)| {
-            Some((PartNumber::new(part?).ok()?, SerialNumber::new(serial?).ok()?))
-        };
-        Ok(parts.iter().zip(serials.iter()).filter_map(named).collect())
     }
 
     /// The different values of a column of texts, in order.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use ingest::ActuatorChannels;
+use ingest::{ActuatorChannels, Quality};
 use job::Config;
 use pipeline::inspect::explain::{Explanation, Recomputation, RecordKey, remedy};
 use records::uncertainty::NORMAL_95;
@@ -149,30 +149,18 @@ fn flat(above: &str, value: &Value) -> Vec<(String, String)> {
 }
 
 fn quality(channels: &ActuatorChannels) -> String {
-    let columns = [
-        text("channel", 0),
-        number("min", 0),
-        number("max", 0),
-        number("resolution", 3),
-        number("rate [Hz]", 2),
-        number("missing [%]", 1),
-        number("spikes", 4),
+    let rows: Vec<_> = ["motor [m]", "screw [m]", "load [N]"].into_iter().zip(&channels.quality).collect();
+    let value = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.6}"));
+    let columns: &table::Columns<'_, (&str, &Quality)> = &[
+        (text("channel", 0), &|(name, _)| (*name).to_owned()),
+        (number("min", 0), &|(_, q)| value(q.span().map(|span| span.0))),
+        (number("max", 0), &|(_, q)| value(q.span().map(|span| span.1))),
+        (number("resolution", 3), &|(_, q)| {
+            q.resolution.map_or_else(table::empty_cell, |r| format!("{r:.2e}"))
+        }),
+        (number("rate [Hz]", 2), &|(_, q)| format!("{:.1}", q.rate_hz)),
+        (number("missing [%]", 1), &|(_, q)| format!("{:.2}", q.missing_share * 100.0)),
+        (number("spikes", 4), &|(_, q)| q.spikes.to_string()),
     ];
-    let rows: Vec<Vec<String>> = ["motor [m]", "screw [m]", "load [N]"]
-        .iter()
-        .zip(&channels.quality)
-        .map(|(name, q)| {
-            let value = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.6}"));
-            vec![
-                (*name).to_owned(),
-                value(q.span().map(|span| span.0)),
-                value(q.span().map(|span| span.1)),
-                q.resolution.map_or_else(table::empty_cell, |r| format!("{r:.2e}")),
-                format!("{:.1}", q.rate_hz),
-                format!("{:.2}", q.missing_share * 100.0),
-                q.spikes.to_string(),
-            ]
-        })
-        .collect();
-    table::layout(&columns, &rows)
+    table::of(&rows, columns)
 }

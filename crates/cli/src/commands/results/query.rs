@@ -1,10 +1,8 @@
 //! `query`: lists stored records by tail, serial, flight or position.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use arrow::array::{RecordBatch, StringArray};
-use arrow::datatypes::{DataType, Field, Schema};
 use clap::ValueEnum;
 use ingest::mapping::column_pattern::nearest;
 use job::Config;
@@ -43,12 +41,7 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
         Format::Table => verdict(&query, &config, &installations, &store)?,
         _ => String::new(),
     };
-    row_output::write_rows(
-        &args.rows,
-        output,
-        || with_remedies(to_batch(&records).map_err(store::Error::from)?, &records),
-        || verdict + &page(&records),
-    )?;
+    row_output::write_rows(&args.rows, output, || with_remedies(&records), || verdict + &page(&records))?;
     if records.is_empty() {
         let names = selected(&query).into_iter().filter_map(|(column, name)| Some((column, name.as_ref()?)));
         let names = names.map(|(column, name)| format!("{} `{name}`", called(column)));
@@ -175,14 +168,11 @@ fn rejection_code(e: &GapEstimate) -> Option<&str> {
 }
 
 /// The rows with the remedy of each rejection as last column.
-fn with_remedies(batch: RecordBatch, records: &[GapRecord]) -> Result<RecordBatch, Failure> {
+fn with_remedies(records: &[GapRecord]) -> Result<RecordBatch, Failure> {
     let remedies: StringArray = records.iter().map(|r| remedy(&r.estimate)).collect();
-    let (schema, mut columns, _) = batch.into_parts();
-    let mut fields: Vec<_> = schema.fields().iter().cloned().collect();
-    fields.push(Arc::new(Field::new("remedy", DataType::Utf8, true)));
-    columns.push(Arc::new(remedies));
-    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns);
-    batch.map_err(|e| Failure::from(std::io::Error::other(e)))
+    let (batch, schema) = (to_batch(records).map_err(store::Error::from)?, GapRecord::schema());
+    let names = schema.fields().iter().map(|field| field.name().as_str());
+    row_output::columns(&batch, &names.chain(["remedy"]).collect::<Vec<_>>(), &[("remedy", remedies)])
 }
 
 /// Load band of an estimate, N.

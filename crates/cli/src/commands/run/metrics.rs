@@ -65,63 +65,63 @@ fn value_in(file: &Path, name: &str) -> Option<f64> {
 fn text(report: &RunSummary, code: Code, completed_before: Option<f64>) -> String {
     let mut text = String::new();
     run_gauges(&mut text, report.started_utc, code);
-    let mut gauge = |name: &str, help: &str, value: f64| gauge(&mut text, name, help, value);
-    let states = |state: &str| report.trends.iter().filter(|row| row.state == Some(state)).count() as f64;
-    let now = Timestamp::now().as_millisecond() as f64 / 1e3;
+    let seconds = |at: Timestamp| at.as_millisecond() as f64 / 1e3;
     let completed =
         matches!(code, Code::Success | Code::LogsInError | Code::StateReached | Code::AlertsNotSent);
-    if let Some(at) = if completed { Some(now) } else { completed_before } {
-        gauge("run_completed_timestamp_seconds", "When a run last completed.", at);
-    }
-    gauge("run_duration_seconds", "Duration of the last run.", report.took_s);
-    gauge("logs_found", "Logs that match the patterns.", report.found as f64);
-    gauge("logs_known", "Logs already processed by earlier runs.", report.known as f64);
-    gauge("logs_done", "Logs processed, including failed ones.", report.done as f64);
-    gauge("logs_in_error", "Failed logs.", report.logs_in_error() as f64);
-    let standing = report.unacknowledged() as f64;
-    gauge(
-        "logs_still_failed",
-        "Failed logs of earlier runs that are not repaired or acknowledged.",
-        standing,
-    );
-    gauge("logs_not_reached", "Logs not processed because the run stopped.", report.not_reached as f64);
-    gauge("records_estimated", "Stored records with a gap.", report.estimated as f64);
-    gauge(
-        "records_refused",
-        "Actuator-flights for which no gap could be determined.",
-        report.refusals() as f64,
-    );
-    gauge(
-        "mapping_faults",
-        "Parts, tails and actuators most of whose flights are refused for a wrong mapping.",
-        report.mapping_faults.len() as f64,
-    );
+    let completed = if completed { Some(seconds(Timestamp::now())) } else { completed_before };
+    let count = |n: usize| Some(n as f64);
     // A run that left logs out cannot determine which tails have no data.
-    if !report.is_partial() {
-        gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet_now as f64);
-    }
-    let stale = report.stale_now as f64;
-    gauge("units_stale", "Installed units without a gap for unusually long before now.", stale);
-    if let Some(newest) = report.newest_departure_utc {
-        let newest = newest.as_millisecond() as f64 / 1e3;
-        gauge("newest_departure_timestamp_seconds", "Newest departure of all logs.", newest);
+    let quiet = count(report.quiet_now).filter(|_| !report.is_partial());
+    let (work, alerts) = (&report.follow_up.work_requests, report.follow_up.alerts.as_ref());
+    let newest = report.newest_departure_utc.map(seconds);
+    let unsent = alerts.map(|alerts| (alerts.failed + alerts.waiting) as f64);
+    let unconfirmed = alerts.map(|alerts| (alerts.unconfirmed + alerts.unconfirmed_before) as f64);
+    for (name, help, value) in [
+        ("run_completed_timestamp_seconds", "When a run last completed.", completed),
+        ("run_duration_seconds", "Duration of the last run.", Some(report.took_s)),
+        ("logs_found", "Logs that match the patterns.", count(report.found)),
+        ("logs_known", "Logs already processed by earlier runs.", count(report.known)),
+        ("logs_done", "Logs processed, including failed ones.", count(report.done)),
+        ("logs_in_error", "Failed logs.", count(report.logs_in_error())),
+        (
+            "logs_still_failed",
+            "Failed logs of earlier runs that are not repaired or acknowledged.",
+            count(report.unacknowledged()),
+        ),
+        ("logs_not_reached", "Logs not processed because the run stopped.", count(report.not_reached)),
+        ("records_estimated", "Stored records with a gap.", count(report.estimated)),
+        (
+            "records_refused",
+            "Actuator-flights for which no gap could be determined.",
+            count(report.refusals()),
+        ),
+        (
+            "mapping_faults",
+            "Parts, tails and actuators most of whose flights are refused for a wrong mapping.",
+            count(report.mapping_faults.len()),
+        ),
+        ("tails_quiet", "Tails with no new logs for unusually long.", quiet),
+        (
+            "units_stale",
+            "Installed units without a gap for unusually long before now.",
+            count(report.stale_now),
+        ),
+        ("newest_departure_timestamp_seconds", "Newest departure of all logs.", newest),
+        ("work_requests_open", "Work requests that wait for a decision.", count(work.open)),
+        ("work_requests_acknowledged", "Work requests that a person has seen.", count(work.acknowledged)),
+        ("work_requests_deferred", "Work requests that a person postponed.", count(work.deferred)),
+        ("alerts_sent", "Messages sent by the last run.", alerts.map(|alerts| alerts.sent as f64)),
+        ("alerts_unsent", "Messages that the next run sends.", unsent),
+        ("alerts_unconfirmed", "Messages that may have been received.", unconfirmed),
+    ] {
+        value.into_iter().for_each(|value| gauge(&mut text, name, help, value));
     }
     for state in State::ALL.map(State::as_str) {
-        let name = format!("units_touched_{state}");
-        gauge(&name, "Units updated by this run that are in this state.", states(state));
-        let name = format!("units_{state}");
+        let touched = report.trends.iter().filter(|row| row.state == Some(state)).count() as f64;
+        let help = "Units updated by this run that are in this state.";
+        gauge(&mut text, &format!("units_touched_{state}"), help, touched);
         let units = report.states.get(state).copied().unwrap_or_default() as f64;
-        gauge(&name, "Units of the fleet in this state.", units);
-    }
-    let work = &report.follow_up.work_requests;
-    gauge("work_requests_open", "Work requests that wait for a decision.", work.open as f64);
-    gauge("work_requests_acknowledged", "Work requests that a person has seen.", work.acknowledged as f64);
-    gauge("work_requests_deferred", "Work requests that a person postponed.", work.deferred as f64);
-    if let Some(alerts) = &report.follow_up.alerts {
-        gauge("alerts_sent", "Messages sent by the last run.", alerts.sent as f64);
-        gauge("alerts_unsent", "Messages that the next run sends.", (alerts.failed + alerts.waiting) as f64);
-        let unconfirmed = alerts.unconfirmed + alerts.unconfirmed_before;
-        gauge("alerts_unconfirmed", "Messages that may have been received.", unconfirmed as f64);
+        gauge(&mut text, &format!("units_{state}"), "Units of the fleet in this state.", units);
     }
     text
 }

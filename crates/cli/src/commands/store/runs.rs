@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use jiff::Timestamp;
 use records::Status;
 use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
 
@@ -13,41 +12,36 @@ use crate::progress::span;
 use crate::row_output;
 use crate::table::{self, count, number, or_dash, text};
 
-records::row! {
-    /// A run as an output row.
-    struct Run {
-        run_id: String,
-        started_utc: Timestamp,
-        finished_utc: Option<Timestamp>,
-        ended: &'static str,
-        exit_code: Option<i64>,
-        found: i64,
-        known: i64,
-        done: i64,
-        estimated: i64,
-        refused: i64,
-        errors: i64,
-        not_reached: i64,
-        program_version: String,
-        config_path: String,
-    }
-}
-
-records::row! {
-    /// A log of a run as an output row.
-    struct Log {
-        log_path: String,
-        class: &'static str,
-        reason: Option<String>,
-        tail_number: Option<String>,
-        flight_id: Option<String>,
-        departure_utc: Option<Timestamp>,
-        estimated: i64,
-        refused: i64,
-        duration_s: f64,
-        error_detail: Option<String>,
-    }
-}
+/// Columns of a run; `ended` is its status.
+const RUN: [&str; 14] = [
+    "run_id",
+    "started_utc",
+    "finished_utc",
+    "ended",
+    "exit_code",
+    "found",
+    "known",
+    "done",
+    "estimated",
+    "refused",
+    "errors",
+    "not_reached",
+    "program_version",
+    "config_path",
+];
+/// Columns of a log of a run; `class` is what became of it, and `reason` why.
+const LOG: [&str; 10] = [
+    "log_path",
+    "class",
+    "reason",
+    "tail_number",
+    "flight_id",
+    "departure_utc",
+    "estimated",
+    "refused",
+    "duration_s",
+    "error_detail",
+];
 
 /// Lists the last runs, or the logs of one.
 ///
@@ -98,38 +92,20 @@ pub(crate) fn status_text(status: &'static str) -> &'static str {
 
 fn all(store: &Store, runs: &[RunRecord], format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
     let is_held = store.is_held()?;
-    let answer: Vec<Run> = runs.iter().map(|run| in_row(run, is_held)).collect();
-    row_output::write_rows(format, output, || row_output::batch(&answer), || page(&answer))?;
+    let ended = runs.iter().map(|run| Some(run_status(run, is_held))).collect();
+    let batch = || row_output::columns(&row_output::batch(runs)?, &RUN, &[("ended", ended)]);
+    row_output::write_rows(format, output, batch, || page(runs, is_held))?;
     Ok(Code::Success)
 }
 
-fn in_row(run: &RunRecord, is_held: bool) -> Run {
-    Run {
-        run_id: run.run_id.clone(),
-        started_utc: run.started_utc,
-        finished_utc: run.finished_utc,
-        ended: run_status(run, is_held),
-        exit_code: run.exit_code,
-        found: run.found,
-        known: run.known,
-        done: run.done,
-        estimated: run.estimated,
-        refused: run.refused,
-        errors: run.errors,
-        not_reached: run.not_reached,
-        program_version: run.program_version.clone(),
-        config_path: run.config_path.clone(),
-    }
-}
-
-fn page(runs: &[Run]) -> String {
-    let took = |run: &Run| {
+fn page(runs: &[RunRecord], is_held: bool) -> String {
+    let took = |run: &RunRecord| {
         let end = run.finished_utc?;
         Some(span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default()))
     };
-    let columns: &table::Columns<'_, Run> = &[
+    let columns: &table::Columns<'_, RunRecord> = &[
         (text("run", 0), &|r| r.run_id.clone()),
-        (text("ended", 0), &|r| status_text(r.ended).to_owned()),
+        (text("ended", 0), &|r| status_text(run_status(r, is_held)).to_owned()),
         (text("duration", 4), &|r| or_dash(took(r).as_deref())),
         (number("found", 2), &|r| r.found.to_string()),
         (number("unchanged", 3), &|r| r.known.to_string()),
@@ -143,12 +119,15 @@ fn page(runs: &[Run]) -> String {
 }
 
 fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
-    let found = store.run_logs(&run.run_id)?;
+    let logs = store.run_logs(&run.run_id)?;
     let reasons = reasons(store, &run.run_id)?;
     let reason = |log: &LogRecord| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
-    let answer: Vec<Log> = found.iter().map(|log| in_log(log, reason(log))).collect();
+    let (classes, why) =
+        (logs.iter().map(|log| Some(class(log))).collect(), logs.iter().map(reason).collect());
+    let batch =
+        || row_output::columns(&row_output::batch(&logs)?, &LOG, &[("class", classes), ("reason", why)]);
     let head = format!("run {}, {}: ", run.run_id, status_text(run_status(run, store.is_held()?)));
-    row_output::write_rows(format, output, || row_output::batch(&answer), || head + &log_page(&answer))?;
+    row_output::write_rows(format, output, batch, || head + &log_page(&logs, &reason))?;
     Ok(Code::Success)
 }
 
@@ -172,21 +151,6 @@ fn words(reasons: &Reasons) -> String {
     words.join(", ")
 }
 
-fn in_log(log: &LogRecord, reason: Option<String>) -> Log {
-    Log {
-        log_path: log.log_path.clone(),
-        class: class(log),
-        reason,
-        tail_number: log.tail_number.clone(),
-        flight_id: log.flight_id.clone(),
-        departure_utc: log.departure_utc,
-        estimated: log.estimated,
-        refused: log.refused,
-        duration_s: log.duration_s,
-        error_detail: log.error_detail.clone(),
-    }
-}
-
 /// Class of a log: a readable log without any gap is *refused*.
 fn class(log: &LogRecord) -> &'static str {
     match log.outcome {
@@ -195,11 +159,11 @@ fn class(log: &LogRecord) -> &'static str {
     }
 }
 
-fn log_page(logs: &[Log]) -> String {
-    let columns: &table::Columns<'_, Log> = &[
-        (text("class", 0), &|l| l.class.replace('_', " ")),
+fn log_page(logs: &[LogRecord], reason: &dyn Fn(&LogRecord) -> Option<String>) -> String {
+    let columns: &table::Columns<'_, LogRecord> = &[
+        (text("class", 0), &|l| class(l).replace('_', " ")),
         (text("log", 0), &|l| l.log_path.clone()),
-        (text("reason", 1), &|l| l.reason.clone().unwrap_or_default()),
+        (text("reason", 1), &|l| reason(l).unwrap_or_default()),
         (text("tail", 4), &|l| or_dash(l.tail_number.as_deref())),
         (text("flight", 3), &|l| or_dash(l.flight_id.as_deref())),
         (number("estimated", 2), &|l| l.estimated.to_string()),
@@ -208,7 +172,7 @@ fn log_page(logs: &[Log]) -> String {
     ];
     let mut classes = Reasons::new();
     for log in logs {
-        *classes.entry(log.class.replace('_', " ")).or_default() += 1;
+        *classes.entry(class(log).replace('_', " ")).or_default() += 1;
     }
     format!("{} ({})\n", count(logs.len(), "log"), words(&classes)) + &table::of(logs, columns)
 }
