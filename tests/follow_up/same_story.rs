@@ -1,6 +1,6 @@
 //! One story: trend, work list, alerts, metrics and report have the same states, dates, gaps and counts.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array};
@@ -90,7 +90,7 @@ fn every_surface_has_the_same_states_dates_and_counts() {
             requests.iter().map(|r| (r["serial_number"].as_str(), r["state"].as_str(), date(&r["due_utc"])));
         let wanted = trend.iter().filter(|(_, told)| matches!(told.0.as_str(), "plan" | "act"));
         let wanted = wanted.map(|(serial, told)| (Some(serial.as_str()), Some(told.0.as_str()), told.1));
-        assert_eq!(sorted(dates), sorted(wanted));
+        assert_eq!(dates.collect::<BTreeSet<_>>(), wanted.collect());
 
         let message = std::fs::read_dir(fleet.path("alerts")).unwrap().next().unwrap().unwrap().path();
         let message: Value = serde_json::from_slice(&std::fs::read(message).unwrap()).unwrap();
@@ -122,12 +122,6 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         dates_stay(&fleet, &trend, date(&report["newest_departure_utc"]).unwrap());
     }
     assert!(["normal", "plan", "act"].iter().all(|state| seen.contains_key(*state)), "{seen:?}");
-}
-
-fn sorted<T: Ord>(items: impl Iterator<Item = T>) -> Vec<T> {
-    let mut items: Vec<T> = items.collect();
-    items.sort();
-    items
 }
 
 /// Without new flights, a date until when moves by two days at most, or the state says why: the unit is now over its limit,

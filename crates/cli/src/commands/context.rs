@@ -128,7 +128,9 @@ impl KnownNames {
         if known.contains(name) {
             return Ok(());
         }
-        let what = columns.iter().map(|column| called(column)).collect::<Vec<_>>().join(" or ");
+        let what = columns.iter().map(|column| called(column)).collect::<Vec<_>>().join(", ");
+        let what =
+            what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
         let hint = match ingest::mapping::column_pattern::nearest(name, known.iter().map(String::as_str)) {
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
             None => "list the contents of the store with `freeplay store info`".to_owned(),

@@ -6,7 +6,7 @@ use pipeline::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use records::WorkRequest;
 
 use crate::output::escape;
-use crate::table::count;
+use crate::table::{self, count, unit_name};
 
 /// Requests listed in each line.
 const MAX_LISTED: usize = 5;
@@ -15,7 +15,7 @@ const MAX_LISTED: usize = 5;
 pub(super) fn section(follow_up: &FollowUpSummary) -> String {
     let mut page = work_section(&follow_up.work_requests);
     if let Some(alerts) = &follow_up.alerts {
-        let _ = writeln!(page, "alerts: {}", alerts_text(alerts));
+        page.push_str(&table::labelled("alerts: ", &alerts_text(alerts)));
     }
     if page.is_empty() { page } else { format!("\n{page}") }
 }
@@ -33,15 +33,15 @@ fn work_section(work: &WorkSummary) -> String {
     for (some, what) in changes.iter().filter(|(some, _)| !some.is_empty()) {
         let more = some.len().saturating_sub(MAX_LISTED);
         let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        let _ = writeln!(page, "  {what:<11} {}{more}", listed(some));
+        page.push_str(&table::labelled(&format!("  {what:<11} "), &(listed(some) + &more)));
     }
     page
 }
 
 fn listed(some: &[WorkRequest]) -> String {
     let name = |request: &WorkRequest| {
-        let part = request.part_number.as_deref().unwrap_or("–");
-        format!("{} {}", request.request_id, escape(&format!("{part} / {}", request.serial_number)))
+        let unit = unit_name(request.part_number.as_deref(), &request.serial_number);
+        format!("{} {}", request.request_id, escape(&unit))
     };
     some.iter().take(MAX_LISTED).map(name).collect::<Vec<_>>().join(", ")
 }
