@@ -330,8 +330,8 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
 fn log_path(config: &Config, path: &Path) -> String {
     let path = path.strip_prefix(&config.folder).unwrap_or(path);
     let as_text = |chunk: Utf8Chunk<'_>| {
-        let others: String = chunk.invalid().iter().map(|byte| format!("%{byte:02X}")).collect();
-        chunk.valid().replace('\\', "/") + &others
+        let others: Vec<String> = chunk.invalid().iter().map(|byte| format!("%{byte:02X}")).collect();
+        chunk.valid().replace('\\', "/") + &others.concat()
     };
     path.as_os_str().as_encoded_bytes().utf8_chunks().map(as_text).collect()
 }
