@@ -57,7 +57,7 @@ fn hostile_tables_are_refused_with_code_2() {
     }
     // CSV: columns, rows and names beyond what any table has, each with a short answer.
     let sound = std::fs::read_to_string(fleet.path("sample-data/installations.csv")).unwrap();
-    let columns: String = (0..200_000).map(|k| format!("c{k},")).collect();
+    let columns = (0..200_000).map(|k| format!("c{k},")).collect::<Vec<_>>().concat();
     let name = "p".repeat(1_000_000);
     fleet.configure("table.parquet", "table.csv");
     for (text, says) in [
