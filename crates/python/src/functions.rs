@@ -229,6 +229,7 @@ pub(crate) fn normalize(
         let whole = |log: &PathBuf| {
             Ok((pipeline::logs::discover::log_containing(&config.inner, log)?, log.display().to_string()))
         };
+        let logs = pipeline::logs::discover::flight_paths(&config.inner, &logs);
         let logs = logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?;
         let place = (output.as_path(), encoding);
         pipeline::inspect::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})

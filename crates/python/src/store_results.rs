@@ -206,6 +206,7 @@ pub(crate) fn check(
                 let whole = |log: &PathBuf| {
                     Ok((pipeline::logs::discover::log_containing(&config, log)?, log.display().to_string()))
                 };
+                let logs = pipeline::logs::discover::flight_paths(&config, &logs);
                 (logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?, Vec::new())
             }
             None => {

@@ -44,6 +44,16 @@ impl RowKeys {
         let (columns, texts) = samples.rows.iter().cloned().unzip();
         Self { columns, texts }
     }
+
+    /// These rows, as far as they are of the flight that a file is opened for.
+    fn of_flight(&self, file: &LogFile) -> Self {
+        let mut rows = self.clone();
+        for (column, text) in &file.flight_rows {
+            rows.columns.push(column.clone());
+            rows.texts.push(text.clone());
+        }
+        rows
+    }
 }
 
 /// Gathered samples are kept by their rows, their leaf, and the leaf whose lists they are aligned to.
@@ -112,7 +122,9 @@ impl Partition {
         let mut leaves = vec![leaf.to_owned()];
         // Lists of different channels may differ in length: their leaves are gathered one by one.
         let has_lists = state.leaves.iter().chain([&samples.leaf]).any(|name| is_listed(name));
-        if asked.2.is_none() && !has_lists {
+        // Rows of a flight in which each is a sample of every channel: one leaf at a time, as in a file of their own.
+        let is_wide = asked.0.columns.is_empty();
+        if asked.2.is_none() && !has_lists && !is_wide {
             let here = |name: &&String| *name != leaf && files.iter().all(|file| file.has(name));
             leaves.extend(state.leaves.iter().filter(here).cloned());
         }
@@ -123,7 +135,10 @@ impl Partition {
                 && !state.gathered.contains_key(&(rows.clone(), leaf.to_owned(), asked.2.clone()))
         };
         keys.extend(state.announced.iter().map(|(rows, _)| rows).filter(|rows| is_new(rows)).cloned());
-        let gathered = gather(files, &keys, &leaves, asked.2.as_deref())?;
+        let mut gathered = gather(files, &keys, &leaves, asked.2.as_deref())?;
+        if is_wide {
+            return Ok(Arc::new(gathered.remove(0).remove(0)));
+        }
         for (slot, parts) in gathered.into_iter().enumerate() {
             for (name, arrays) in leaves.iter().zip(parts) {
                 state.gathered.insert((keys[slot].clone(), name.clone(), asked.2.clone()), Arc::new(arrays));
@@ -142,13 +157,14 @@ fn gather(
     leaves: &[String],
     aligned: Option<&str>,
 ) -> Result<Gathered, Error> {
-    let columns: Vec<&str> = keys[0].columns.iter().map(String::as_str).collect();
     let leaves: Vec<&str> = leaves.iter().map(String::as_str).collect();
-    let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
-    let mut slots = Slots::of(keys);
     let mut gathered: Gathered = vec![vec![Vec::new(); leaves.len()]; keys.len()];
     let mut bytes = vec![0_usize; keys.len()];
     for file in files {
+        let keys: Vec<RowKeys> = keys[..gathered.len()].iter().map(|rows| rows.of_flight(file)).collect();
+        let columns: Vec<&str> = keys[0].columns.iter().map(String::as_str).collect();
+        let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
+        let mut slots = Slots::of(&keys);
         let may_hold = |group: usize| {
             keys.iter().any(|rows| {
                 let mut pairs = rows.columns.iter().zip(&rows.texts);

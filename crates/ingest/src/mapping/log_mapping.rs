@@ -68,9 +68,13 @@ pub struct IdentityMapping {
     /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
-    /// Columns that hold one value throughout: fact → column.
+    /// Columns that hold one value throughout the log: fact → column.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<IdentityField, String>,
+    /// Whether rows name their flight, so that a file may hold many: each flight, by the columns of tail, flight id and
+    /// departure or landing, is a log of its own. A row without one of them is of no flight.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub by_row: bool,
     /// A regular expression on the absolute path with named groups, e.g.
     /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

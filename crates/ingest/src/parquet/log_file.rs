@@ -71,6 +71,8 @@ fn footer_error(source: &ByteSource, error: &ParquetError) -> ErrorKind {
 #[derive(Debug)]
 pub(crate) struct LogFile {
     path: PathBuf,
+    /// Columns and the texts that mark the rows of one flight; empty where the file holds no other.
+    pub(crate) flight_rows: Vec<(String, String)>,
     source: ByteSource,
     footer: ArrowReaderMetadata,
     /// The same footer, by which text columns are read as the codes of their dictionary.
@@ -133,7 +135,8 @@ impl LogFile {
             by_name.entry(leaf.name.clone()).or_default().push(place);
         }
         let (coded, noted) = (OnceLock::new(), OnceLock::new());
-        let opened = Self { path: path.to_owned(), source, footer, coded, noted, leaves, by_name };
+        let (path, flight_rows) = (path.to_owned(), Vec::new());
+        let opened = Self { path, flight_rows, source, footer, coded, noted, leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -529,7 +532,9 @@ impl LogFile {
             }
         }
         let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
-        digest.take(file, start..length).map_err(unreadable)
+        digest.take(file, start..length).map_err(unreadable)?;
+        self.flight_rows.iter().for_each(|(_, text)| digest.take_text(text));
+        Ok(())
     }
 }
 

@@ -68,7 +68,10 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs
     if !args.logs.is_empty() {
         let whole =
             |path: &std::path::PathBuf| Ok((discover::log_containing(config, path)?, display_path(path)));
-        return Ok((args.logs.iter().map(whole).collect::<Result<_, Failure>>()?, Vec::new()));
+        return Ok((
+            discover::flight_paths(config, &args.logs).iter().map(whole).collect::<Result<_, Failure>>()?,
+            Vec::new(),
+        ));
     }
     let found = discover::discover(config)?;
     for stray in &found.strays {

@@ -25,7 +25,7 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
     } else {
         let whole =
             |path: &std::path::PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
-        args.logs.iter().map(whole).collect::<Result<_, Failure>>()?
+        discover::flight_paths(&config, &args.logs).iter().map(whole).collect::<Result<_, Failure>>()?
     };
     let progress = Progress::new("normalize", output);
     let watch = |event: Event| match event {
