@@ -49,6 +49,9 @@ pub enum AtLimit {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartSettings {
+    /// Whether the values are placeholders: a run refuses the part until they are those of its data sheet.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub placeholder: bool,
     /// `linear` (default) or `rotary`.
     pub kind: Kind,
     /// Linear: axial stiffness K, N/m.
@@ -212,6 +215,7 @@ impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
     pub(crate) fn without_limits(&self) -> Self {
         Self {
+            placeholder: false,
             limit_m: None,
             watch_m: None,
             axis: None,
