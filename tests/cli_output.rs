@@ -117,7 +117,7 @@ fn a_proposal_covers_every_tail_and_variant_of_the_columns() {
     let proposed = propose(&fleet);
     assert!(proposed.contains("3 folders, 7 logs matched"), "{proposed}");
     let stays = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
-    assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 6, "{stays}");
+    assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 12, "{stays}");
     let checked = fleet.freeplay(&["check", "--config", "new-fleet/pipeline.toml"]);
     assert!(checked.out.contains("7 logs checked, 1 failed"), "{checked:?}\n{proposed}");
 }

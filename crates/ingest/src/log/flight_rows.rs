@@ -3,19 +3,14 @@
 //! Each flight of such a file is a log of its own. Its path is that of the file, with the texts of its identity columns:
 //! `logs/2026-11-19.parquet#N412FP/FL0123`.
 
-use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
-use arrow::array::{Array, ArrayRef, AsArray};
-use arrow::datatypes::DataType;
-use arrow::row::{RowConverter, SortField};
 use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
 
 use crate::error::Error;
-use crate::log::row_partition::LONG_BATCH_ROWS;
+use crate::log::row_partition::DistinctTexts;
 use crate::mapping::{IdentityField, IdentityMapping};
-use crate::parquet::log_file::{LogFile, Scan};
-use crate::parquet::numeric::{as_text, wrong_type};
+use crate::parquet::log_file::LogFile;
 
 /// Fields that tell one flight from another, in the order of their texts in a path.
 const FIELDS: [IdentityField; 4] = [
@@ -30,9 +25,6 @@ const MARK: char = '#';
 
 /// Characters of a text that a path writes as `%` and two digits.
 const ESCAPED: &AsciiSet = &CONTROLS.add(b'%').add(b'#').add(b'/').add(b'\\');
-
-/// More flights than these are times of samples in a column that was taken for a departure.
-const MAX_FLIGHTS: usize = 1 << 16;
 
 /// A column and the text that it holds in every row of a flight.
 pub(crate) type FlightRow = (String, String);
@@ -73,34 +65,10 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
     if !columns.iter().all(|column| file.has(column)) {
         return whole();
     }
-    let only = |group: usize| -> Option<Vec<String>> {
-        columns.iter().map(|column| Some(file.text_bounds(column, group)?.only()?.to_owned())).collect()
-    };
-    let mut found: BTreeSet<Vec<String>> = file.groups().filter_map(only).collect();
-    let scan =
-        Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group: &|group| only(group).is_none() };
-    let wrong = |texts: &[ArrayRef]| wrong_type(columns[0], &texts[0], "text");
-    let mut seen: HashSet<Vec<u8>> = HashSet::new();
-    file.scan(&columns, scan, |arrays| {
-        let named = columns.iter().zip(arrays);
-        let texts = named.map(|(column, array)| as_text(column, array)).collect::<Result<Vec<_>, _>>()?;
-        let fields = vec![SortField::new(DataType::Utf8); columns.len()];
-        let rows = RowConverter::new(fields).and_then(|converter| converter.convert_columns(&texts));
-        let rows = rows.map_err(|_| wrong(&texts))?;
-        for row in 0..rows.num_rows() {
-            let (bytes, is_same) = (rows.row(row), row > 0 && rows.row(row) == rows.row(row - 1));
-            if is_same || seen.contains(bytes.as_ref()) || found.len() > MAX_FLIGHTS {
-                continue;
-            }
-            seen.insert(bytes.as_ref().to_vec());
-            if texts.iter().all(|column| column.is_valid(row)) {
-                let text = |column: &ArrayRef| column.as_string::<i32>().value(row).to_owned();
-                found.insert(texts.iter().map(text).collect());
-            }
-        }
-        Ok(())
-    })?;
-    if found.is_empty() || found.len() > MAX_FLIGHTS {
+    let mut distinct = DistinctTexts::default();
+    distinct.take_file(&file, &columns)?;
+    let found = distinct.found;
+    if found.is_empty() {
         return whole();
     }
     let escaped = |text: &String| utf8_percent_encode(text, ESCAPED).to_string();

@@ -10,14 +10,14 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use arrow::array::{Array, ArrayRef, AsArray, Scalar};
 use arrow::compute::cast;
 use arrow::compute::kernels::cmp;
-use arrow::datatypes::{DataType, Int32Type, Int64Type, UInt64Type};
+use arrow::datatypes::{DataType, Int64Type, UInt64Type};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
-use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
+use crate::log::row_partition::{DistinctTexts, Partition, RowKeys};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::units::TimeUnit;
@@ -261,41 +261,20 @@ impl RowTable {
         Ok(())
     }
 
-    /// Every text that a column holds; a row group that holds but one, by its statistics, is not read.
+    /// Every text that a column holds.
     pub(crate) fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
         let known = |texts: &BTreeMap<String, Arc<BTreeSet<String>>>| texts.get(column).cloned();
         if let Some(texts) = known(&self.texts.lock().unwrap_or_else(PoisonError::into_inner)) {
             return Ok(texts);
         }
-        let mut found = BTreeSet::new();
+        let mut distinct = DistinctTexts::default();
         if self.is_of_many() {
             let rows = SampleSelector { leaf: column.to_owned(), rows: Vec::new() };
-            self.each(&rows, column, |array| add_texts(column, array, &mut found))?;
+            self.each(&rows, column, |array| distinct.take(&[column], std::slice::from_ref(array)))?;
+        } else {
+            self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
         }
-        for file in self.files.iter().filter(|file| file.flight_rows.is_empty()) {
-            let only = |group: usize| file.text_bounds(column, group)?.only().map(str::to_owned);
-            found.extend(file.groups().filter_map(only));
-            let scan = Scan {
-                batch_rows: LONG_BATCH_ROWS,
-                as_codes: true,
-                wants_group: &|group| only(group).is_none(),
-            };
-            file.scan(&[column], scan, |arrays| {
-                let (array, mut used) = (&arrays[0], Vec::new());
-                let Some(codes) = array.as_dictionary_opt::<Int32Type>() else {
-                    return add_texts(column, array, &mut found);
-                };
-                used.resize(codes.values().len(), false);
-                codes.keys().iter().flatten().for_each(|code| used[code as usize] = true);
-                let texts = codes.values().as_string::<i32>();
-                for code in (0..used.len()).filter(|code| used[*code] && texts.is_valid(*code)) {
-                    if !found.contains(texts.value(code)) {
-                        found.insert(texts.value(code).to_owned());
-                    }
-                }
-                Ok(())
-            })?;
-        }
+        let found: BTreeSet<String> = distinct.found.into_iter().flatten().collect();
         let found = Arc::new(found);
         let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         texts.insert(column.to_owned(), Arc::clone(&found));
@@ -481,16 +460,4 @@ impl RowTable {
 fn is_uniform(array: &ArrayRef) -> bool {
     let first = Scalar::new(array.slice(0, array.len().min(1)));
     !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
-}
-
-fn add_texts(column: &str, array: &ArrayRef, found: &mut BTreeSet<String>) -> Result<(), ErrorKind> {
-    let text = as_text(column, array)?;
-    let mut last: Option<&str> = None;
-    for value in text.as_string::<i32>().iter().flatten() {
-        if last != Some(value) && !found.contains(value) {
-            found.insert(value.to_owned());
-        }
-        last = Some(value);
-    }
-    Ok(())
 }
