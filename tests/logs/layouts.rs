@@ -637,9 +637,7 @@ fn check_summarises_many_logs() {
     let fleet = one_tail();
     let text = fleet.run_ok(&["check"]);
     assert!(text.lines().count() < 40, "{text}");
-    for log in logs(&fleet) {
-        assert_eq!(text.matches(log.file_name().unwrap().to_str().unwrap()).count(), 1, "{text}");
-    }
+    assert!(text.contains("10 logs") && text.contains("1 tail") && text.contains(" Hz"), "{text}");
     let few = fleet.run_ok(&["check", "--limit", "2"]);
     assert!(few.contains("aileron_left_motor_deg") && few.contains("motor_position"), "{few}");
 }
