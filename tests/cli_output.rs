@@ -5,7 +5,7 @@ use std::io::Read;
 
 use ingest::parquet::writer::Column;
 
-use crate::harness::{Table, TestFleet};
+use crate::harness::{Table, TestFleet, rewrite};
 
 /// Each line of stderr is an object with a time, a level and an event; the answer stays what it is.
 #[test]
@@ -81,7 +81,7 @@ fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
         let folder = fleet.path("qar").join(tail);
         std::fs::create_dir_all(&folder).unwrap();
         let named = folder.join("FLT_2026-09-10_1307.parquet");
-        crate::harness::rewrite(log, &named, &Vec::new(), |_| true, |_| true);
+        rewrite(log, &named, &Vec::new(), |_| true, |_| true);
     }
     let proposed = propose(&fleet);
     assert!(!proposed.lines().any(|line| line.starts_with("limit_m")), "{proposed}");
@@ -131,14 +131,8 @@ fn what_init_proposes_for_channel_groups_runs_as_it_stands() {
         let is_load = |c: &str| c.ends_with("_load_n");
         let loads = fleet.path("qar/loads").join(name);
         std::fs::create_dir_all(loads.parent().unwrap()).unwrap();
-        crate::harness::rewrite(log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
-        crate::harness::rewrite(
-            log,
-            &fleet.path("qar/positions").join(name),
-            &own,
-            |c| !is_load(c),
-            |_| true,
-        );
+        rewrite(log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
+        rewrite(log, &fleet.path("qar/positions").join(name), &own, |c| !is_load(c), |_| true);
     }
     let toml = propose(&fleet);
     assert!(toml.contains("files = [\"../qar/positions/**/*.parquet\"]"), "{toml}");
@@ -155,13 +149,7 @@ fn what_init_proposes_for_hive_folders_runs_as_it_stands() {
         let folder = format!("qar/tail=TC-JRA/off=2026-09-10T13%3A07%3A19Z/actuator={position}");
         std::fs::create_dir_all(fleet.path(&folder)).unwrap();
         let file = fleet.path(&folder).join("part-0.parquet");
-        crate::harness::rewrite(
-            log,
-            &file,
-            &Vec::new(),
-            |c| c.starts_with(position) || c == "time_s",
-            |_| true,
-        );
+        rewrite(log, &file, &Vec::new(), |c| c.starts_with(position) || c == "time_s", |_| true);
     }
     propose(&fleet);
     let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
@@ -177,7 +165,7 @@ fn init_invents_no_serial_number() {
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
     std::fs::create_dir_all(fleet.path("qar")).unwrap();
-    crate::harness::rewrite(log, &fleet.path("qar/a.parquet"), &Vec::new(), |c| c == "time_s", |_| true);
+    rewrite(log, &fleet.path("qar/a.parquet"), &Vec::new(), |c| c == "time_s", |_| true);
     propose(&fleet);
     let table = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| !line.starts_with('#')).collect();
@@ -220,7 +208,7 @@ fn rows_come_as_table_json_csv_and_parquet() {
     let gap: f64 = csv.lines().nth(1).unwrap().split(',').nth(12).unwrap().parse().unwrap();
     assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both formats hold bitwise identical values");
     fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
-    assert_eq!(crate::harness::Table::read(&fleet.path("all.parquet")).rows(), 12);
+    assert_eq!(Table::read(&fleet.path("all.parquet")).rows(), 12);
     assert!(fleet.run_ok(&["trend"]).contains(" units as of "));
 }
 
@@ -244,13 +232,13 @@ fn a_store_that_is_not_there_says_who_makes_it() {
 fn a_trace_has_the_log_s_own_times_after_a_break() {
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
-    let own_s = crate::harness::Table::read(log).numbers("time_s");
+    let own_s = Table::read(log).numbers("time_s");
     let broken = fleet.path("broken.parquet");
     let keep = |row: usize| !(3000..3400).contains(&row);
-    crate::harness::rewrite(log, &broken, &crate::harness::facts(log), |_| true, keep);
+    rewrite(log, &broken, &crate::harness::facts(log), |_| true, keep);
     let part = ["--part", "EMA-27-1040", "--trace", "trace.parquet"];
     fleet.run_ok(&[&["estimate", "broken.parquet"][..], &part].concat());
-    let times_s = crate::harness::Table::read(&fleet.path("trace.parquet")).numbers("time_s");
+    let times_s = Table::read(&fleet.path("trace.parquet")).numbers("time_s");
     for (sample, row) in [(0, 0), (2999, 2999), (3000, 3400), (4000, 4400)] {
         let expected_s = own_s[row] - own_s[0];
         assert!(
@@ -265,7 +253,7 @@ fn a_trace_has_the_log_s_own_times_after_a_break() {
 fn a_trace_holds_every_sample_the_filter_saw() {
     let fleet = TestFleet::of("flights");
     fleet.run_ok(&["estimate", "A_nominal.parquet", "--part", "A", "--trace", "trace.parquet"]);
-    let trace = crate::harness::Table::read(&fleet.path("trace.parquet"));
+    let trace = Table::read(&fleet.path("trace.parquet"));
     assert_eq!(trace.rows(), 37_495);
     assert!(trace.numbers("s_m").iter().all(|s| s.is_finite()));
     // The estimated position follows the measured one within its noise; the motor's speed adds up to its travel.

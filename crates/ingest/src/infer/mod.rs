@@ -60,23 +60,11 @@ pub struct InferredMapping {
 }
 
 /// Names of columns that name the channel of a row, and of those that hold its value.
-const NAME_COLUMNS: [&str; 12] = [
-    "parameter",
-    "parameter_name",
-    "param",
-    "name",
-    "channel",
-    "channel_name",
-    "signal",
-    "signal_name",
-    "mnemonic",
-    "label",
-    "variable",
-    "tag",
-];
-const VALUE_COLUMNS: [&str; 7] = ["value", "val", "reading", "data", "measurement", "sample", "v"];
+const NAME_COLUMNS: &str =
+    "parameter parameter_name param name channel channel_name signal signal_name mnemonic label variable tag";
+const VALUE_COLUMNS: &str = "value val reading data measurement sample v";
 /// Names of columns that name the position of a row, beyond those of a fact.
-const POSITION_COLUMNS: [&str; 6] = ["unit", "location", "ema", "servo", "actuator_id", "side"];
+const POSITION_COLUMNS: &str = "unit location ema servo actuator_id side";
 
 /// Looks at one log.
 ///
@@ -166,10 +154,11 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
 /// The layout that columns of names, values and positions show.
 fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
     let leaves = table.files[0].leaves();
-    let is_called = |leaf: &LeafColumn, known: &[&str]| known.contains(&leaf.name.to_lowercase().as_str());
+    let is_called =
+        |leaf: &LeafColumn, known: &str| known.split(' ').any(|word| word == leaf.name.to_lowercase());
     let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
-    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, &NAME_COLUMNS));
-    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, &VALUE_COLUMNS));
+    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, NAME_COLUMNS));
+    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, VALUE_COLUMNS));
     let mut layout = Layout::default();
     if let (Some(name), Some(value)) = (name, value) {
         (layout.name_column, layout.value_column) = (Some(name.name.clone()), Some(value.name.clone()));
@@ -178,7 +167,7 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
         |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
     for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
         let is_position =
-            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, &POSITION_COLUMNS);
+            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, POSITION_COLUMNS);
         let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
         if texts.len() > 1 && !texts.iter().all(|text| is_unit(text)) {
             layout.position_column = Some(leaf.name.clone());

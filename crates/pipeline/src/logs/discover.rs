@@ -91,6 +91,15 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
     paths.iter().flat_map(of).collect()
 }
 
+/// The logs that files given by hand hold or belong to, each with its name.
+///
+/// # Errors
+/// As [`discover`], where groups or pieces must be searched.
+pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<(LogFiles, String)>, Error> {
+    let named = |path: &PathBuf| Ok((log_containing(config, path)?, path.display().to_string()));
+    flight_paths(config, paths).iter().map(named).collect()
+}
+
 /// The whole log that a file given by hand belongs to.
 ///
 /// # Errors

@@ -18,7 +18,7 @@ use crate::output::{Output, escape};
 use crate::row_output;
 use crate::table::{self, number, text};
 
-use crate::commands::context::{display_path, load_with_installations};
+use crate::commands::context::load_with_installations;
 
 /// More logs than these are summarised, one line each.
 const MOST_WHOLE_LOGS: usize = 3;
@@ -66,12 +66,7 @@ type NamedLogs = Vec<(LogFiles, String)>;
 /// The logs to be checked, and the faults of what cannot be listed.
 fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs, Vec<Diagnostic>), Failure> {
     if !args.logs.is_empty() {
-        let whole =
-            |path: &std::path::PathBuf| Ok((discover::log_containing(config, path)?, display_path(path)));
-        return Ok((
-            discover::flight_paths(config, &args.logs).iter().map(whole).collect::<Result<_, Failure>>()?,
-            Vec::new(),
-        ));
+        return Ok((discover::named_logs(config, &args.logs)?, Vec::new()));
     }
     let found = discover::discover(config)?;
     for stray in &found.strays {

@@ -161,20 +161,19 @@ fn variants(sample: Vec<PathBuf>) -> Result<Vec<Variant>, Failure> {
     }
 }
 
-/// How the kind of a file shows in its path: a folder below the given one, its own folder, or the end of its name.
+/// How the kind of a file shows in its path: a folder below the given one, or the end of its name.
 #[derive(Clone, Copy)]
 enum Kind {
-    Below,
-    Own,
+    Folder,
     Name,
 }
 
 impl Kind {
     fn of(self, folder: &Path, log: &Path) -> Option<String> {
-        let within = log.strip_prefix(folder).ok()?.parent()?;
         let name = match self {
-            Self::Below => within.components().next()?.as_os_str().to_str()?,
-            Self::Own => within.components().next_back()?.as_os_str().to_str()?,
+            Self::Folder => {
+                log.strip_prefix(folder).ok()?.parent()?.components().next()?.as_os_str().to_str()?
+            }
             Self::Name => last_word(log)?,
         };
         Some(name.to_owned())
@@ -183,8 +182,7 @@ impl Kind {
     /// The files of a kind, from the folder of all.
     fn pattern(self, kind: &str) -> String {
         match self {
-            Self::Below => format!("{kind}/**/*.parquet"),
-            Self::Own => format!("**/{kind}/*.parquet"),
+            Self::Folder => format!("{kind}/**/*.parquet"),
             Self::Name => format!("**/*{kind}.parquet"),
         }
     }
@@ -223,7 +221,7 @@ impl Proposal {
         let found = variants(sampled(logs))?;
         let looked_at = found.iter().map(|variant| variant.logs).sum();
         let folders = logs.iter().map(|log| log.parent()).collect::<BTreeSet<_>>().len();
-        let kinds = [Kind::Below, Kind::Own, Kind::Name];
+        let kinds = [Kind::Folder, Kind::Name];
         let grouped =
             kinds.iter().filter(|_| !found[0].is_whole()).find_map(|kind| group(folder, &found, *kind));
         if let Some((main, files, groups)) = grouped {
@@ -280,38 +278,25 @@ impl Proposal {
     pub(crate) fn installations(&self, logs: &[PathBuf]) -> String {
         let offer = &self.main.offer;
         let has_own = offer.metadata.contains_key(&IdentityField::TailNumber);
-        let tails = |log: &PathBuf| -> BTreeSet<String> {
-            let own =
-                if has_own { propose(log).map(|own| own.tails).unwrap_or_default() } else { BTreeSet::new() };
-            let named = folder_of(log, offer, IdentityField::TailNumber).or_else(|| path_tail(log));
-            if own.is_empty() { named.into_iter().collect() } else { own }
-        };
-        let is_plain = |name: &String| {
-            !name.contains(|c: char| matches!(c, '"' | ',' | '#') || c.is_control())
-                && csv_cell(name) == *name
-        };
-        let every = |tails: &BTreeSet<String>, own: &BTreeSet<String>| -> BTreeSet<(String, String)> {
-            let pairs = tails
-                .iter()
-                .flat_map(|tail| own.iter().map(move |position| (tail.clone(), position.clone())));
-            pairs.filter(|(tail, position)| is_plain(tail) && is_plain(position)).collect()
-        };
-        let mut places = BTreeSet::new();
+        let mut places: BTreeSet<(String, String)> = BTreeSet::new();
         for variant in self.overrides.iter().chain([&self.main]) {
-            places.extend(every(&variant.offer.tails, &variant.offer.positions));
+            places.extend(pairs(&variant.offer.tails, &variant.offer.positions));
         }
-        let known: BTreeSet<&String> =
-            self.overrides.iter().flat_map(|variant| &variant.offer.tails).collect();
+        let of_overrides: BTreeSet<&String> =
+            self.overrides.iter().flat_map(|one| &one.offer.tails).collect();
         for log in logs.iter().take(MOST_LOGS) {
-            let tails = tails(log);
-            if tails.iter().any(|tail| known.contains(tail)) {
-                continue;
-            }
-            let own = folder_of(log, offer, IdentityField::Position)
+            let own = if has_own { propose(log).ok().map(|own| own.tails) } else { None };
+            let mut tails = own.unwrap_or_else(|| tail_of(log, offer).into_iter().collect());
+            tails.retain(|tail| !of_overrides.contains(tail));
+            let position = folder_of(log, offer, IdentityField::Position)
                 .or_else(|| path_position(log).filter(|_| needs_position(offer)));
-            let own = own.map_or_else(|| offer.positions.clone(), |own| BTreeSet::from([own]));
-            places.extend(every(&tails, &own));
+            let positions = position.map_or_else(|| offer.positions.clone(), |own| BTreeSet::from([own]));
+            places.extend(pairs(&tails, &positions));
         }
+        let is_plain = |name: &str| {
+            !name.contains(|c: char| matches!(c, '"' | ',' | '#') || c.is_control()) && csv_cell(name) == name
+        };
+        places.retain(|(tail, position)| is_plain(tail) && is_plain(position));
         let row = |(tail, position): &(String, String)| {
             format!("{tail},{position},{PART},{tail} {position},1970-01-01,\n")
         };
@@ -364,23 +349,16 @@ impl Proposal {
         let tails: Vec<String> = variant.offer.tails.iter().map(|tail| quoted(tail)).collect();
         let mut text =
             format!("# {}.\n[[override]]\ntails = [{}]\n", self.seen_in(variant), tails.join(", "));
-        let differs = |role: &Role| variant.offer.channels.get(role) != self.main.offer.channels.get(role);
+        let (own, usual) = (&variant.offer, &self.main.offer);
+        let differs = |role: &Role| {
+            own.channels.contains_key(role) && own.channels.get(role) != usual.channels.get(role)
+        };
         for (role, name) in CHANNELS.iter().filter(|(role, _)| differs(role)) {
-            if let Some((column, unit)) = variant.offer.channels.get(role) {
-                let unit = unit.unwrap_or(usual(*role)).as_str();
-                let _ = writeln!(text, "channel.{name} = {{ column = {}, unit = {unit:?} }}", quoted(column));
-            }
+            let _ = write!(text, "[override.channel.{name}]\n{}", self.channel(variant, *role));
         }
-        if variant.offer.clock != self.main.offer.clock
-            && let Some((column, unit)) = &variant.offer.clock
-        {
-            let unit = unit.map_or_else(String::new, |unit| format!(", unit = {}", quoted(unit)));
-            let epoch = match variant.offer.epoch {
-                Epoch::Unix => "unix",
-                Epoch::Midnight => "midnight",
-                Epoch::None | Epoch::Excel => "none",
-            };
-            let _ = writeln!(text, "clock = {{ column = {}{unit}, epoch = {epoch:?} }}", quoted(column));
+        if (&own.clock, own.epoch) != (&usual.clock, usual.epoch) {
+            let none = if own.epoch == Epoch::None { "epoch = \"none\"\n" } else { "" };
+            let _ = write!(text, "[override.clock]\n{}{none}", clock(own));
         }
         text + "\n"
     }
@@ -397,9 +375,10 @@ impl Proposal {
         let positions = if positions.is_empty() { "none".to_owned() } else { escape(&positions.join(", ")) };
         let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
         let has = |role: &Role| Role::NEEDED.contains(role) || offer.channels.contains_key(role);
-        let channels = CHANNELS.iter().filter(|(role, _)| has(role));
-        let channels: String =
-            channels.map(|(role, name)| format!("\n[channel.{name}]\n{}", self.channel(*role))).collect();
+        let mut channels = String::new();
+        for (role, name) in CHANNELS.iter().filter(|(role, _)| has(role)) {
+            let _ = write!(channels, "\n[channel.{name}]\n{}", self.channel(&self.main, *role));
+        }
         let rows = if offer.layout == Layout::default() {
             String::new()
         } else {
@@ -436,9 +415,9 @@ impl Proposal {
         .concat()
     }
 
-    fn channel(&self, role: Role) -> String {
-        let (offer, usual) = (&self.main.offer, usual(role).as_str());
-        let seen = format!("in {} of {} logs looked at", self.main.logs, self.looked_at);
+    fn channel(&self, variant: &Variant, role: Role) -> String {
+        let (offer, usual) = (&variant.offer, usual(role).as_str());
+        let seen = format!("in {} of {} logs looked at", variant.logs, self.looked_at);
         let mut text = match offer.channels.get(&role) {
             Some((column, unit)) => {
                 let (unit, sure) = match unit {
@@ -525,6 +504,16 @@ fn unite(offer: &mut InferredMapping, other: &InferredMapping) {
         }
     }
     offer.by_row |= other.by_row;
+}
+
+/// Every pair of a tail and a position.
+fn pairs(tails: &BTreeSet<String>, positions: &BTreeSet<String>) -> Vec<(String, String)> {
+    tails.iter().flat_map(|tail| positions.iter().map(|own| (tail.clone(), own.clone()))).collect()
+}
+
+/// The tail that the path of a log names.
+fn tail_of(log: &Path, offer: &InferredMapping) -> Option<String> {
+    folder_of(log, offer, IdentityField::TailNumber).or_else(|| path_tail(log))
 }
 
 /// The value of a folder `name=value` that names a fact.
