@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 use std::io::Read;
 
-use crate::harness::TestFleet;
+use ingest::parquet::writer::Column;
+
+use crate::harness::{Table, TestFleet, rewrite};
 
 /// Each line of stderr is an object with a time, a level and an event; the answer stays what it is.
 #[test]
@@ -61,6 +63,15 @@ fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
     assert!(silent.err.contains("error[no_log_matched]"), "{}", silent.err);
 }
 
+/// Proposes a configuration from the logs in `qar`, and accepts the values of its part; the proposal as it was written.
+fn propose(fleet: &TestFleet) -> String {
+    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let file = fleet.path("new-fleet/pipeline.toml");
+    let proposed = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(file, proposed.replace("placeholder = true\n", "")).unwrap();
+    proposed
+}
+
 /// Logs without metadata, identified by their path only: the mapping that `init` proposes passes `check` and `run`
 /// unchanged.
 #[test]
@@ -70,9 +81,10 @@ fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
         let folder = fleet.path("qar").join(tail);
         std::fs::create_dir_all(&folder).unwrap();
         let named = folder.join("FLT_2026-09-10_1307.parquet");
-        crate::harness::rewrite(log, &named, &Vec::new(), |_| true, |_| true);
+        rewrite(log, &named, &Vec::new(), |_| true, |_| true);
     }
-    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let proposed = propose(&fleet);
+    assert!(!proposed.lines().any(|line| line.starts_with("limit_m")), "{proposed}");
     let stays = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
     assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 8, "{stays}");
     let checked = fleet.run_ok(&["check", "--config", "new-fleet/pipeline.toml"]);
@@ -81,6 +93,33 @@ fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
     assert!(account.contains("8 records of 2 flights"), "{account}");
     let records = fleet.run_ok(&["query", "tail", "TC-JRB", "--config", "new-fleet/pipeline.toml"]);
     assert!(records.contains("2026-09-10 13:07"), "{records}");
+}
+
+/// Two tails name their columns as no one does in the first folder, one of them in other units and without a redundant
+/// sensor; a part of the files cannot be read. All tails are mapped, and the patterns cover every folder.
+#[test]
+fn a_proposal_covers_every_tail_and_variant_of_the_columns() {
+    let fleet = TestFleet::sample();
+    let named = |name: &str, tail: &str| match tail {
+        "TC-JRA" => name.replace("_motor_deg", "_MTR_RESOLVER_DEG").replace("_load_n", "_FORCE_N"),
+        _ => name.replace("time_s", "GMT_SEC"),
+    };
+    for (log, tail) in fleet.logs().iter().step_by(11).zip(["TC-JRA", "TC-JRB", "TC-JRC"]) {
+        let table = Table::read(log);
+        let column = |name: String| (named(&name, tail), Column::Real(table.numbers(&name)));
+        let columns: Vec<_> = table.names().into_iter().map(column).collect();
+        for hour in ["0413", "1307"] {
+            let file = fleet.path(&format!("qar/ac={tail}/FLT_2026-09-10_{hour}.parquet"));
+            ingest::parquet::writer::write_parquet(&file, &columns, &[]).unwrap();
+        }
+    }
+    std::fs::write(fleet.path("qar/ac=TC-JRA/FLT_2026-09-09_0413.parquet"), "PAR1").unwrap();
+    let proposed = propose(&fleet);
+    assert!(proposed.contains("3 folders, 7 logs matched"), "{proposed}");
+    let stays = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
+    assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 12, "{stays}");
+    let checked = fleet.freeplay(&["check", "--config", "new-fleet/pipeline.toml"]);
+    assert!(checked.out.contains("7 logs checked, 1 failed"), "{checked:?}\n{proposed}");
 }
 
 /// Loads in a folder of their own, paths from the folder of the configuration, and no invented serial number.
@@ -92,17 +131,10 @@ fn what_init_proposes_for_channel_groups_runs_as_it_stands() {
         let is_load = |c: &str| c.ends_with("_load_n");
         let loads = fleet.path("qar/loads").join(name);
         std::fs::create_dir_all(loads.parent().unwrap()).unwrap();
-        crate::harness::rewrite(log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
-        crate::harness::rewrite(
-            log,
-            &fleet.path("qar/positions").join(name),
-            &own,
-            |c| !is_load(c),
-            |_| true,
-        );
+        rewrite(log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
+        rewrite(log, &fleet.path("qar/positions").join(name), &own, |c| !is_load(c), |_| true);
     }
-    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
-    let toml = std::fs::read_to_string(fleet.path("new-fleet/pipeline.toml")).unwrap();
+    let toml = propose(&fleet);
     assert!(toml.contains("files = [\"../qar/positions/**/*.parquet\"]"), "{toml}");
     let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
     assert!(account.contains("8 records of 2 flights"), "{account}");
@@ -117,15 +149,9 @@ fn what_init_proposes_for_hive_folders_runs_as_it_stands() {
         let folder = format!("qar/tail=TC-JRA/off=2026-09-10T13%3A07%3A19Z/actuator={position}");
         std::fs::create_dir_all(fleet.path(&folder)).unwrap();
         let file = fleet.path(&folder).join("part-0.parquet");
-        crate::harness::rewrite(
-            log,
-            &file,
-            &Vec::new(),
-            |c| c.starts_with(position) || c == "time_s",
-            |_| true,
-        );
+        rewrite(log, &file, &Vec::new(), |c| c.starts_with(position) || c == "time_s", |_| true);
     }
-    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    propose(&fleet);
     let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
     assert!(
         account.contains("2 records of 2 flights") || account.contains("2 records of 1 flight"),
@@ -139,8 +165,8 @@ fn init_invents_no_serial_number() {
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
     std::fs::create_dir_all(fleet.path("qar")).unwrap();
-    crate::harness::rewrite(log, &fleet.path("qar/a.parquet"), &Vec::new(), |c| c == "time_s", |_| true);
-    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    rewrite(log, &fleet.path("qar/a.parquet"), &Vec::new(), |c| c == "time_s", |_| true);
+    propose(&fleet);
     let table = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| !line.starts_with('#')).collect();
     assert_eq!(rows, ["tail_number,position,part_number,serial_number,installed_utc,removed_utc"]);
@@ -188,7 +214,7 @@ fn rows_come_as_table_json_csv_and_parquet() {
         assert_eq!(line.split(',').nth(flags), Some(joined.join(";").as_str()));
     }
     fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
-    assert_eq!(crate::harness::Table::read(&fleet.path("all.parquet")).rows(), 12);
+    assert_eq!(Table::read(&fleet.path("all.parquet")).rows(), 12);
     assert!(fleet.run_ok(&["trend"]).contains(" units as of "));
 }
 
@@ -212,13 +238,13 @@ fn a_store_that_is_not_there_says_who_makes_it() {
 fn a_trace_has_the_log_s_own_times_after_a_break() {
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
-    let own_s = crate::harness::Table::read(log).numbers("time_s");
+    let own_s = Table::read(log).numbers("time_s");
     let broken = fleet.path("broken.parquet");
     let keep = |row: usize| !(3000..3400).contains(&row);
-    crate::harness::rewrite(log, &broken, &crate::harness::facts(log), |_| true, keep);
+    rewrite(log, &broken, &crate::harness::facts(log), |_| true, keep);
     let part = ["--part", "EMA-27-1040", "--trace", "trace.parquet"];
     fleet.run_ok(&[&["estimate", "broken.parquet"][..], &part].concat());
-    let times_s = crate::harness::Table::read(&fleet.path("trace.parquet")).numbers("time_s");
+    let times_s = Table::read(&fleet.path("trace.parquet")).numbers("time_s");
     for (sample, row) in [(0, 0), (2999, 2999), (3000, 3400), (4000, 4400)] {
         let expected_s = own_s[row] - own_s[0];
         assert!(
@@ -233,7 +259,7 @@ fn a_trace_has_the_log_s_own_times_after_a_break() {
 fn a_trace_holds_every_sample_the_filter_saw() {
     let fleet = TestFleet::of("flights");
     fleet.run_ok(&["estimate", "A_nominal.parquet", "--part", "A", "--trace", "trace.parquet"]);
-    let trace = crate::harness::Table::read(&fleet.path("trace.parquet"));
+    let trace = Table::read(&fleet.path("trace.parquet"));
     assert_eq!(trace.rows(), 37_495);
     assert!(trace.numbers("s_m").iter().all(|s| s.is_finite()));
     // The estimated position follows the measured one within its noise; the motor's speed adds up to its travel.
@@ -457,6 +483,11 @@ fn a_proposal_from_logs_reads_them() {
     std::fs::remove_file(fleet.path("pipeline.toml")).unwrap();
     fleet.run_ok(&["init", "--from", "sample-data/logs"]);
     fleet.configure("\"installations.csv\"", "\"sample-data/installations.csv\"");
+    fleet.configure("PART-NUMBER", "EMA-27-1040");
+    fleet.configure("PART-NUMBER", "EMA-27-1040");
+    let refused = fleet.freeplay(&["run"]);
+    assert!(refused.code == Some(2) && refused.err.contains("error[placeholder]"), "{refused:?}");
+    fleet.configure("placeholder = true", "");
     fleet.configure("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1060\"]\nstiffness_n_per_m = 6.5e7\ndamping_n_s_per_m = 2500.0\nscrew_mass_kg = 9.0\nlead_m_per_rev = 0.006\nnoise = { screw_rms_m = 3e-6, screw_resolution_m = 2e-6, motor_rms_m = 1e-6, motor_resolution_m = 3e-7, unknown_force_n = 200.0, bandwidth_hz = 10.0 }\n\n[part.\"EMA-27-1040\"]");
     let account = fleet.run_ok(&["run"]);
     assert!(account.contains("120 estimated"), "{account}");

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -194,16 +194,10 @@ impl Table {
         self.0.schema().fields().iter().map(|field| field.name().clone()).collect()
     }
 
-    /// A column of numbers of any type as doubles.
-    pub(crate) fn reals(&self, column: &str) -> Vec<f64> {
-        let real = cast(self.0.column_by_name(column).unwrap(), &DataType::Float64).unwrap();
-        real.as_primitive::<Float64Type>().values().to_vec()
-    }
-
-    /// NaN where null.
+    /// A column of numbers of any type as doubles; NaN where null.
     pub(crate) fn numbers(&self, column: &str) -> Vec<f64> {
-        let values = self.0.column_by_name(column).unwrap().as_primitive::<Float64Type>();
-        (0..values.len()).map(|i| if values.is_null(i) { f64::NAN } else { values.value(i) }).collect()
+        let real = cast(self.0.column_by_name(column).unwrap(), &DataType::Float64).unwrap();
+        real.as_primitive::<Float64Type>().iter().map(|value| value.unwrap_or(f64::NAN)).collect()
     }
 
     /// One number for each flight and position.

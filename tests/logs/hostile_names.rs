@@ -34,7 +34,7 @@ fn rename_log(log: &Path, to: &Path, tail: &str) {
     let columns: Vec<(String, Column)> = table
         .names()
         .into_iter()
-        .map(|name| (renamed(&name), Column::Real(table.reals(&name))))
+        .map(|name| (renamed(&name), Column::Real(table.numbers(&name))))
         .chain([(format!("unmapped{HOSTILE}"), Column::Real(vec![0.0; table.rows()]))])
         .collect();
     let mut known = facts(log);
@@ -62,7 +62,7 @@ fn fleet() -> TestFleet {
     let log = &fleet.logs()[9];
     let mut known = facts(log);
     known.iter_mut().filter(|(key, _)| key == "departure_utc").for_each(|(_, v)| HOSTILE.clone_into(v));
-    let time = Table::read(log).reals("time_s");
+    let time = Table::read(log).numbers("time_s");
     let other = ["time_s".to_owned(), format!("other{HOSTILE}")];
     let columns = other.map(|name| (name, Column::Real(time.clone())));
     write_parquet(&folder.join(format!("dated{HOSTILE}.parquet")), &columns, &known).unwrap();

@@ -93,6 +93,47 @@ fn a_flight_in_pieces_is_one_flight_whatever_the_pieces_are_called() {
     assert!(fleet.run_ok(&["run"]).contains("10 logs: 0 new or changed, 10 already processed"));
 }
 
+/// A table of many flights, one file a day: rows of different flights alternate, and one flight goes on in the next file.
+#[test]
+fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
+    let tables: Vec<_> = logs(&fleet).iter().map(|log| (Table::read(log), facts(log))).collect();
+    let mut days: [Vec<(usize, usize)>; 3] = Default::default();
+    let longest = tables.iter().map(|(table, _)| table.rows()).max().unwrap();
+    for (row, flight) in (0..longest).flat_map(|row| (0..tables.len()).map(move |flight| (row, flight))) {
+        let day = if flight == 3 && row >= 4321 { 1 } else { flight / 4 };
+        if row < tables[flight].0.rows() {
+            days[day].push((flight, row));
+        }
+    }
+    for (day, rows) in days.iter().enumerate() {
+        let fact =
+            |flight: usize, key: &str| tables[flight].1.iter().find(|(k, _)| k == key).unwrap().1.clone();
+        let text = |key: &str| Column::Text(rows.iter().map(|row| fact(row.0, key)).collect());
+        let keys = ["tail_number", "flight_id", "departure_utc", "flight_hours", "tail_hours_end"];
+        let mut columns: Vec<(String, Column)> = keys.map(|key| (key.to_owned(), text(key))).into();
+        for name in tables[0].0.names() {
+            let all: Vec<Vec<f64>> = tables.iter().map(|(table, _)| table.numbers(&name)).collect();
+            let values = rows.iter().map(|&(flight, row)| all[flight][row]).collect();
+            columns.push((name, Column::Real(values)));
+        }
+        write_parquet(&fleet.path(&format!("days/{day}.parquet")), &columns, &[]).unwrap();
+    }
+    fleet.configure("sample-data/logs/N412FP/*.parquet", "days/*.parquet");
+    fleet.configure("metadata = {", "by_row = true\ncolumns = {");
+    fleet.configure("[store]", "pieces = true\n\n[store]");
+    let account = fleet.run_ok(&["run"]);
+    assert!(account.contains("10 logs: 10 new or changed"), "{account}");
+    assert_eq!(numbers(&fleet), plain());
+    assert!(fleet.run_ok(&["run"]).contains("10 logs: 0 new or changed, 10 already processed"));
+    let checked = fleet.run_ok(&["check", "days/2.parquet"]);
+    assert!(
+        checked.contains("2 logs checked, 0 failed") && checked.contains("2.parquet#N412FP/"),
+        "{checked}"
+    );
+}
+
 /// Positions in one file, loads in another: the same numbers. Loads at half the rate: nearly so.
 #[test]
 fn loads_in_files_of_their_own_find_their_flights() {
@@ -406,10 +447,10 @@ fn missing_rows_of_a_long_log_raise_no_flag() {
         let fleet = one_tail();
         for log in logs(&fleet) {
             let table = Table::read(&log);
-            let time = table.reals("time_s");
+            let time = table.numbers("time_s");
             let channels = table.names().into_iter().filter_map(|name| {
                 let channel = CHANNELS.iter().position(|channel| name.ends_with(channel))?;
-                Some((channel, table.reals(&name), name))
+                Some((channel, table.numbers(&name), name))
             });
             let mut rows: Vec<(f64, String, f64)> = channels
                 .flat_map(|(channel, values, name)| {
@@ -442,7 +483,7 @@ fn check_names_the_rate_of_a_slower_screw() {
     for log in logs(&fleet) {
         let table = Table::read(&log);
         let column = |name: String| {
-            let mut values = table.reals(&name);
+            let mut values = table.numbers(&name);
             if name.ends_with("screw_mm") {
                 values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
             }
@@ -466,7 +507,7 @@ fn a_clock_that_restarts_names_its_settings() {
     let log = &logs(&fleet)[0];
     let table = Table::read(log);
     let column = |name: String| {
-        let mut values = table.reals(&name);
+        let mut values = table.numbers(&name);
         if name == "time_s" {
             let half = values.len() / 2;
             let first = values[0];
@@ -596,9 +637,7 @@ fn check_summarises_many_logs() {
     let fleet = one_tail();
     let text = fleet.run_ok(&["check"]);
     assert!(text.lines().count() < 40, "{text}");
-    for log in logs(&fleet) {
-        assert_eq!(text.matches(log.file_name().unwrap().to_str().unwrap()).count(), 1, "{text}");
-    }
+    assert!(text.contains("10 logs") && text.contains("1 tail") && text.contains(" Hz"), "{text}");
     let few = fleet.run_ok(&["check", "--limit", "2"]);
     assert!(few.contains("aileron_left_motor_deg") && few.contains("motor_position"), "{few}");
 }

@@ -393,7 +393,9 @@ impl ErrorKind {
                 "set its source under `[identity]`: `metadata`, `columns` or `path`"
             }
             Self::IdentityInvalid { .. } => "see `identity.departure_format` and `identity.time_zone`",
-            Self::IdentityChanges { .. } => "a log must hold one flight: split it by this column",
+            Self::IdentityChanges { .. } => {
+                "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight"
+            }
             Self::Table { detail, .. } if detail.contains("is not a UTC date") => {
                 "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z"
             }

@@ -5,10 +5,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use ingest::log::flight_rows;
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::Output;
 use ingest::mapping::column_pattern::nearest;
-use ingest::{ActuatorChannels, ActuatorColumns, Channels, Identity, Log, LogFiles, Mapping};
+use ingest::{
+    ActuatorChannels, ActuatorColumns, Channels, Identity, IdentityMapping, Log, LogFiles, Mapping,
+};
 use jiff::{SignedDuration, Timestamp};
 use records::{
     Diagnostic, Flight, GapEstimate, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
@@ -356,6 +359,20 @@ pub fn digest_without_identity(config: &Config, installations: &Installations) -
     hash.finalize().to_hex().to_string()
 }
 
+/// The paths of the flights in a file: its own, unless its rows name their flight.
+///
+/// # Errors
+/// A diagnostic when the file cannot be read.
+pub fn flights_in(
+    path: &Path,
+    display_name: &str,
+    identity: &IdentityMapping,
+) -> Result<Vec<PathBuf>, Diagnostic> {
+    catch_panic(display_name, || {
+        flight_rows::flights_in(path, identity).map_err(|e| e.diagnostic().in_file(display_name))
+    })
+}
+
 /// Which flight a log is, and which actuator where it holds but one, without reading its channels.
 ///
 /// # Errors
@@ -418,8 +435,10 @@ fn check_tail(identity: &Identity, display_name: &str, config: &Config) -> Resul
 
 /// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
+    let identity = &config.document.identity;
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
-    log.identity(|fields, start| config.flights.facts(path, fields, start, &config.document.identity))
+    let (path, _) = flight_rows::split_path(path, identity);
+    log.identity(|fields, start| config.flights.facts(&path, fields, start, identity))
 }
 
 type Mapped = (ActuatorColumns, Arc<Mapping>);

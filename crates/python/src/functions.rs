@@ -226,10 +226,7 @@ pub(crate) fn normalize(
     let installations = config.installations(py)?;
     let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
     let done = py.detach(|| {
-        let whole = |log: &PathBuf| {
-            Ok((pipeline::logs::discover::log_containing(&config.inner, log)?, log.display().to_string()))
-        };
-        let logs = logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?;
+        let logs = pipeline::logs::discover::named_logs(&config.inner, &logs)?;
         let place = (output.as_path(), encoding);
         pipeline::inspect::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
     });

@@ -198,12 +198,7 @@ pub(crate) fn check(
     let config = Arc::new(config.inner.clone());
     let seen = py.detach(|| {
         let (logs, faults) = match logs {
-            Some(logs) => {
-                let whole = |log: &PathBuf| {
-                    Ok((pipeline::logs::discover::log_containing(&config, log)?, log.display().to_string()))
-                };
-                (logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?, Vec::new())
-            }
+            Some(logs) => (pipeline::logs::discover::named_logs(&config, &logs)?, Vec::new()),
             None => {
                 let found = pipeline::logs::discover::discover(&config)?;
                 let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();

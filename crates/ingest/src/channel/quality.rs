@@ -109,30 +109,6 @@ fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Those of [`runs`] that repeat one of two values: rare, so most samples are passed over in groups.
-#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
-fn repeat_runs_of(values: &[f64], of: [f64; 2], least: usize) -> Vec<Range<usize>> {
-    const GROUP: usize = 16;
-    let is_one = |v: &f64| *v == of[0] || *v == of[1];
-    let (mut found, mut done) = (Vec::new(), 0);
-    for start in (0..values.len()).step_by(GROUP) {
-        let group = &values[start..values.len().min(start + GROUP)];
-        if group.iter().filter(|v| is_one(v)).count() == 0 {
-            continue;
-        }
-        for at in start..start + group.len() {
-            if at < done || !is_one(&values[at]) {
-                continue;
-            }
-            done = at + values[at..].iter().take_while(|v| **v == values[at]).count();
-            if done - at >= least {
-                found.push(at..done);
-            }
-        }
-    }
-    found
-}
-
 /// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
 /// leaves it at full speed, more than once. A position that comes to rest slows down first.
 #[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
@@ -142,7 +118,8 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     if longest_run < LEAST_RUN {
         return 0;
     }
-    let at_rails: Vec<Range<usize>> = repeat_runs_of(values, [min, max], LEAST_RUN);
+    let is_rail = |run: &Range<usize>| [min, max].contains(&values[run.start]);
+    let at_rails: Vec<Range<usize>> = runs(values, LEAST_RUN).filter(is_rail).collect();
     if at_rails.is_empty() {
         return 0;
     }
@@ -333,20 +310,7 @@ pub(crate) fn load_frozen(
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
-
-    proptest! {
-        /// Passing over samples in groups finds the runs at the rails that looking at each of them does.
-        #[test]
-        fn runs_at_the_rails_are_those_of_all_runs(ticks in proptest::collection::vec(-2_i32..3, 0..90)) {
-            let values: Vec<f64> =
-                ticks.iter().map(|&k| if k == 0 { f64::NAN } else { f64::from(k) }).collect();
-            let all = runs(&values, 2).filter(|run| values[run.start].abs() > 1.5);
-            prop_assert_eq!(repeat_runs_of(&values, [-2.0, 2.0], 2), all.collect::<Vec<_>>());
-        }
-    }
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {

@@ -23,8 +23,22 @@ fn words(name: &str) -> Vec<(usize, &str)> {
     found
 }
 
-const TIMES: [&str; 11] =
-    ["time", "t", "timestamp", "stamp", "elapsed", "tick", "ticks", "clock", "utc", "epoch", "unix"];
+const TIMES: [&str; 14] = [
+    "time",
+    "t",
+    "timestamp",
+    "stamp",
+    "elapsed",
+    "tick",
+    "ticks",
+    "clock",
+    "utc",
+    "epoch",
+    "unix",
+    "gmt",
+    "zulu",
+    "tod",
+];
 
 pub(super) fn is_time(name: &str) -> bool {
     words(name).iter().any(|(_, word)| TIMES.contains(&word.to_lowercase().as_str()))
@@ -55,6 +69,11 @@ const ROLES: [(Role, &[&str]); 4] = [
 
 /// Words without information.
 const FILLERS: [&str; 8] = ["position", "pos", "angle", "displacement", "cell", "sensor", "meas", "value"];
+
+/// Whether a time of this name counts from midnight, if its values do not contradict.
+pub(super) fn is_of_day(name: &str) -> bool {
+    words(name).iter().any(|(_, word)| ["gmt", "utc", "zulu", "tod"].contains(&word.to_lowercase().as_str()))
+}
 
 /// The unit that a word in small letters is.
 fn unit_of(word: &str) -> Option<Unit> {
@@ -105,11 +124,22 @@ impl ParsedName {
         if words.iter().any(|(_, _, word)| says(&OTHERS, word)) {
             return None;
         }
-        // The temperature of a motor is a temperature.
-        let roles = ROLES.iter().rev().filter(|(role, _)| *role == Role::Temperature).chain(&ROLES);
-        let (at, role) = roles
-            .filter_map(|(role, known)| Some((words.iter().position(|(_, _, w)| says(known, w))?, *role)))
-            .min_by_key(|(at, role)| (*role != Role::Temperature, *at))?;
+        let named = |(role, known): &(Role, &[&str])| {
+            Some((words.iter().position(|(_, _, word)| says(known, word))?, *role))
+        };
+        let named: Vec<(usize, Role)> = ROLES.iter().filter_map(named).collect();
+        let has = |role: Role| named.iter().any(|(_, of)| *of == role);
+        if has(Role::Motor) && has(Role::Load) {
+            // What the motor bears is not the load of the screw.
+            return None;
+        }
+        // The temperature of a motor is a temperature, and the load of a ram a load.
+        let rank = |role: Role| match role {
+            Role::Temperature => 0,
+            Role::Load => 1,
+            _ => 2,
+        };
+        let (at, role) = named.iter().copied().min_by_key(|(at, role)| (rank(*role), *at))?;
         let fits = |unit: &Unit| match role {
             Role::Motor | Role::Screw => matches!(unit.dimension(), Dimension::Length | Dimension::Angle),
             Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),
@@ -124,14 +154,14 @@ impl ParsedName {
         let is_unit = |i: usize| found.is_some_and(|(at, _)| at == i);
         let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(&SENSORS, &words[*i].2));
         let sensor = tag.and_then(|i| SENSORS.iter().position(|word| *word == words[i].2));
-        let is_other_role =
-            |word: &str| role == Role::Temperature && ROLES.iter().any(|(_, known)| says(known, word));
+        // `RAM_LOAD` and `MTR_RESOLVER`: two words for one channel.
+        let is_of_channel = |i: usize| {
+            ROLES.iter().any(|(of, known)| {
+                says(known, &words[i].2) && (rank(role) < 2 || (*of == role && i.abs_diff(at) == 1))
+            })
+        };
         let is_place = |i: &usize| {
-            *i != at
-                && !is_unit(*i)
-                && tag != Some(*i)
-                && !says(&FILLERS, &words[*i].2)
-                && !is_other_role(&words[*i].2)
+            *i != at && !is_unit(*i) && tag != Some(*i) && !says(&FILLERS, &words[*i].2) && !is_of_channel(*i)
         };
         let place: Vec<usize> = (0..words.len()).filter(is_place).collect();
         let run = place.windows(2).all(|w| w[1] == w[0] + 1);
@@ -182,12 +212,28 @@ mod tests {
                 Some(Unit::Degree),
             ),
             ("rudder/screw_position", Role::Screw, "{position}/screw_position", place("rudder"), None),
+            (
+                "AIL_L_MTR_RESOLVER_DEG",
+                Role::Motor,
+                "{position}_MTR_RESOLVER_DEG",
+                place("AIL_L"),
+                Some(Unit::Degree),
+            ),
+            ("ELEV_R_FORCE_LBF", Role::Load, "{position}_FORCE_LBF", place("ELEV_R"), Some(Unit::PoundForce)),
+            ("RAM_LOAD", Role::Load, "RAM_LOAD", None, None),
+            (
+                "rudder_torque_nm",
+                Role::Load,
+                "{position}_torque_nm",
+                place("rudder"),
+                Some(Unit::NewtonMetre),
+            ),
             ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
         ];
         for (name, role, pattern, position, unit) in cases {
             assert_eq!(inferred(name), Some((role, pattern.to_owned(), position, unit)), "{name}");
         }
-        assert_eq!(inferred("airspeed_kt"), None);
+        assert_eq!((inferred("airspeed_kt"), inferred("aileron_left_motor_torque_nm")), (None, None));
     }
 
     #[test]

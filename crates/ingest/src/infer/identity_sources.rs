@@ -6,63 +6,53 @@ use std::path::Path;
 use crate::log::identity::hive_folders;
 use crate::mapping::IdentityField;
 
-/// Names by which a fact goes, in small letters.
-const SOUNDS: [(IdentityField, &[&str]); 6] = [
+/// Names by which a fact goes, in small letters, the best known one first.
+const SOUNDS: [(IdentityField, &str); 6] = [
     (
         IdentityField::TailNumber,
-        &["tail_number", "tail", "tail_no", "registration", "reg", "ac_reg", "aircraft", "tail_id", "msn"],
+        "tail_number tail tail_no registration reg ac_reg aircraft_registration aircraft tail_id aircraft_id ac_id ac msn",
     ),
     (
         IdentityField::FlightId,
-        &["flight_id", "flight", "flight_number", "flight_no", "leg", "leg_id", "sortie"],
+        "flight_id flight_leg_id flight flight_number flight_no flt_no flt_id leg leg_id sortie",
     ),
     (
         IdentityField::DepartureUtc,
-        &[
-            "departure_utc",
-            "departure",
-            "departure_time",
-            "takeoff_utc",
-            "takeoff",
-            "off_block_utc",
-            "off_block",
-            "off",
-            "start_utc",
-            "date_utc",
-        ],
+        "departure_utc departure departure_time takeoff_utc takeoff off_block_utc off_block off start_utc date_utc \
+         flight_date date",
     ),
-    (IdentityField::Position, &["position", "actuator", "actuator_position", "surface"]),
+    (IdentityField::Position, "position actuator actuator_position surface"),
     (
         IdentityField::FlightHours,
-        &["flight_hours", "flight_duration_h", "duration_h", "flight_time_h", "block_hours", "flight_h"],
+        "flight_hours flight_duration_h duration_h flight_time_h block_hours flight_h",
     ),
     (
         IdentityField::TailHoursEnd,
-        &["tail_hours_end", "tail_hours", "total_hours", "airframe_hours", "aircraft_hours", "total_time_h"],
+        "tail_hours_end tail_hours total_hours airframe_hours aircraft_hours total_time_h",
     ),
 ];
 
+/// The fact that a name sounds like, and how far behind the best known name of that fact.
+fn rank_of(name: &str) -> Option<(IdentityField, usize)> {
+    let plain = name.trim().to_lowercase().replace(['-', ' ', '.'], "_");
+    SOUNDS.iter().find_map(|(fact, known)| Some((*fact, known.split(' ').position(|word| word == plain)?)))
+}
+
 /// The fact that a name sounds like.
 pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
-    let plain = name.trim().to_lowercase().replace(['-', ' ', '.'], "_");
-    SOUNDS.iter().find(|(_, known)| known.contains(&plain.as_str())).map(|(fact, _)| *fact)
+    rank_of(name).map(|(fact, _)| fact)
 }
 
 /// The name of each fact among some names, the best known one first.
 pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str> {
-    let rank = |fact: IdentityField, name: &str| {
-        let known = SOUNDS.iter().find(|(of, _)| *of == fact).map_or(&[][..], |(_, known)| known);
-        known.iter().position(|word| *word == name.to_lowercase())
-    };
-    let mut found: BTreeMap<IdentityField, &str> = BTreeMap::new();
+    let mut found: BTreeMap<IdentityField, (usize, &str)> = BTreeMap::new();
     for name in names {
-        let Some(fact) = fact_of(name) else { continue };
-        let is_better = found.get(&fact).is_none_or(|other| rank(fact, name) < rank(fact, other));
-        if is_better {
-            found.insert(fact, name);
+        let Some((fact, rank)) = rank_of(name) else { continue };
+        if found.get(&fact).is_none_or(|(best, _)| rank < *best) {
+            found.insert(fact, (rank, name));
         }
     }
-    found
+    found.into_iter().map(|(fact, (_, name))| (fact, name)).collect()
 }
 
 /// Folders called `name=value` whose names sound like facts.

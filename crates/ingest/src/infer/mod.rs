@@ -15,15 +15,16 @@ use arrow::datatypes::DataType;
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::Error;
-use crate::infer::column_names::{ParsedName, is_time, is_unit, time_unit};
+use crate::infer::column_names::{ParsedName, is_of_day, is_time, is_unit, time_unit};
 use crate::infer::identity_sources::{fact_of, facts_of, folders};
 use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::Unit;
-use crate::mapping::{ClockMapping, IdentityField, Layout, Role};
+use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
 use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
 use crate::parquet::row_selection::RowSelection;
+use crate::time::clock::DAY_S;
 
 pub use identity_sources::{PLACE_END, folder_value, path_identity, path_position, path_tail};
 
@@ -32,8 +33,8 @@ pub use identity_sources::{PLACE_END, folder_value, path_identity, path_position
 pub struct InferredMapping {
     /// The time column, and its unit where the name holds one; timestamp types need none.
     pub clock: Option<(String, Option<&'static str>)>,
-    /// Whether the time column counts from 1970, in its unit.
-    pub is_unix_clock: bool,
+    /// What the time column counts from, in its unit.
+    pub epoch: Epoch,
     /// Channel → its column with `{position}` in it, and its unit where the name holds one.
     pub channels: BTreeMap<Role, (String, Option<Unit>)>,
     /// Redundant columns of a channel, best first.
@@ -46,34 +47,24 @@ pub struct InferredMapping {
     pub positions: BTreeSet<String>,
     /// Facts that the footer's metadata holds: fact → key.
     pub metadata: BTreeMap<IdentityField, String>,
-    /// Facts that columns of one value hold: fact → column.
+    /// Facts that columns hold: fact → column.
     pub columns: BTreeMap<IdentityField, String>,
+    /// Whether those columns name more than one flight.
+    pub by_row: bool,
     /// Facts that folders called `name=value` hold: fact → name.
     pub folders: BTreeMap<IdentityField, String>,
-    /// The tail that the log names.
-    pub tail: Option<String>,
+    /// The tails that the log names.
+    pub tails: BTreeSet<String>,
     /// Columns that hold numbers and were not understood.
     pub others: Vec<String>,
 }
 
 /// Names of columns that name the channel of a row, and of those that hold its value.
-const NAME_COLUMNS: [&str; 12] = [
-    "parameter",
-    "parameter_name",
-    "param",
-    "name",
-    "channel",
-    "channel_name",
-    "signal",
-    "signal_name",
-    "mnemonic",
-    "label",
-    "variable",
-    "tag",
-];
-const VALUE_COLUMNS: [&str; 7] = ["value", "val", "reading", "data", "measurement", "sample", "v"];
+const NAME_COLUMNS: &str =
+    "parameter parameter_name param name channel channel_name signal signal_name mnemonic label variable tag";
+const VALUE_COLUMNS: &str = "value val reading data measurement sample v";
 /// Names of columns that name the position of a row, beyond those of a fact.
-const POSITION_COLUMNS: [&str; 6] = ["unit", "location", "ema", "servo", "actuator_id", "side"];
+const POSITION_COLUMNS: &str = "unit location ema servo actuator_id side";
 
 /// Looks at one log.
 ///
@@ -90,19 +81,28 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     metadata.remove(&IdentityField::Position);
     let constant = |name: &str| table.constant(name, "fact").ok().flatten();
     let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
-    let facts = facts_of(&single).into_iter().filter(|(fact, _)| !metadata.contains_key(fact));
-    let columns = owned(facts.filter(|(_, name)| constant(name).is_some()).collect());
+    let facts: Vec<_> =
+        facts_of(&single).into_iter().filter(|(fact, _)| !metadata.contains_key(fact)).collect();
+    let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
+    let varies =
+        |name: &str| constant(name).is_none() && table.texts(name).is_ok_and(|texts| texts.len() > 1);
+    let by_row = facts.iter().any(|(fact, name)| of_flight(*fact) && varies(name));
+    let is_date = |name: &str| leaves.iter().any(|leaf| leaf.name == name && leaf.kind == DataType::Date32);
+    let is_kept = |(fact, name): &(IdentityField, &str)| {
+        constant(name).is_some() || (by_row && (of_flight(*fact) || is_date(name)))
+    };
+    let columns = owned(facts.into_iter().filter(is_kept).collect());
     let layout = layout(&table, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
     let clock =
         clock(leaves, |name| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some()));
-    let mut is_unix_clock = false;
+    let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
         let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
         let times = if is_number { numbers(file, &name) } else { Vec::new() };
         let unit = unit.or_else(|| unit_of_steps(&times));
-        is_unix_clock = unit.is_some_and(|unit| counts_from_1970(&times, unit));
+        epoch = unit.map_or(Epoch::None, |unit| epoch_of(&times, unit, is_of_day(&name)));
         (name, unit)
     });
     let is_clock = |name: &str| clock.as_ref().is_some_and(|(column, _)| column == name);
@@ -128,17 +128,25 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     } else if let Some(column) = columns.get(&IdentityField::Position) {
         found.positions = constant(column).into_iter().collect();
     }
+    let first = found.positions.iter().next().map_or("", String::as_str);
+    for (pattern, unit) in found.channels.values_mut().filter(|(_, unit)| unit.is_none()) {
+        *unit = file.field_metadata(&pattern.replace(PLACEHOLDER, first)).unit;
+    }
     found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
     let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
-    let tail = tail.or_else(|| columns.get(&IdentityField::TailNumber).and_then(|column| constant(column)));
+    let tails = match (tail, columns.get(&IdentityField::TailNumber)) {
+        (None, Some(column)) => table.texts(column)?.as_ref().clone(),
+        (tail, _) => tail.into_iter().collect(),
+    };
     Ok(InferredMapping {
         clock,
-        is_unix_clock,
+        epoch,
         layout,
         metadata,
         columns,
+        by_row,
         folders: folders(path),
-        tail,
+        tails,
         ..found
     })
 }
@@ -146,10 +154,11 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
 /// The layout that columns of names, values and positions show.
 fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
     let leaves = table.files[0].leaves();
-    let is_called = |leaf: &LeafColumn, known: &[&str]| known.contains(&leaf.name.to_lowercase().as_str());
+    let is_called =
+        |leaf: &LeafColumn, known: &str| known.split(' ').any(|word| word == leaf.name.to_lowercase());
     let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
-    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, &NAME_COLUMNS));
-    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, &VALUE_COLUMNS));
+    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, NAME_COLUMNS));
+    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, VALUE_COLUMNS));
     let mut layout = Layout::default();
     if let (Some(name), Some(value)) = (name, value) {
         (layout.name_column, layout.value_column) = (Some(name.name.clone()), Some(value.name.clone()));
@@ -158,7 +167,7 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
         |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
     for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
         let is_position =
-            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, &POSITION_COLUMNS);
+            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, POSITION_COLUMNS);
         let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
         if texts.len() > 1 && !texts.iter().all(|text| is_unit(text)) {
             layout.position_column = Some(leaf.name.clone());
@@ -210,17 +219,21 @@ fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     }
 }
 
-/// Whether times lie between 1990 and 2100 when they count from 1970.
-fn counts_from_1970(times: &[f64], unit: &str) -> bool {
+/// 1970 where times lie between 1990 and 2100 when they count from there; midnight where they lie within a day and
+/// the name of the column has it.
+fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
     let scale = match unit {
         "s" => 1.0,
         "ms" => 1e-3,
         "us" => 1e-6,
         "ns" => 1e-9,
-        _ => return false,
+        _ => return Epoch::None,
     };
-    let first = times.iter().find(|time| !time.is_nan());
-    first.is_some_and(|first| (631_152_000.0..4_102_444_800.0).contains(&(first * scale)))
+    match times.iter().find(|time| !time.is_nan()).map(|first| first * scale) {
+        Some(first_s) if (631_152_000.0..4_102_444_800.0).contains(&first_s) => Epoch::Unix,
+        Some(first_s) if is_of_day && (0.0..DAY_S).contains(&first_s) => Epoch::Midnight,
+        _ => Epoch::None,
+    }
 }
 
 /// The struct that all numbers are fields of, with its dot.
@@ -331,7 +344,7 @@ mod tests {
         let positions: Vec<&str> = found.positions.iter().map(String::as_str).collect();
         assert_eq!(positions, ["aileron_left", "aileron_right", "elevator_left", "elevator_right"]);
         assert_eq!((found.metadata.len(), found.others.len()), (5, 0));
-        assert_eq!(found.tail.as_deref(), Some("N412FP"));
+        assert!(found.tails.iter().eq(["N412FP"]));
     }
 
     fn of(names: &[&str]) -> InferredMapping {
@@ -366,11 +379,13 @@ mod tests {
         ];
         write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
         let found = propose(&file).unwrap();
-        assert_eq!((found.clock, found.is_unix_clock), (Some(("unix_ms".to_owned(), Some("ms"))), true));
+        assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
         assert_eq!(found.layout.position_column, None);
         assert_eq!(found.channels[&Role::Load].0, "{position}/load");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
-        assert!(!counts_from_1970(&[0.0, 0.01], "s") && !counts_from_1970(&[1_795_061_580.0], "ms"));
+        let epochs = [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true)]
+            .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
+        assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight]);
     }
 
     /// A long table with its identity in columns, one of which is a constant instant.
@@ -397,7 +412,7 @@ mod tests {
         assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
         let facts: Vec<&str> = found.columns.values().map(String::as_str).collect();
-        assert_eq!(facts, ["tail_number", "flight_id", "departure_utc"]);
-        assert_eq!(found.tail.as_deref(), Some("N412FP"));
+        assert_eq!((facts, found.by_row), (vec!["tail_number", "flight_id", "departure_utc"], false));
+        assert!(found.tails.iter().eq(["N412FP"]));
     }
 }

@@ -45,6 +45,13 @@ impl Digest {
         Ok(())
     }
 
+    /// Adds a text and its length.
+    pub(crate) fn take_text(&mut self, text: &str) {
+        self.hash.update(&self.buffer[..std::mem::take(&mut self.filled)]);
+        self.hash.update(&text.len().to_le_bytes());
+        self.hash.update(text.as_bytes());
+    }
+
     /// In hexadecimal.
     pub(crate) fn end(mut self) -> String {
         self.hash.update(&self.buffer[..self.filled]);

@@ -13,13 +13,14 @@ use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
+use crate::log::flight_rows::{FlightRow, split_path};
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized::Normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
 use crate::log::types::{ActuatorChannels, ActuatorColumns, LogFiles};
 use crate::mapping::column_pattern::ColumnPattern;
-use crate::mapping::{ChannelMapping, Channels, IdentityField, Mapping, Role, SampleFilter};
+use crate::mapping::{ChannelMapping, Channels, IdentityField, IdentityMapping, Mapping, Role, SampleFilter};
 use crate::parquet::log_file::LogFile;
 use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::TimeOrigin;
@@ -53,15 +54,24 @@ impl Log {
     /// # Errors
     /// When a file cannot be read, is empty, or is not whole Parquet.
     pub fn open(files: &LogFiles, mapping: &Arc<Mapping>) -> Result<Self, Error> {
-        let open = |paths: &[PathBuf]| paths.iter().map(|p| LogFile::open(p)).collect::<Result<Vec<_>, _>>();
+        let open_one = |(path, flight_rows): (PathBuf, Vec<FlightRow>)| {
+            let mut file = LogFile::open(&path)?;
+            file.flight_rows = flight_rows;
+            Ok(file)
+        };
+        let open = |paths: &[PathBuf], identity: &IdentityMapping| {
+            let paths = paths.iter().map(|path| split_path(path, identity));
+            paths.map(open_one).collect::<Result<Vec<_>, _>>()
+        };
         let (clock, layout) = (mapping.clock.clone(), mapping.layout.clone());
-        let main = RowTable::new(open(&files.main)?, clock, layout);
+        let main = RowTable::new(open(&files.main, &mapping.identity)?, clock, layout);
         let mut groups = BTreeMap::new();
         for (name, group) in &mapping.groups {
             let paths = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
             if !paths.is_empty() {
                 let clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
-                groups.insert(name.clone(), RowTable::new(open(paths)?, clock, group.layout.clone()));
+                let files = open(paths, group.identity.as_ref().unwrap_or(&mapping.identity))?;
+                groups.insert(name.clone(), RowTable::new(files, clock, group.layout.clone()));
             }
         }
         let Some(first) = main.files.first() else {
@@ -150,7 +160,7 @@ impl Log {
         known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
     ) -> Result<Identity, Error> {
         if let Some(normalized) = &self.normalized {
-            let own = crate::mapping::IdentityMapping::default();
+            let own = IdentityMapping::default();
             return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
         }
         let mapping = &self.mapping.identity;
@@ -554,8 +564,10 @@ impl Log {
 
     /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
     fn check_one_flight(&self, (sampling, map): &ReferenceClock<'_, '_>) -> Result<(), Error> {
-        let by_row = [IdentityField::FlightId, IdentityField::DepartureUtc];
-        if by_row.iter().any(|field| self.mapping.identity.columns.contains_key(field)) {
+        let identity = &self.mapping.identity;
+        let fields = [IdentityField::FlightId, IdentityField::DepartureUtc];
+        // Where a file holds many flights, a flight number may come again on another day.
+        if !identity.by_row && fields.iter().any(|field| identity.columns.contains_key(field)) {
             return Ok(());
         }
         let sheet = self.sheet_of(map)?;
@@ -636,7 +648,7 @@ struct ReferenceChannel<'s, 'c> {
 }
 
 /// Identity fields in the files of a row table.
-fn facts(sheet: &RowTable, map: &crate::mapping::IdentityMapping) -> Result<IdentityFields, Error> {
+fn facts(sheet: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Error> {
     let first = &sheet.files[0];
     let mut facts: IdentityFields = map.values.clone();
     facts.extend(identity::from_hive_path(first.path(), &map.folders));

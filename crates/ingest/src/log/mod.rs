@@ -3,13 +3,13 @@
 mod assemble;
 mod channel_reader;
 mod flight_log;
+pub mod flight_rows;
 pub mod identity;
 pub mod in_memory;
 pub mod normalized;
 mod row_partition;
 pub(crate) mod row_table;
 mod selection;
-mod timestamps;
 mod types;
 
 pub use flight_log::{Log, companion_identity};

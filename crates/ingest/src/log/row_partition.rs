@@ -3,13 +3,14 @@
 //! A row of such a file belongs to one channel, or to one actuator, and a column of texts names it. Other
 //! rows are dropped as they are decoded, and row groups whose statistics exclude every requested text are not decoded.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use arrow::array::{Array, ArrayRef, AsArray, UInt32Array};
 use arrow::compute::take;
 use arrow::datatypes::Int32Type;
 
+use crate::bounds;
 use crate::error::{Error, ErrorKind};
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::as_text;
@@ -22,6 +23,9 @@ const MAX_GATHERED_BYTES: usize = 256 << 20;
 
 /// No slot: the row belongs to a channel that is not requested.
 const NONE: u32 = u32::MAX;
+
+/// The most combinations of texts of the columns that name rows: more are the numbers or times of a wrong column.
+const MAX_COMBINATIONS: u64 = 1 << 22;
 
 /// Which samples are meant: the leaf that holds them, and the rows in which it does.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,6 +47,16 @@ impl RowKeys {
     pub(crate) fn of(samples: &SampleSelector) -> Self {
         let (columns, texts) = samples.rows.iter().cloned().unzip();
         Self { columns, texts }
+    }
+
+    /// These rows, as far as they are of the flight that a file is opened for.
+    fn of_flight(&self, file: &LogFile) -> Self {
+        let mut rows = self.clone();
+        for (column, text) in &file.flight_rows {
+            rows.columns.push(column.clone());
+            rows.texts.push(text.clone());
+        }
+        rows
     }
 }
 
@@ -112,7 +126,9 @@ impl Partition {
         let mut leaves = vec![leaf.to_owned()];
         // Lists of different channels may differ in length: their leaves are gathered one by one.
         let has_lists = state.leaves.iter().chain([&samples.leaf]).any(|name| is_listed(name));
-        if asked.2.is_none() && !has_lists {
+        // Rows of a flight in which each is a sample of every channel: one leaf at a time, as in a file of their own.
+        let is_wide = asked.0.columns.is_empty();
+        if asked.2.is_none() && !has_lists && !is_wide {
             let here = |name: &&String| *name != leaf && files.iter().all(|file| file.has(name));
             leaves.extend(state.leaves.iter().filter(here).cloned());
         }
@@ -123,7 +139,10 @@ impl Partition {
                 && !state.gathered.contains_key(&(rows.clone(), leaf.to_owned(), asked.2.clone()))
         };
         keys.extend(state.announced.iter().map(|(rows, _)| rows).filter(|rows| is_new(rows)).cloned());
-        let gathered = gather(files, &keys, &leaves, asked.2.as_deref())?;
+        let mut gathered = gather(files, &keys, &leaves, asked.2.as_deref())?;
+        if is_wide {
+            return Ok(Arc::new(gathered.remove(0).remove(0)));
+        }
         for (slot, parts) in gathered.into_iter().enumerate() {
             for (name, arrays) in leaves.iter().zip(parts) {
                 state.gathered.insert((keys[slot].clone(), name.clone(), asked.2.clone()), Arc::new(arrays));
@@ -142,13 +161,14 @@ fn gather(
     leaves: &[String],
     aligned: Option<&str>,
 ) -> Result<Gathered, Error> {
-    let columns: Vec<&str> = keys[0].columns.iter().map(String::as_str).collect();
     let leaves: Vec<&str> = leaves.iter().map(String::as_str).collect();
-    let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
-    let mut slots = Slots::of(keys);
     let mut gathered: Gathered = vec![vec![Vec::new(); leaves.len()]; keys.len()];
     let mut bytes = vec![0_usize; keys.len()];
     for file in files {
+        let keys: Vec<RowKeys> = keys[..gathered.len()].iter().map(|rows| rows.of_flight(file)).collect();
+        let columns: Vec<&str> = keys[0].columns.iter().map(String::as_str).collect();
+        let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
+        let mut slots = Slots::of(&keys);
         let may_hold = |group: usize| {
             keys.iter().any(|rows| {
                 let mut pairs = rows.columns.iter().zip(&rows.texts);
@@ -188,68 +208,40 @@ fn gather(
 
 /// The rows of a batch by slot: slot k holds the rows of key k.
 struct Slots {
-    /// For each column the number of each requested text.
-    texts: Vec<BTreeMap<String, u32>>,
-    /// The slot of every combination of these numbers, the last column's counting fastest.
+    /// The requested texts of each column.
+    columns: Vec<TextNumbers>,
+    /// The slot of every combination of their numbers.
     slots: Vec<u32>,
-    /// The number of each text of a dictionary, and that dictionary, as batch after batch shares one.
-    coded: Vec<Option<(ArrayRef, Vec<u32>)>>,
     /// The rows of each slot.
     rows: Vec<Vec<u32>>,
 }
 
 impl Slots {
     fn of(keys: &[RowKeys]) -> Self {
-        let columns = keys[0].columns.len();
-        let texts: Vec<BTreeMap<String, u32>> = (0..columns)
-            .map(|column| {
-                let all: BTreeSet<&String> = keys.iter().map(|rows| &rows.texts[column]).collect();
-                all.into_iter().zip(0..).map(|(text, number)| (text.clone(), number)).collect()
-            })
-            .collect();
-        let mut slots = vec![NONE; texts.iter().map(BTreeMap::len).product()];
-        for (slot, rows) in (0..).zip(keys) {
-            let numbers = rows.texts.iter().zip(&texts);
-            let at = numbers.fold(0, |at, (text, known)| at * known.len() + known[text] as usize);
-            slots[at] = slot;
+        let mut columns: Vec<TextNumbers> = keys[0].columns.iter().map(|_| TextNumbers::default()).collect();
+        for rows in keys {
+            for (column, text) in columns.iter_mut().zip(&rows.texts) {
+                column.enter(text);
+            }
         }
-        Self { coded: vec![None; columns], texts, slots, rows: vec![Vec::new(); keys.len()] }
+        let mut slots = vec![NONE; columns.iter().map(|column| column.texts.len()).product()];
+        for (slot, rows) in (0..).zip(keys) {
+            let numbers =
+                columns.iter().zip(&rows.texts).map(|(column, text)| (column, column.numbers[text]));
+            slots[numbers.fold(0, combined) as usize] = slot;
+        }
+        Self { columns, slots, rows: vec![Vec::new(); keys.len()] }
     }
 
     /// Sorts the rows of a batch by slot.
-    fn assign(&mut self, columns: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        let mut combined = vec![0_u32; arrays.first().map_or(0, Array::len)];
-        for (k, (column, array)) in columns.iter().zip(arrays).enumerate() {
-            let of_column = self.texts[k].len() as u32;
-            let enter = |(at, number): (&mut u32, u32)| {
-                *at = if *at == NONE || number == NONE { NONE } else { *at * of_column + number };
-            };
-            if let Some(codes) = array.as_dictionary_opt::<Int32Type>() {
-                let numbers = self.numbers_of_codes(k, codes.values());
-                let number = |code: Option<i32>| code.map_or(NONE, |code| numbers[code as usize]);
-                combined.iter_mut().zip(codes.keys().iter().map(number)).for_each(enter);
-            } else {
-                let text = as_text(column, array)?;
-                let numbers = text.as_string::<i32>().iter().map(|text| number_of(&self.texts[k], text));
-                combined.iter_mut().zip(numbers).for_each(enter);
-            }
-        }
+    fn assign(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
+        let combinations = combine(&mut self.columns, names, arrays, false)?;
         self.rows.iter_mut().for_each(Vec::clear);
-        for (row, at) in (0..).zip(combined) {
+        for (row, at) in (0..).zip(combinations) {
             let slot = self.slots.get(at as usize).copied().unwrap_or(NONE);
             self.rows.get_mut(slot as usize).into_iter().for_each(|rows| rows.push(row));
         }
         Ok(())
-    }
-
-    /// The number of each code of a dictionary of column `k`.
-    fn numbers_of_codes(&mut self, k: usize, dictionary: &ArrayRef) -> &[u32] {
-        let known = self.coded[k].take().filter(|(known, _)| Arc::ptr_eq(known, dictionary));
-        let (_, numbers) = self.coded[k].insert(known.unwrap_or_else(|| {
-            let texts = dictionary.as_string::<i32>().iter();
-            (Arc::clone(dictionary), texts.map(|text| number_of(&self.texts[k], text)).collect())
-        }));
-        numbers
     }
 
     /// The rows of a slot in the batch.
@@ -258,9 +250,120 @@ impl Slots {
     }
 }
 
-/// The number of a requested text.
-fn number_of(texts: &BTreeMap<String, u32>, text: Option<&str>) -> u32 {
-    text.and_then(|text| texts.get(text)).copied().unwrap_or(NONE)
+/// The combinations of texts that the rows of some columns hold; a row without one of the texts holds none.
+#[derive(Debug, Default)]
+pub(crate) struct DistinctTexts {
+    columns: Vec<TextNumbers>,
+    pub(crate) found: BTreeSet<Vec<String>>,
+}
+
+impl DistinctTexts {
+    /// Looks at a file; a row group that holds but one combination, by its statistics, is not read.
+    ///
+    /// # Errors
+    /// When a column is missing or cannot be decoded.
+    pub(crate) fn take_file(&mut self, file: &LogFile, names: &[&str]) -> Result<(), Error> {
+        let only = |group: usize| -> Option<Vec<String>> {
+            names.iter().map(|name| Some(file.text_bounds(name, group)?.only()?.to_owned())).collect()
+        };
+        self.found.extend(file.groups().filter_map(only));
+        let wants_group = &|group| only(group).is_none();
+        let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group };
+        file.scan(names, scan, |arrays| self.take(names, arrays))
+    }
+
+    /// Looks at a batch.
+    ///
+    /// # Errors
+    /// When a column has no text form, or the combinations are too many.
+    pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
+        self.columns.resize_with(names.len(), TextNumbers::default);
+        let combinations = combine(&mut self.columns, names, arrays, true)?;
+        let all = self.columns.iter().map(|column| column.texts.len()).product();
+        let mut used = vec![false; all];
+        combinations.into_iter().filter(|at| *at != NONE).for_each(|at| used[at as usize] = true);
+        for mut at in (0..used.len()).filter(|at| used[*at]) {
+            let mut texts = Vec::with_capacity(names.len());
+            for column in self.columns.iter().rev() {
+                texts.push(column.texts[at % column.texts.len()].clone());
+                at /= column.texts.len();
+            }
+            texts.reverse();
+            self.found.insert(texts);
+        }
+        Ok(())
+    }
+}
+
+/// The texts of a column, numbered.
+#[derive(Debug, Default)]
+struct TextNumbers {
+    texts: Vec<String>,
+    numbers: HashMap<String, u32>,
+    /// A dictionary and the number of each of its codes, as batch after batch shares one.
+    coded: Option<(ArrayRef, Vec<u32>)>,
+}
+
+impl TextNumbers {
+    fn enter(&mut self, text: &str) -> u32 {
+        if let Some(number) = self.numbers.get(text) {
+            return *number;
+        }
+        let number = self.texts.len() as u32;
+        self.texts.push(text.to_owned());
+        self.numbers.insert(text.to_owned(), number);
+        number
+    }
+
+    /// The number of a text; a new text gets one where the column `is_open`.
+    fn number(&mut self, text: Option<&str>, is_open: bool) -> u32 {
+        match text {
+            Some(text) if is_open => self.enter(text),
+            Some(text) => self.numbers.get(text).copied().unwrap_or(NONE),
+            None => NONE,
+        }
+    }
+
+    /// The number of each row.
+    fn rows(&mut self, name: &str, array: &ArrayRef, is_open: bool) -> Result<Vec<u32>, ErrorKind> {
+        let Some(codes) = array.as_dictionary_opt::<Int32Type>() else {
+            let texts = as_text(name, array)?;
+            return Ok(texts.as_string::<i32>().iter().map(|text| self.number(text, is_open)).collect());
+        };
+        let known = self.coded.take().filter(|(known, _)| Arc::ptr_eq(known, codes.values()));
+        let (dictionary, numbers) = known.unwrap_or_else(|| {
+            let texts = codes.values().as_string::<i32>().iter();
+            (Arc::clone(codes.values()), texts.map(|text| self.number(text, is_open)).collect())
+        });
+        let rows = codes.keys().iter().map(|code| code.map_or(NONE, |code| numbers[code as usize])).collect();
+        self.coded = Some((dictionary, numbers));
+        Ok(rows)
+    }
+}
+
+/// A combination with the number of one more column, the last column's counting fastest.
+fn combined(at: u32, (column, number): (&TextNumbers, u32)) -> u32 {
+    if at == NONE || number == NONE { NONE } else { at * column.texts.len() as u32 + number }
+}
+
+/// The combination of the numbers of each row.
+fn combine(
+    columns: &mut [TextNumbers],
+    names: &[&str],
+    arrays: &[ArrayRef],
+    is_open: bool,
+) -> Result<Vec<u32>, ErrorKind> {
+    let rows = arrays.first().map_or(0, Array::len);
+    let each = columns.iter_mut().zip(names.iter().zip(arrays));
+    let numbers = each.map(|(column, (name, array))| column.rows(name, array, is_open));
+    let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+    let all = columns.iter().fold(1_u64, |all, column| all.saturating_mul(column.texts.len() as u64));
+    bounds::check("texts of columns that name rows", all, MAX_COMBINATIONS)?;
+    let mut combinations = vec![0; rows];
+    for (column, numbers) in columns.iter().zip(numbers) {
+        combinations.iter_mut().zip(numbers).for_each(|(at, number)| *at = combined(*at, (column, number)));
+    }
+    Ok(combinations)
 }
 
 #[cfg(test)]

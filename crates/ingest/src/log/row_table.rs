@@ -10,15 +10,14 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use arrow::array::{Array, ArrayRef, AsArray, Scalar};
 use arrow::compute::cast;
 use arrow::compute::kernels::cmp;
-use arrow::datatypes::{DataType, Int32Type, Int64Type, UInt64Type};
+use arrow::datatypes::{DataType, Int64Type, UInt64Type};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
-use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
-use crate::log::timestamps::{TickEpoch, TickFormat, TimestampParser};
+use crate::log::row_partition::{DistinctTexts, Partition, RowKeys};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::units::TimeUnit;
@@ -27,6 +26,7 @@ use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::{DAY_S, TimeBase, Timestamps};
+use crate::time::timestamps::{TickEpoch, TickFormat, TimestampParser};
 
 /// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
 const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
@@ -121,12 +121,12 @@ impl RowTable {
         wanted: RowSelection<'_>,
     ) -> Result<(Vec<f64>, Option<ChannelStats>), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
-        let room = if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 };
+        let room = if self.holds_all(samples) { self.rows().min(1 << 26) } else { 0 };
         let mut values = ColumnBuilder::with_capacity(room, to_si);
         if to_si.is_some() && wanted.is_all() {
             values = values.with_stats();
         }
-        if samples.rows.is_empty() {
+        if self.holds_all(samples) {
             // In a list a row is no sample.
             let wanted = if self.is_listed(&samples.leaf) { RowSelection::ALL } else { wanted };
             for file in &self.files {
@@ -230,6 +230,16 @@ impl RowTable {
         self.partition.release(position);
     }
 
+    /// Whether every row of the files holds those samples.
+    fn holds_all(&self, samples: &SampleSelector) -> bool {
+        samples.rows.is_empty() && !self.is_of_many()
+    }
+
+    /// Whether a file holds rows of other flights.
+    fn is_of_many(&self) -> bool {
+        self.files.iter().any(|file| !file.flight_rows.is_empty())
+    }
+
     /// Hands over one leaf of the samples meant, batch by batch.
     fn each(
         &self,
@@ -237,7 +247,7 @@ impl RowTable {
         leaf: &str,
         mut take: impl FnMut(&ArrayRef) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
-        if !samples.rows.is_empty() {
+        if !self.holds_all(samples) {
             let gathered = self.partition.samples(&self.files, samples, leaf)?;
             return gathered.iter().try_for_each(take).map_err(|fault| self.error(fault));
         }
@@ -251,37 +261,20 @@ impl RowTable {
         Ok(())
     }
 
-    /// Every text that a column holds; a row group that holds but one, by its statistics, is not read.
+    /// Every text that a column holds.
     pub(crate) fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
         let known = |texts: &BTreeMap<String, Arc<BTreeSet<String>>>| texts.get(column).cloned();
         if let Some(texts) = known(&self.texts.lock().unwrap_or_else(PoisonError::into_inner)) {
             return Ok(texts);
         }
-        let mut found = BTreeSet::new();
-        for file in &self.files {
-            let only = |group: usize| file.text_bounds(column, group)?.only().map(str::to_owned);
-            found.extend(file.groups().filter_map(only));
-            let scan = Scan {
-                batch_rows: LONG_BATCH_ROWS,
-                as_codes: true,
-                wants_group: &|group| only(group).is_none(),
-            };
-            file.scan(&[column], scan, |arrays| {
-                let (array, mut used) = (&arrays[0], Vec::new());
-                let Some(codes) = array.as_dictionary_opt::<Int32Type>() else {
-                    return add_texts(column, array, &mut found);
-                };
-                used.resize(codes.values().len(), false);
-                codes.keys().iter().flatten().for_each(|code| used[code as usize] = true);
-                let texts = codes.values().as_string::<i32>();
-                for code in (0..used.len()).filter(|code| used[*code] && texts.is_valid(*code)) {
-                    if !found.contains(texts.value(code)) {
-                        found.insert(texts.value(code).to_owned());
-                    }
-                }
-                Ok(())
-            })?;
+        let mut distinct = DistinctTexts::default();
+        if self.is_of_many() {
+            let rows = SampleSelector { leaf: column.to_owned(), rows: Vec::new() };
+            self.each(&rows, column, |array| distinct.take(&[column], std::slice::from_ref(array)))?;
+        } else {
+            self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
         }
+        let found: BTreeSet<String> = distinct.found.into_iter().flatten().collect();
         let found = Arc::new(found);
         let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         texts.insert(column.to_owned(), Arc::clone(&found));
@@ -290,29 +283,39 @@ impl RowTable {
 
     /// One column as text that must not change; `None` when it is null throughout, or not there.
     pub(crate) fn constant(&self, column: &str, fact: &'static str) -> Result<Option<String>, Error> {
+        if let Some((_, text)) = self.files[0].flight_rows.iter().find(|(own, _)| own == column) {
+            return Ok(Some(text.clone()));
+        }
         let mut first: Option<String> = None;
         let mut row = 0_u64;
-        for file in self.files.iter().filter(|file| file.has(column)) {
-            file.scan(&[column], Scan { as_codes: true, ..Scan::PLAIN }, |arrays| {
-                let array =
-                    if is_uniform(&arrays[0]) { arrays[0].slice(0, 1) } else { Arc::clone(&arrays[0]) };
-                let text = as_text(column, &array)?;
-                let begun = row;
-                for value in text.as_string::<i32>() {
-                    match (value, &first) {
-                        (Some(value), Some(before)) if value != before => {
-                            let (found, before) = (value.to_owned(), before.clone());
-                            let column = column.to_owned();
-                            return Err(ErrorKind::IdentityChanges { fact, column, row, found, before });
-                        }
-                        (Some(value), None) => first = Some(value.to_owned()),
-                        _ => {}
+        let mut take = |array: &ArrayRef| {
+            let shown = if is_uniform(array) { array.slice(0, 1) } else { Arc::clone(array) };
+            let text = as_text(column, &shown)?;
+            let begun = row;
+            for value in text.as_string::<i32>() {
+                match (value, &first) {
+                    (Some(value), Some(before)) if value != before => {
+                        let (found, before) = (value.to_owned(), before.clone());
+                        let column = column.to_owned();
+                        return Err(ErrorKind::IdentityChanges { fact, column, row, found, before });
                     }
-                    row += 1;
+                    (Some(value), None) => first = Some(value.to_owned()),
+                    _ => {}
                 }
-                row = begun + arrays[0].len() as u64;
-                Ok(())
-            })?;
+                row += 1;
+            }
+            row = begun + array.len() as u64;
+            Ok(())
+        };
+        if self.is_of_many() {
+            let rows = SampleSelector { leaf: column.to_owned(), rows: Vec::new() };
+            if self.files.iter().all(|file| file.has(column)) {
+                self.each(&rows, column, take)?;
+            }
+            return Ok(first);
+        }
+        for file in self.files.iter().filter(|file| file.has(column)) {
+            file.scan(&[column], Scan { as_codes: true, ..Scan::PLAIN }, |arrays| take(&arrays[0]))?;
         }
         Ok(first)
     }
@@ -331,14 +334,11 @@ impl RowTable {
             let listed = |name: &str| file.leaf(name).is_ok_and(|leaf| leaf.is_listed);
             listed(&samples.leaf) && !listed(column)
         };
-        if samples.rows.is_empty() && self.files.iter().any(lists) {
+        let is_every_row = self.holds_all(samples);
+        if is_every_row && self.files.iter().any(lists) {
             return self.burst_stamps(samples, column, ticks);
         }
-        if samples.rows.is_empty()
-            && ticks.is_real()
-            && !self.is_listed(column)
-            && !self.is_listed(&samples.leaf)
-        {
+        if is_every_row && ticks.is_real() && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
             let mut reals = ColumnBuilder::with_capacity(self.rows().min(1 << 26), None);
             self.files
                 .iter()
@@ -347,7 +347,8 @@ impl RowTable {
             reader.take_reals(reals.finish().0);
             return Ok(reader.stamps());
         }
-        let mut reader = TimestampParser::new(column, ticks, self.rows());
+        let room = if is_every_row { self.rows() } else { 0 };
+        let mut reader = TimestampParser::new(column, ticks, room);
         self.each(samples, column, |array| reader.append(array))?;
         Ok(reader.stamps())
     }
@@ -384,7 +385,7 @@ impl RowTable {
     /// # Errors
     /// When they cannot be read.
     pub(crate) fn count(&self, samples: &SampleSelector) -> Result<usize, Error> {
-        if samples.rows.is_empty() && !self.is_listed(&samples.leaf) {
+        if self.holds_all(samples) && !self.is_listed(&samples.leaf) {
             return Ok(self.rows());
         }
         let mut count = 0;
@@ -459,16 +460,4 @@ impl RowTable {
 fn is_uniform(array: &ArrayRef) -> bool {
     let first = Scalar::new(array.slice(0, array.len().min(1)));
     !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
-}
-
-fn add_texts(column: &str, array: &ArrayRef, found: &mut BTreeSet<String>) -> Result<(), ErrorKind> {
-    let text = as_text(column, array)?;
-    let mut last: Option<&str> = None;
-    for value in text.as_string::<i32>().iter().flatten() {
-        if last != Some(value) && !found.contains(value) {
-            found.insert(value.to_owned());
-        }
-        last = Some(value);
-    }
-    Ok(())
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::skip_serializing_none;
 
 use crate::mapping::units::{TimeUnit, Unit};
 
@@ -26,18 +27,16 @@ pub struct Mapping {
 }
 
 /// How the rows of a log are laid out; by default a row holds one sample of every channel.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Layout {
     /// A row holds a sample of one channel, and this column names it; `column` of a channel is then
     /// such a name.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub name_column: Option<String>,
     /// Where the value of such a row stands.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub value_column: Option<String>,
     /// Each row belongs to one actuator, and this column names its position.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub position_column: Option<String>,
 }
 
@@ -61,6 +60,7 @@ pub struct GroupMapping {
 /// Where tail, flight and departure stand: in the file's metadata, in constant columns, in its path, in
 /// the names of its folders, or in the configuration itself. For each fact the first source that has it
 /// wins, in that order; the flights table fills what is still open.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
@@ -68,12 +68,15 @@ pub struct IdentityMapping {
     /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
-    /// Columns that hold one value throughout: fact → column.
+    /// Columns that hold one value throughout the log: fact → column.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<IdentityField, String>,
+    /// Whether rows name their flight, so that a file may hold many: each flight, by the columns of tail, flight id and
+    /// departure or landing, is a log of its own. A row without one of them is of no flight.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub by_row: bool,
     /// A regular expression on the absolute path with named groups, e.g.
     /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
     /// Folders called `name=value`, as Hive partitions are: fact → name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -82,11 +85,9 @@ pub struct IdentityMapping {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
     /// How departures are written, by `strftime` signs; ISO 8601 when not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub departure_format: Option<String>,
     /// The zone of departures that do not name one, e.g. `UTC` or `Europe/Istanbul`; without it such
     /// a departure is refused rather than guessed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_zone: Option<String>,
 }
 
@@ -137,33 +138,27 @@ impl IdentityField {
 }
 
 /// The clock of a log.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClockMapping {
     /// The time column. Not needed when `rate_hz` is given and rows are evenly spaced.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub column: Option<String>,
     /// Its unit; not needed for Arrow timestamps and text. `count` is a counter of samples.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<TimeUnit>,
     /// What a column of numbers counts from: nothing that is known, 1970 UTC, midnight of the day of departure, or the
     /// beginning of 1900 as spreadsheets have it (1899-12-30, local time).
     #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero, e.g. 65536.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wraps_at: Option<f64>,
     /// The rate of the rows, Hz, where it is known better than from the stamps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// How coarsely the clock ticks, s: rows that share a stamp are spread evenly instead of left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tick_s: Option<f64>,
     /// How far stamps may fall back and still be put in order, s. Default 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_back_s: Option<f64>,
     /// The longest pause of one flight, s; a longer one separates two flights, and the log is refused. Default 3600.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_gap_s: Option<f64>,
     /// Whether a log whose clock falls further is taken as several recordings, one after the other.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -186,6 +181,7 @@ pub enum Epoch {
 }
 
 /// The channels of an actuator.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channels {
@@ -195,10 +191,8 @@ pub struct Channels {
     /// Motor position: an angle at the motor, or already a length at the screw.
     pub motor_position: ChannelMapping,
     /// Screw position.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screw_position: Option<ChannelMapping>,
     /// Screw minus motor, where it is logged instead of the screw's own position.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_position: Option<ChannelMapping>,
     /// Whether the output moves: `moving` (default), or `locked` where it is fixed and the screw position is constant.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -206,7 +200,6 @@ pub struct Channels {
     /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
     pub load: ChannelMapping,
     /// Temperature, where logged.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ChannelMapping>,
     /// Conditions on other columns under which samples count; all must hold. Every sample when not given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -285,6 +278,7 @@ impl Channels {
 }
 
 /// One channel: its column and how to read it.
+#[skip_serializing_none]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelMapping {
@@ -304,7 +298,6 @@ pub struct ChannelMapping {
     #[serde(default, skip_serializing_if = "is_default")]
     pub offset: f64,
     /// The raw value at which a turning sensor starts again, e.g. 360 in degrees: it is unwrapped.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wraps_at: Option<f64>,
     /// Raw values that mean "no value", e.g. −9999.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -313,28 +306,22 @@ pub struct ChannelMapping {
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub gear_ratio: f64,
     /// A column that marks valid samples; `{position}` as in `column`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_column: Option<String>,
     /// The values of `valid_column` that mean valid: numbers, texts, true or false. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub valid_values: Vec<RawValue>,
     /// Bits of a status word in `valid_column` that are all set in a valid sample, e.g. `0x60`; instead of `valid_values`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_bits: Option<u64>,
     /// Bits of a status word in `valid_column` that are all clear in a valid sample.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub invalid_bits: Option<u64>,
     /// Whether scale, offset and unit in the Arrow metadata of the column are ignored.
     #[serde(default, skip_serializing_if = "is_default")]
     pub ignore_metadata: bool,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
     /// The channel's own time column, in the unit of the clock of its file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<String>,
     /// The channel's own rate, Hz, where it is recorded more slowly than its rows.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Time from the row's timestamp to the channel's sampling instant, s.
     #[serde(default, skip_serializing_if = "is_default")]

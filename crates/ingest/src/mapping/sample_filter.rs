@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::skip_serializing_none;
 
 /// A raw value of a column: a number, a truth value, or a text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,6 +52,7 @@ impl RawValue {
 }
 
 /// `[[channel.when]]`: samples count only while a column meets a condition, e.g. airborne, or powered.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFilter {
@@ -60,22 +62,16 @@ pub struct SampleFilter {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub equals: Vec<RawValue>,
     /// Lowest raw value that meets the condition.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
     /// Highest raw value that meets the condition.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
     /// Time that is excluded after the condition begins to hold and before it ends, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin_s: Option<f64>,
     /// The name of the `[group.…]` whose files hold the column; the main logs when not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
     /// The column's own time column.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<String>,
     /// The column's own rate, Hz, where it is recorded more slowly than its rows.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
 }
 

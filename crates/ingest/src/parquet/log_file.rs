@@ -71,6 +71,8 @@ fn footer_error(source: &ByteSource, error: &ParquetError) -> ErrorKind {
 #[derive(Debug)]
 pub(crate) struct LogFile {
     path: PathBuf,
+    /// Columns and the texts that mark the rows of one flight; empty where the file holds no other.
+    pub(crate) flight_rows: Vec<(String, String)>,
     source: ByteSource,
     footer: ArrowReaderMetadata,
     /// The same footer, by which text columns are read as the codes of their dictionary.
@@ -133,7 +135,8 @@ impl LogFile {
             by_name.entry(leaf.name.clone()).or_default().push(place);
         }
         let (coded, noted) = (OnceLock::new(), OnceLock::new());
-        let opened = Self { path: path.to_owned(), source, footer, coded, noted, leaves, by_name };
+        let (path, flight_rows) = (path.to_owned(), Vec::new());
+        let opened = Self { path, flight_rows, source, footer, coded, noted, leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -423,18 +426,7 @@ impl LogFile {
 
     /// The footer with every text column as codes of a dictionary; none where the reader refuses it.
     fn coded_footer(&self) -> Option<&ArrowReaderMetadata> {
-        let coded = || {
-            let field = |field: &Arc<Field>| match field.data_type() {
-                DataType::Utf8 => {
-                    let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-                    Arc::new(field.as_ref().clone().with_data_type(kind))
-                }
-                _ => Arc::clone(field),
-            };
-            let schema = Schema::new(self.footer.schema().fields().iter().map(field).collect::<Vec<_>>());
-            let options = ArrowReaderOptions::new().with_schema(Arc::new(schema));
-            ArrowReaderMetadata::try_new(Arc::clone(self.footer.metadata()), options).ok()
-        };
+        let coded = || with_codes(&self.footer, |_| true).ok();
         self.coded.get_or_init(coded).as_ref()
     }
 
@@ -529,7 +521,9 @@ impl LogFile {
             }
         }
         let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
-        digest.take(file, start..length).map_err(unreadable)
+        digest.take(file, start..length).map_err(unreadable)?;
+        self.flight_rows.iter().for_each(|(_, text)| digest.take_text(text));
+        Ok(())
     }
 }
 
@@ -557,6 +551,25 @@ impl TextBounds<'_> {
 }
 
 type BatchIter = ParquetRecordBatchReader;
+
+/// A footer by which text columns of these names are read as codes of their dictionary.
+///
+/// # Errors
+/// Where the reader refuses it.
+pub(crate) fn with_codes(
+    footer: &ArrowReaderMetadata,
+    is_coded: impl Fn(&str) -> bool,
+) -> Result<ArrowReaderMetadata, ParquetError> {
+    let field = |field: &Arc<Field>| {
+        let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
+        let codes = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let coded = || Arc::new(field.as_ref().clone().with_data_type(codes()));
+        if is_text && is_coded(field.name()) { coded() } else { Arc::clone(field) }
+    };
+    let schema = Schema::new(footer.schema().fields().iter().map(field).collect::<Vec<_>>());
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(schema));
+    ArrowReaderMetadata::try_new(Arc::clone(footer.metadata()), options)
+}
 
 /// Whether an offset or a length of a chunk is negative, on which the parquet crate panics.
 fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {

@@ -1,9 +1,6 @@
 //! Parquet files: leaf columns as numbers, page by page, and a writer.
 
 mod column_numbers;
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-mod fuzz;
 pub(crate) mod leaf_columns;
 pub(crate) mod log_file;
 pub(crate) mod numeric;

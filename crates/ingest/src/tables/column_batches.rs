@@ -25,6 +25,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::whole;
 use crate::io::read_at::PreadFile;
 use crate::io::transient;
+use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
 use crate::parquet::raw_footer;
 use crate::tables::cell::{bad_cell, missing, number, position, utc};
@@ -246,29 +247,13 @@ fn parquet(
     raw_footer::check(&opened)?;
     let input = PreadFile::new(&opened).map_err(|source| ErrorKind::Unreadable { source })?;
     let found = caught(|| ArrowReaderMetadata::load(&input, ArrowReaderOptions::new()))?;
-    let footer = if coded.is_empty() { found } else { with_codes(found, coded) };
+    let with_coded = || with_codes(&found, |name| coded.contains(&name.trim()));
+    let footer = if coded.is_empty() { found } else { with_coded().unwrap_or(found) };
     let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
     let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
     let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
     let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
     Ok((opened, footer, mask))
-}
-
-/// The same file, whose texts in some columns are read as codes, where they can be.
-fn with_codes(found: ArrowReaderMetadata, names: &[&str]) -> ArrowReaderMetadata {
-    let field = |field: &Arc<Field>| {
-        let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
-        let codes = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        let name = field.name().trim();
-        if is_text && names.contains(&name) {
-            field.as_ref().clone().with_data_type(codes())
-        } else {
-            field.as_ref().clone()
-        }
-    };
-    let fields: Vec<Field> = found.schema().fields().iter().map(field).collect();
-    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
-    ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), options).unwrap_or(found)
 }
 
 /// The rows of some row groups, their columns, and how many rows of the file are before them.

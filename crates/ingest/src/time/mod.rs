@@ -3,4 +3,5 @@
 pub mod clock;
 pub(crate) mod resample;
 pub(crate) mod slow_channel;
+pub(crate) mod timestamps;
 pub(crate) mod zero_order_hold;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Float64Array, StructArray};
 use arrow::datatypes::{DataType, Field};
 use ingest::mapping::units::Unit;
-use ingest::{ActuatorChannels, ClockMapping, Error, Geometry, Log, LogFiles, Mapping, SampleFilter};
+use ingest::{ActuatorChannels, Error, Geometry, Log, LogFiles, Mapping};
 
 use crate::layouts::{self, channel, place, plain, write};
 
@@ -104,54 +104,6 @@ fn a_clock_without_a_unit_is_never_guessed() {
     m.clock.column = None;
     let error = read(&file, &m).unwrap_err();
     assert_eq!(error.diagnostic().code, "no_clock");
-}
-
-/// Bytes changed anywhere in files of every writer: a number or a reason comes back, and never the end of
-/// the process. What was read holds as many samples as the file has rows.
-#[test]
-fn no_change_of_bytes_ends_the_process() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers");
-    let whole = crate::foreign_writers::wide();
-    let mut selected = whole.clone();
-    let column = whole.clock.column.clone().unwrap();
-    selected.channels.when.push(SampleFilter { column, at_least: Some(0.5), ..SampleFilter::default() });
-    let mut unstamped = selected.clone();
-    unstamped.clock = ClockMapping { rate_hz: Some(100.0), ..ClockMapping::default() };
-    let mappings = [whole, selected, unstamped].map(Arc::new);
-    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).collect();
-    files.retain(|f| f.extension().is_some_and(|e| e == "parquet"));
-    files.sort();
-    let dir = tempfile::tempdir().unwrap();
-    let damaged = dir.path().join("damaged.parquet");
-    // A fixed multiplicative congruence: the same bytes on every machine.
-    let mut state = 0x2545_f491_4f6c_dd1d_u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
-    for file in &files {
-        let bytes = std::fs::read(file).unwrap();
-        for _ in 0..40 {
-            let mut changed = bytes.clone();
-            for _ in 0..=(next() % 4) {
-                // Half of the changes go into the footer, where sizes and places stand.
-                let from = if next() % 2 == 0 { 0 } else { bytes.len() - bytes.len().min(3000) };
-                changed[from + next() % (bytes.len() - from)] = next() as u8;
-            }
-            std::fs::write(&damaged, &changed).unwrap();
-            for m in &mappings {
-                let read = std::panic::catch_unwind(|| -> Result<usize, Error> {
-                    let log = Log::open(&LogFiles::one(&damaged), m)?;
-                    let at = log.actuators(&m.channels, None)?;
-                    let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
-                    Ok(log.read_actuator(&at[0], &m.channels, geometry)?.dx_m.len())
-                });
-                if let Ok(Ok(samples)) = read {
-                    assert!(samples <= 400, "{}: {samples} samples of 400 rows", file.display());
-                }
-            }
-        }
-    }
 }
 
 /// Two columns of one name: neither is taken, and the error names them.

@@ -1,14 +1,21 @@
-//! Fuzz targets of clocks and of the tables of installations and flights.
+//! Fuzz targets of logs, of clocks, and of the tables of installations and flights.
 
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, StringArray};
+use bytes::Bytes;
 use ingest::tables::ColumnAliases;
 use ingest::time::clock::{TimeOrigin, Timestamps, build_time_base};
-use ingest::{ClockMapping, Flights, IdentityMapping};
+use ingest::{ClockMapping, Error, Flights, Geometry, IdentityMapping, Log, LogFiles, SampleFilter};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::properties::{WriterProperties, WriterVersion};
 
-use self::engine::{Input, Random, change_edits, edit_text, fuzz};
+use self::engine::{Input, Random, change_edits, edit_text, fuzz, overwrite};
 use crate::layouts::write;
 
 #[path = "../../../../tests/fuzz/engine.rs"]
@@ -107,6 +114,109 @@ fn fuzz_clock() {
         (0..24_usize).map(|edits| (0..=EDIT * (edits % 8)).map(|_| random.next() as u8).collect()).collect();
     let change = |random: &mut Random, input: &mut Input| change_edits(random, input, EDIT, 20);
     fuzz("clock", corpus, 2000, change, clock_of_any);
+}
+
+/// Page headers are shorter than this without statistics.
+const HEADER_BYTES: usize = 48;
+
+/// Files of other writers, and of the parquet crate by each of its encodings.
+fn logs() -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().flatten().map(|e| e.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
+    files.sort();
+    let mut all: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
+    let wide = files.iter().find(|file| file.to_str().unwrap().contains("pyarrow")).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(wide).unwrap()).unwrap();
+    let batch = reader.build().unwrap().next().unwrap().unwrap();
+    let encodings = [(Encoding::PLAIN, false), (Encoding::BYTE_STREAM_SPLIT, false), (Encoding::PLAIN, true)];
+    for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
+        for (encoding, is_coded) in encodings {
+            let compression =
+                if is_coded { Compression::UNCOMPRESSED } else { Compression::ZSTD(ZstdLevel::default()) };
+            let properties = WriterProperties::builder()
+                .set_writer_version(version)
+                .set_compression(compression)
+                .set_encoding(encoding)
+                .set_dictionary_enabled(is_coded)
+                .set_data_page_row_count_limit(60)
+                .set_write_batch_size(20)
+                .set_max_row_group_row_count(Some(150));
+            let mut bytes = Vec::new();
+            let mut writer =
+                ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties.build())).unwrap();
+            writer.write(&batch).unwrap();
+            writer.close().unwrap();
+            all.push(bytes);
+        }
+    }
+    all
+}
+
+/// Byte ranges of a sound file that are changed equally often: headers of pages, their bodies, the footer, everything.
+fn places(bytes: &[u8]) -> [Vec<Range<usize>>; 4] {
+    let footer = ParquetMetaDataReader::new().parse_and_finish(&Bytes::copy_from_slice(bytes)).unwrap();
+    let trailer: [u8; 4] = bytes[bytes.len() - 8..bytes.len() - 4].try_into().unwrap();
+    let start = bytes.len() - 8 - u32::from_le_bytes(trailer) as usize;
+    let (mut headers, mut bodies) = (Vec::new(), Vec::new());
+    for chunk in footer.row_groups().iter().flat_map(RowGroupMetaData::columns) {
+        let (first, length) = chunk.byte_range();
+        let end = (first + length) as usize;
+        for page in [first as usize, chunk.data_page_offset() as usize] {
+            headers.push(page..page + HEADER_BYTES);
+            bodies.push((page + HEADER_BYTES).min(end)..end);
+        }
+    }
+    [
+        headers,
+        bodies,
+        std::iter::once(start..bytes.len()).collect(),
+        std::iter::once(0..bytes.len()).collect(),
+    ]
+}
+
+/// Bytes changed in files of every writer: samples or a reason come back, and no more samples than the file has rows.
+#[test]
+fn fuzz_logs() {
+    let corpus = logs();
+    let places: Vec<_> = corpus.iter().map(|bytes| places(bytes)).collect();
+    let whole = crate::foreign_writers::wide();
+    let mut selected = whole.clone();
+    let column = whole.clock.column.clone().unwrap();
+    selected.channels.when.push(SampleFilter { column, at_least: Some(0.5), ..SampleFilter::default() });
+    let mut unstamped = selected.clone();
+    unstamped.clock = ClockMapping { rate_hz: Some(100.0), ..ClockMapping::default() };
+    let mappings = [whole, selected, unstamped].map(Arc::new);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("log.parquet");
+    let change = |random: &mut Random, input: &mut Input| {
+        let place = random.below(4);
+        overwrite(random, &mut input.bytes, &places[input.origin][place]);
+        if random.below(60) == 0 {
+            input.bytes.truncate(random.below(input.bytes.len()) + 1);
+        }
+    };
+    fuzz("logs", corpus, 3000, change, |bytes| {
+        std::fs::write(&file, bytes).unwrap();
+        let read = |mapping| -> Result<usize, Error> {
+            let log = Log::open(&LogFiles::one(&file), mapping)?;
+            let at = log.actuators(&mapping.channels, None)?;
+            let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+            Ok(log.read_actuator(&at[0], &mapping.channels, geometry)?.dx_m.len())
+        };
+        let outcome = mappings.iter().map(|mapping| match read(mapping) {
+            Ok(samples) => {
+                assert!(samples <= 400, "{samples} samples of 400 rows");
+                "read ".to_owned()
+            }
+            Err(error) => {
+                let diagnostic = error.diagnostic();
+                let words = diagnostic.message.chars().filter(|c| !c.is_ascii_digit());
+                format!("{} {} ", diagnostic.code, words.take(80).collect::<String>())
+            }
+        });
+        outcome.collect()
+    });
 }
 
 #[test]

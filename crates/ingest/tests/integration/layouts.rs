@@ -585,3 +585,83 @@ fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
     let refused = read(&file, &m, LINEAR).unwrap_err().diagnostic();
     assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
 }
+
+/// Three flights of two tails in one file, one row after the other or flight by flight: each is read as in a file of its
+/// own, with its own positions, whether a row is a moment or a sample of one channel. Flight k has δX = k mm.
+#[test]
+fn each_flight_of_a_file_is_a_log_of_its_own() {
+    let flights = [("N1", "7", 1.0, "left"), ("N1", "A/8#", 2.0, "left"), ("N2", "7", 3.0, "right")];
+    let column = |rows: &[(usize, usize)], of: &dyn Fn(usize, usize) -> String| -> ArrayRef {
+        Arc::new(rows.iter().map(|&(flight, k)| Some(of(flight, k))).collect::<StringArray>())
+    };
+    for (is_long, is_sorted) in [(false, false), (false, true), (true, false), (true, true)] {
+        // A sample of each of three channels, or all of a moment.
+        let each = if is_long { 3 } else { 1 };
+        let mut rows: Vec<(usize, usize)> =
+            (0..200 * each).flat_map(|k| (0..3).map(move |flight| (flight, k))).collect();
+        if is_sorted {
+            rows.sort_by_key(|row| row.0);
+        }
+        let numbers = |of: &dyn Fn(f64, f64) -> f64| -> ArrayRef {
+            reals(
+                &rows.iter().map(|&(flight, k)| of(flights[flight].2, (k / each) as f64)).collect::<Vec<_>>(),
+            )
+        };
+        let moves = |t: f64| 1e-2 * (0.1 * t).sin();
+        let (motor, screw) = (numbers(&|_, t| moves(t)), numbers(&|k, t| moves(t) + 1e-3 * k));
+        let names = ["m", "s", "f"].map(|name| format!("{{position}}_{name}"));
+        let [m, s, f] = [0, 1, 2].map(|k| channel(&names[k], [Unit::Metre, Unit::Metre, Unit::Newton][k]));
+        let mut mapping = mapping(m, s, f);
+        mapping.identity = IdentityMapping {
+            columns: [(IdentityField::TailNumber, "tail"), (IdentityField::FlightId, "leg")]
+                .map(|(field, name)| (field, name.to_owned()))
+                .into(),
+            values: [(IdentityField::DepartureUtc, "2026-11-19T04:13:00Z".to_owned())].into(),
+            by_row: true,
+            ..IdentityMapping::default()
+        };
+        let mut columns = vec![
+            ("tail", column(&rows, &|flight, _| flights[flight].0.to_owned())),
+            ("leg", column(&rows, &|flight, _| flights[flight].1.to_owned())),
+            ("t", numbers(&|_, t| 0.1 * t)),
+        ];
+        if is_long {
+            mapping.layout.name_column = Some("name".into());
+            mapping.layout.value_column = Some("value".into());
+            let name = |flight: usize, k: usize| format!("{}_{}", flights[flight].3, ["m", "s", "f"][k % 3]);
+            columns.push(("name", column(&rows, &name)));
+            let value =
+                |k: usize| [&motor, &screw, &motor][k % 3].as_any().downcast_ref::<Float64Array>().unwrap();
+            let values: Vec<f64> =
+                rows.iter().enumerate().map(|(row, &(_, k))| value(k).value(row)).collect();
+            columns.push(("value", reals(&values)));
+        } else {
+            columns.extend([("left_m", motor.clone()), ("left_s", screw), ("left_f", motor)]);
+        }
+        let (_dir, file) = place("day.parquet");
+        write(&file, &columns);
+        let paths = ingest::log::flight_rows::flights_in(&file, &mapping.identity).unwrap();
+        let texts: Vec<&str> = paths.iter().map(|p| p.to_str().unwrap().split_once('#').unwrap().1).collect();
+        assert_eq!(texts, ["N1/7", "N1/A%2F8%23", "N2/7"]);
+        let mut digests = std::collections::BTreeSet::new();
+        for (path, (tail, leg, dx_mm, position)) in paths.iter().zip(flights) {
+            let log = opened(path, &mapping);
+            let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
+            assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), (tail, leg));
+            let found = log.actuators(&mapping.channels, None).unwrap();
+            assert_eq!(found.len(), 1);
+            assert_eq!(found[0].position.as_str(), if is_long { position } else { "left" });
+            log.announce(&[(&mapping.channels, &found[0])]).unwrap();
+            let a = log.read_actuator(&found[0], &mapping.channels, LINEAR).unwrap();
+            assert_eq!((a.dx_m.len(), a.segments.len()), (200, 1), "{texts:?}");
+            assert!(
+                a.dx_m.iter().all(|dx_m| (dx_m - 1e-3 * dx_mm).abs() < 1e-12),
+                "{is_long} {is_sorted} {path:?}"
+            );
+            digests.insert(log.digest(&[(&mapping.channels, &found[0])]).unwrap());
+        }
+        assert_eq!(digests.len(), 3);
+        let whole = opened(&file, &mapping).identity(|_, _| IdentityFields::new()).unwrap_err();
+        assert!(whole.diagnostic().hint.unwrap().contains("identity.by_row"));
+    }
+}

@@ -6,6 +6,7 @@ use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::skip_serializing_none;
 
 use super::layers::Source;
 use crate::config::limits::positive;
@@ -32,20 +33,18 @@ pub const NOT_ASSESSED: &str = "not_assessed";
 const MAX_TIMEOUT_S: f64 = 600.0;
 
 /// `[alerts.NAME]`: one channel for changes of state. It has one of `command`, `folder` and `url`.
+#[skip_serializing_none]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AlertChannel {
     /// Program and arguments, without a shell: it gets the message as JSON on standard input. Exit code 0 means sent.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
     /// Variables of the environment that `command` gets in addition to `PATH`, `HOME`, `LANG` and a few others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pass_environment: Vec<String>,
     /// Folder that gets one JSON file per message, named after the alert's `id`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub folder: Option<String>,
     /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent; redirections are not followed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
     /// New states that are sent: of the gap `normal`, `watch`, `unassessed`, `plan`, `act`, and `not_assessed` (removed,
     /// or unassessed); of other quantities `normal`, `softening`, `friction_rising` and the others in the column `state` of

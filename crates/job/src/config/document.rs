@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glob::Pattern;
+use ingest::log::flight_rows::flight_columns;
 use ingest::log::identity::zone;
 use ingest::mapping::IdentityField;
 use ingest::mapping::column_pattern::nearest;
@@ -455,6 +456,11 @@ impl Document {
                 }
             }
             None => {}
+        }
+        if self.identity.by_row && flight_columns(&self.identity).is_empty() {
+            let what = "`identity.by_row` needs the columns in which rows name their flight";
+            let hint = "such as columns = { tail_number = \"tail\", flight_id = \"flight\" }";
+            found.push(source.at(&["identity", "by_row"], Diagnostic::new("key_missing", what).hint(hint)));
         }
         if let Some(name) = self.identity.time_zone.as_deref().filter(|name| zone(name).is_err()) {
             found.push(source.at(&["identity", "time_zone"], no_zone(name)));

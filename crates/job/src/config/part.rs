@@ -6,6 +6,7 @@ use ingest::mapping::Output;
 use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::skip_serializing_none;
 
 use crate::config::limits::{bounded, implausible};
 use crate::config::quantity_limits::QuantityLimits;
@@ -46,58 +47,47 @@ pub enum AtLimit {
 }
 
 /// `[part."EMA-27-1040"]`: what is known of a design.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartSettings {
+    /// Whether the values are placeholders: a run refuses the part until they are those of its data sheet.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub placeholder: bool,
     /// `linear` (default) or `rotary`.
     pub kind: Kind,
     /// Linear: axial stiffness K, N/m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_n_per_m: Option<f64>,
     /// Linear: damping f, N·s/m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub damping_n_s_per_m: Option<f64>,
     /// Linear: mass of the screw, kg.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub screw_mass_kg: Option<f64>,
     /// Linear: travel for one turn of the motor, m; needed when a channel is an angle or a torque.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub lead_m_per_rev: Option<f64>,
     /// Rotary: torsional stiffness, N·m/rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_nm_per_rad: Option<f64>,
     /// Rotary: damping, N·m·s/rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub damping_nm_s_per_rad: Option<f64>,
     /// Rotary: inertia of the driven side, kg·m².
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub inertia_kg_m2: Option<f64>,
     /// Rotary: the radius at which the gap is stated, m: `gap_m` = radius × radians.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_radius_m: Option<f64>,
     /// `moving` (default), or `locked` where the output is fixed: the screw position is constant and needs no channel.
     #[serde(skip_serializing_if = "Output::is_moving")]
     pub output: Output,
     /// Load between whose positive and negative value lost motion is stated, N.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_load_n: Option<f64>,
     /// What the sensors and the model do not know.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSettings>,
     /// Removal limit, m: state `act` at or above.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_m: Option<f64>,
     /// Alert level, m: state `watch` at or above.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub watch_m: Option<f64>,
     /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
     /// Action in state `act`: `replace` (default) or `inspect`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub at_limit: Option<AtLimit>,
     /// Changes of its other followed quantities from which there is a state, where they differ from those of `[trend]`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub quantity_limits: Option<QuantityLimits>,
 }
 
@@ -115,64 +105,47 @@ pub enum NoiseModel {
 }
 
 /// `[part."…".noise]`: noise levels have no defaults; the operator of the fleet sets them.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseSettings {
     /// `sensors` (default), `per_step` or `continuous`.
     pub model: NoiseModel,
     /// Noise of the screw position, rms, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub screw_rms_m: Option<f64>,
     /// Its smallest step, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub screw_resolution_m: Option<f64>,
     /// Noise of the motor position at the screw (angle × lead/2π), rms, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub motor_rms_m: Option<f64>,
     /// Its smallest step, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub motor_resolution_m: Option<f64>,
     /// Rms of the force the model does not know, mainly friction, N.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub unknown_force_n: Option<f64>,
     /// Rotary: noise of the driven angle, rms, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub screw_rms_rad: Option<f64>,
     /// Rotary: its smallest step, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub screw_resolution_rad: Option<f64>,
     /// Rotary: noise of the motor angle brought to the driven side, rms, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub motor_rms_rad: Option<f64>,
     /// Rotary: its smallest step, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub motor_resolution_rad: Option<f64>,
     /// Rotary: rms of the torque the model does not know, N·m.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub unknown_torque_nm: Option<f64>,
     /// The bandwidth in which the backlash may move, Hz; 10–20 does well.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bandwidth_hz: Option<f64>,
     /// `per_step`: process noise covariance, states δX, δẊ, S, SI.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub w_d: Option<[[f64; 3]; 3]>,
     /// `per_step` and `continuous`: measurement noise variance, m².
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub v_d_m2: Option<f64>,
     /// `continuous`: density of the unknown force, N²·s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub force_psd_n2_s: Option<f64>,
     /// `continuous`: density of the backlash rate, m²/s.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub backlash_rate_psd_m2_per_s: Option<f64>,
     /// Uncertainty of the initial relative position, rms, m; default: that of the measurement.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub initial_position_rms_m: Option<f64>,
     /// Uncertainty of the initial relative speed, rms, m/s; default 0.01.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub initial_speed_rms_m_per_s: Option<f64>,
     /// Uncertainty of the initial backlash, rms, m; default 0.001.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub initial_backlash_rms_m: Option<f64>,
 }
 
@@ -236,6 +209,7 @@ impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
     pub(crate) fn without_limits(&self) -> Self {
         Self {
+            placeholder: false,
             limit_m: None,
             watch_m: None,
             axis: None,

@@ -2,32 +2,27 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::skip_serializing_none;
 
 /// `[trend.quantity_limits]`, and `[part."…".quantity_limits]` for one part: changes since a unit's first flights from
 /// which a followed quantity has a state.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuantityLimits {
     /// Stiffness, as a share of the unit's own. Default 0.05.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_share: Option<f64>,
     /// Friction at the unit's usual load, as a share of its own. Default 0.1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_share: Option<f64>,
     /// Lost motion at the reference load, as a share of the unit's own. Default 0.25.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub lost_motion_share: Option<f64>,
     /// Delay between the positions, s. Default 0.0005.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
     /// Load zero, as a share of the unit's usual 95 % load. Default 0.02.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub load_zero_share: Option<f64>,
     /// Delay of the load, s. Default 0.001.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub load_delay_s: Option<f64>,
     /// Mean NIS, as a share of the unit's own. Default 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub nis_share: Option<f64>,
 }
 

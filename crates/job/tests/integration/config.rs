@@ -106,6 +106,7 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("limit_m = 150e-6", "limit_m = -1.0", "not_positive"),
         ("limit_m = 150e-6", "limit_m = 150e-6\nwatch_m = 200e-6", "limit_order"),
         ("screw_mass_kg = 8.0", "", "key_missing"),
+        ("[clock]", "[identity]\nby_row = true\n[clock]", "key_missing"),
         ("screw_mass_kg = 8.0", "screw_mass_kg = -8.0", "bad_parameter"),
         ("lead_m_per_rev = 0.005", "reference_radius_m = 0.1", "key_of_other_kind"),
         ("bandwidth_hz = 10.0", "", "key_missing"),

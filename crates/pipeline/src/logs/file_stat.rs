@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use ingest::LogFiles;
+use ingest::log::flight_rows::split_path;
+use ingest::{IdentityMapping, LogFiles};
 use object_io::ListEntry;
 use store::LogRecord;
 
@@ -36,8 +37,8 @@ impl FileStat {
     }
 
     /// Of all files of a log: one that differs makes the whole differ.
-    pub(crate) fn of_log(files: &LogFiles, seen: &SeenObjects) -> Option<Self> {
-        let mut stats = files.all().map(|path| Self::of(path, seen));
+    pub(crate) fn of_log(files: &LogFiles, seen: &SeenObjects, identity: &IdentityMapping) -> Option<Self> {
+        let mut stats = files.all().map(|path| Self::of(&split_path(path, identity).0, seen));
         let first = stats.next()??;
         stats.try_fold(first, |whole, next| {
             let next = next?;

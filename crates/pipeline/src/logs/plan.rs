@@ -325,7 +325,7 @@ impl Planner<'_> {
         (files, fault): &(LogFiles, Option<Diagnostic>),
         before: Option<&LogRecord>,
     ) -> Verdict {
-        let stat = FileStat::of_log(files, self.seen);
+        let stat = FileStat::of_log(files, self.seen, &self.config.document.identity);
         let is_unlisted = fault.as_ref().is_some_and(|fault| is_unlisted(&fault.code));
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
         let Some(why) = why else { return Verdict::Known };

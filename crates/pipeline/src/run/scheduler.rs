@@ -15,7 +15,7 @@ use jiff::Timestamp;
 use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_identity};
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
-use records::{Diagnostic, GapRecord, Installations, Status};
+use records::{Diagnostic, GapRecord, Installations, PartNumber, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
 use crate::assess::changes::RunFacts;
@@ -96,6 +96,18 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     })
 }
 
+/// A gap by values that nobody entered would be no gap of the part.
+fn refuse_placeholders(config: &Config, installations: &Installations) -> Result<(), Error> {
+    let is_placeholder =
+        |number: &&PartNumber| config.document.part.get(number.as_str()).is_some_and(|part| part.placeholder);
+    let installed: BTreeSet<&PartNumber> = installations.iter().map(|i| &i.part_number).collect();
+    let Some(number) = installed.into_iter().find(is_placeholder) else { return Ok(()) };
+    let what = format!("the values of part {number} are placeholders");
+    let hint = "enter its part number and the values of its data sheet in pipeline.toml and the installations table; then \
+                delete `placeholder = true`";
+    Err(Error::refused(config.at(number.as_str(), Diagnostic::new("placeholder", what).hint(hint))))
+}
+
 /// What the logs of a run changed.
 #[derive(Debug, Default)]
 pub(crate) struct Touched {
@@ -116,6 +128,7 @@ pub(crate) fn execute_run(
     let clock = Instant::now();
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
+    refuse_placeholders(config, &installations)?;
     inspections::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?;

@@ -18,7 +18,7 @@ use crate::output::{Output, escape};
 use crate::row_output;
 use crate::table::{self, number, text};
 
-use crate::commands::context::{display_path, load_with_installations};
+use crate::commands::context::load_with_installations;
 
 /// More logs than these are summarised, one line each.
 const MOST_WHOLE_LOGS: usize = 3;
@@ -66,9 +66,7 @@ type NamedLogs = Vec<(LogFiles, String)>;
 /// The logs to be checked, and the faults of what cannot be listed.
 fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs, Vec<Diagnostic>), Failure> {
     if !args.logs.is_empty() {
-        let whole =
-            |path: &std::path::PathBuf| Ok((discover::log_containing(config, path)?, display_path(path)));
-        return Ok((args.logs.iter().map(whole).collect::<Result<_, Failure>>()?, Vec::new()));
+        return Ok((discover::named_logs(config, &args.logs)?, Vec::new()));
     }
     let found = discover::discover(config)?;
     for stray in &found.strays {
@@ -78,24 +76,43 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs
     let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).collect();
     if logs.len() > args.limit {
         output.note(&format!("checking {} of {} logs; use `--limit` to check more", args.limit, logs.len()));
-        logs.truncate(args.limit);
+        // Evenly among all, which are in order of their names: of each folder, and mostly of each tail.
+        let (all, most) = (logs.len(), args.limit.max(1));
+        let mut k = 0;
+        logs.retain(|_| {
+            k += 1;
+            k * most / all > (k - 1) * most / all
+        });
     }
     Ok((logs, faults))
 }
 
-/// One line for each log, and each note once.
+/// One line for each layout of the logs, and each note once.
 fn overview(logs: &[LogCheck], channels: &[ChannelCheck]) -> String {
     let columns = [
-        text("log", 0),
-        text("tail", 3),
-        text("flight", 2),
-        text("departed", 4),
-        number("rows", 5),
-        text("clock", 0),
-        number("actuators", 0),
-        number("notes", 1),
+        text("logs of one layout", 0),
+        text("tails", 0),
+        text("actuators", 0),
+        text("clock", 1),
+        number("with notes", 0),
+        text("first log", 2),
     ];
-    let mut page = table::layout(&columns, &logs.iter().map(overview_line).collect::<Vec<_>>());
+    let mut layouts: BTreeMap<_, Vec<&LogCheck>> = BTreeMap::new();
+    for log in logs {
+        layouts.entry((&log.column_types, rate(log))).or_default().push(log);
+    }
+    let mut layouts: Vec<_> = layouts.into_iter().map(|((_, rate), logs)| (rate, logs)).collect();
+    layouts.sort_by_key(|(_, logs)| std::cmp::Reverse(logs.len()));
+    let line = |(rate, logs): &(String, Vec<&LogCheck>)| {
+        let tails: BTreeSet<&str> = logs.iter().map(|log| log.flight[0].as_str()).collect();
+        let actuators: BTreeSet<usize> = logs.iter().map(|log| positions(log).len()).collect();
+        let actuators: Vec<String> = actuators.iter().map(usize::to_string).collect();
+        let noted = logs.iter().filter(|log| log.channels.iter().any(ChannelCheck::is_warning)).count();
+        let (logs_in_all, tails) = (table::count(logs.len(), "log"), table::count(tails.len(), "tail"));
+        let first = logs.first().map_or_else(String::new, |log| log.name.clone());
+        vec![logs_in_all, tails, actuators.join(", "), rate.clone(), noted.to_string(), first]
+    };
+    let mut page = table::layout(&columns, &layouts.iter().map(line).collect::<Vec<_>>());
     // Ratios differ from log to log, and mean the same.
     let kind = |channel: &ChannelCheck| {
         let note = channel.note.as_deref().unwrap_or_default();
@@ -122,20 +139,14 @@ fn overview(logs: &[LogCheck], channels: &[ChannelCheck]) -> String {
     page
 }
 
-fn overview_line(log: &LogCheck) -> Vec<String> {
-    let positions: BTreeSet<&str> = log.channels.iter().map(|channel| channel.position.as_str()).collect();
-    let notes = log.channels.iter().filter(|channel| channel.is_warning()).count();
-    let [tail, flight, departure] = log.flight.clone();
-    vec![
-        log.name.clone(),
-        tail,
-        flight,
-        departure,
-        log.rows.to_string(),
-        log.clocks.first().cloned().unwrap_or_default(),
-        positions.len().to_string(),
-        notes.to_string(),
-    ]
+fn positions(log: &LogCheck) -> BTreeSet<&str> {
+    log.channels.iter().map(|channel| channel.position.as_str()).collect()
+}
+
+/// The rate of a log, rounded: clocks of one recorder differ a little.
+fn rate(log: &LogCheck) -> String {
+    let rate_hz = log.clocks.first().and_then(|clock| clock.split(' ').next()?.parse::<f64>().ok());
+    rate_hz.map_or_else(table::empty_cell, |rate_hz| format!("{rate_hz:.1} Hz"))
 }
 
 fn log_page(log: &LogCheck) -> String {

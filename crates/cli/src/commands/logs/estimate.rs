@@ -34,7 +34,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
     let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
     let (config, installations) = (Arc::new(config), Arc::new(installations));
     let (mut found, mut diagnostics, mut finished) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &args.logs {
+    for path in &pipeline::logs::discover::flight_paths(&config, &args.logs) {
         match estimate_log(path, &config, &installations, part.as_ref()) {
             Ok(estimated) => {
                 let (rows, of_log) = estimated?;

@@ -23,9 +23,7 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
     let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {
         discover::discover(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
     } else {
-        let whole =
-            |path: &std::path::PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
-        args.logs.iter().map(whole).collect::<Result<_, Failure>>()?
+        discover::named_logs(&config, &args.logs)?
     };
     let progress = Progress::new("normalize", output);
     let watch = |event: Event| match event {
