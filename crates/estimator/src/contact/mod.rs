@@ -13,8 +13,8 @@
 //!
 //! 1. `block_means` averages whole samples, without missing ones and spikes; `sign_check` rejects wrong mappings.
 //! 2. `parameter_search` finds, in an excerpt of a long flight, what derivatives do not show: the zero of the load cell
-//!    (in contact it merges with δX₀; it shows where the flank is left), pre-sliding of the friction, and whether a late
-//!    load channel is delayed or filtered. Each candidate is refined by `gauss_newton`.
+//!    (in contact it merges with δX₀; it shows where the flank is left), and pre-sliding of the friction. Each candidate is
+//!    refined by `gauss_newton`.
 //! 3. `flank_fit` extrapolates the stiff part of both flanks to zero load and states the error.
 //!
 //! A toe below the loads that occur is, to the data, extra gap: `gap_m` is the distance of the stiff flanks extrapolated
@@ -179,7 +179,7 @@ fn report(
         skew_se_s: contact.skew_se_s,
         load_zero_n: contact.state.load_zero_n,
         load_zero_se_n: contact.load_zero_se_n,
-        load_delay_s: contact.state.load_delay_s + contact.state.load_lag_s,
+        load_delay_s: contact.state.load_delay_s,
         load_delay_se_s: contact.load_delay_se_s,
         friction: contact.state.friction,
         friction_se: contact.friction_se,

@@ -51,8 +51,6 @@ pub(crate) struct FrictionState {
     pub(crate) load_zero_n: f64,
     /// τ in `load_logged(t) = F(t − τ)`, s.
     pub(crate) load_delay_s: f64,
-    /// Time constant of the load channel's first-order lag, s.
-    pub(crate) load_lag_s: f64,
     /// τ in `screw_logged(t) = X₂(t − τ)`, s.
     pub(crate) skew_s: f64,
 }
