@@ -238,29 +238,20 @@ impl BlockMeans {
     /// The windows of an excerpt in order of time: one half by the number of load reversals in them, the other evenly
     /// among the rest. The load alone selects, so that what is estimated does not select its own data.
     fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
-        let windows: Vec<Range<usize>> = self
-            .segments()
-            .flat_map(|segment| {
-                let end = segment.end;
-                segment.step_by(WINDOW_BLOCKS).map(move |from| from..end.min(from + WINDOW_BLOCKS))
-            })
-            .filter(|window| window.len() == WINDOW_BLOCKS)
-            .collect();
-        let mut by_reversals: Vec<(usize, usize)> = windows
-            .iter()
-            .map(|window| reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))
-            .enumerate()
-            .collect();
-        by_reversals.sort_by_key(|&(number, reversals)| (std::cmp::Reverse(reversals), number));
-        let busy = by_reversals.len().min(count / 2);
-        let mut rest: Vec<usize> =
-            by_reversals.split_off(busy).into_iter().map(|(number, _)| number).collect();
-        rest.sort_unstable();
-        let stride = rest.len().div_ceil((count - busy).max(1)).max(1);
-        let mut chosen: Vec<usize> = rest.into_iter().step_by(stride).collect();
-        chosen.extend(by_reversals.into_iter().map(|(number, _)| number));
-        chosen.sort_unstable();
-        chosen.into_iter().map(|number| windows[number].clone()).collect()
+        let of_segment = |segment: Range<usize>| {
+            let starts = segment.clone().step_by(WINDOW_BLOCKS).take(segment.len() / WINDOW_BLOCKS);
+            starts.map(|from| from..from + WINDOW_BLOCKS)
+        };
+        let mut chosen: Vec<Range<usize>> = self.segments().flat_map(of_segment).collect();
+        chosen.sort_by_cached_key(|window| {
+            std::cmp::Reverse(reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))
+        });
+        let mut rest = chosen.split_off(chosen.len().min(count / 2));
+        rest.sort_unstable_by_key(|window| window.start);
+        let stride = rest.len().div_ceil((count - chosen.len()).max(1)).max(1);
+        chosen.extend(rest.into_iter().step_by(stride));
+        chosen.sort_unstable_by_key(|window| window.start);
+        chosen
     }
 
     /// Speed of the motor by the difference over [`SPEED_S`] on either side, m/s; NaN at the ends and near gaps.

@@ -9,19 +9,17 @@ use std::ops::Range;
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SHARE, SIDE_FORCE, SPEED,
-    dot,
+    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
-use crate::contact::fit::scaling::{LATE_S, SEARCH_ROW_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
 use crate::contact::stats::second_difference_rms;
-use crate::contact::types::FrictionErrors;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -111,18 +109,6 @@ impl Doubt {
     }
 }
 
-/// Standard errors of the friction of a fit. A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
-fn friction_errors(line: &GaussNewtonResult, scaling: &Scaling) -> FrictionErrors {
-    let stiffness = scaling.load_n / line.fit.beta[FORCE];
-    let error_n =
-        |columns: &[usize]| stiffness * line.fit.standard_error_of_sum_m(columns, &line.design.firm);
-    FrictionErrors {
-        dry_n: error_n(&[DRY]),
-        lost_share: error_n(&[SHARE]) / scaling.load_n,
-        at_p95_n: error_n(&[DRY, SHARE]),
-    }
-}
-
 /// The fitted flanks.
 #[derive(Debug)]
 pub(crate) struct FlankFit {
@@ -130,16 +116,11 @@ pub(crate) struct FlankFit {
     pub(crate) gap_m: (f64, f64),
     /// 1/K and its standard error, m/N.
     pub(crate) compliance_m_per_n: (f64, f64),
-    pub(crate) skew_se_s: f64,
     pub(crate) load_zero_se_n: f64,
-    pub(crate) load_delay_se_s: f64,
-    pub(crate) friction_se: FrictionErrors,
-    pub(crate) touched_s: (f64, f64),
     /// Rms of the residuals of single blocks, m.
     pub(crate) residual_rms_m: f64,
     /// Length of a block, s.
     pub(crate) period_s: f64,
-    pub(crate) state: FrictionState,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
     /// Whether higher loads alone read another gap.
@@ -168,7 +149,7 @@ impl FlankFit {
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
-    let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
+    let compliance_se = line.fit.standard_error_m(FORCE, &line.design.firm);
     let windup_m = scaling.windup_m();
     let vibration_n = second_difference_rms(&workspace.whole.load_n);
     if vibration_n > ALIASED_LOAD * scaling.load_n && scale_m > ALIASED_RESIDUAL * windup_m {
@@ -184,15 +165,10 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let fit = FlankFit {
         gap_m,
         profile,
-        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
-        skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
+        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, compliance_se / scaling.load_n),
         load_zero_se_n,
-        load_delay_se_s: error_m(LOAD_RATE) * LATE_S / line.fit.beta[FORCE],
-        friction_se: friction_errors(&line, scaling),
-        touched_s: line.design.touched_s,
         residual_rms_m: scale_m,
         period_s: workspace.whole.period_s,
-        state: line.state,
         is_soft: sigma > SOFT_CONTACT_SIGMA,
         line,
     };

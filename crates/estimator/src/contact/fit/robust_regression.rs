@@ -226,20 +226,13 @@ impl<const N: usize> RobustFit<N> {
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
     pub(crate) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
-        self.standard_error_of_sum_m(&[column], rows)
+        self.standard_error_of_sum_m(&[(column, 1.0)], rows)
     }
 
-    /// As [`standard_error_m`](Self::standard_error_m), of a sum of coefficients.
-    pub(crate) fn standard_error_of_sum_m(&self, columns: &[usize], rows: &[DesignRow<N>]) -> f64 {
-        let mut combination = [0.0; N];
-        columns.iter().for_each(|&column| combination[column] = 1.0);
-        self.standard_error_of_m(&combination, rows)
-    }
-
-    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of all coefficients.
-    pub(crate) fn standard_error_of_m(&self, combination: &[f64; N], rows: &[DesignRow<N>]) -> f64 {
+    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of coefficients.
+    pub(crate) fn standard_error_of_sum_m(&self, terms: &[(usize, f64)], rows: &[DesignRow<N>]) -> f64 {
         let influence: [f64; N] = std::array::from_fn(|i| {
-            (0..N).map(|column| combination[column] * self.inverse[(column, i)]).sum()
+            terms.iter().map(|&(column, weight)| weight * self.inverse[(column, i)]).sum()
         });
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;
