@@ -42,7 +42,7 @@ const SHORTEST_PILE_S: f64 = 1.0;
 
 /// Size of the subsample of steps between neighbours.
 const LOOKS: usize = 4000;
-/// A block with a step of more than this many times the 90 % quantile of the steps holds a spike, and is left out.
+/// A sample is a spike beyond this many times the 90 % quantile of the steps.
 const SPIKE: f64 = 8.0;
 
 /// Blocks of a window of an excerpt.
@@ -92,7 +92,7 @@ impl BlockMeans {
         let count = (CALM_PERIOD_S / (shortest as f64 * samples.step_s)).ceil() as usize;
         let each = if is_calm { shortest * count } else { shortest };
         longest_step(samples.motor_m, samples.segments)?;
-        let leaps =
+        let steps =
             [longest_step(samples.dx_m, samples.segments)?, longest_step(samples.load_n, samples.segments)?];
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
@@ -101,7 +101,7 @@ impl BlockMeans {
             let end = segment.start + segment.len() / each * each;
             for start in (segment.start..end).step_by(each) {
                 self.time_s.push(middle_s(start));
-                self.push(mean(samples, &(start..start + each), leaps));
+                self.push(mean(samples, start..start + each, steps));
             }
         }
         self.is_calm = is_calm;
@@ -342,12 +342,6 @@ fn mean_of_sound(values: &[f64]) -> f64 {
     if 2 * count < values.len() { f64::NAN } else { sum / count as f64 }
 }
 
-/// The greater; the first where the second is no number. One instruction, unlike [`f64::max`].
-#[inline]
-fn greater(known: f64, new: f64) -> f64 {
-    if new > known { new } else { known }
-}
-
 /// Weights of four even points for a place between the middle two.
 fn cubic(u: f64) -> [f64; 4] {
     let (square, cube) = (u * u, u * u * u);
@@ -359,21 +353,26 @@ fn cubic(u: f64) -> [f64; 4] {
     ]
 }
 
-/// Means of motor, δX and load over the complete samples of a block; none where they are fewer than half, or where δX or
-/// the load leaps by more than some step from one to the next.
-fn mean(samples: &Samples<'_>, block: &Range<usize>, leaps: [f64; 2]) -> Option<[f64; 3]> {
-    let channels = [samples.motor_m, samples.dx_m, samples.load_n].map(|channel| &channel[block.clone()]);
-    let (mut sums, mut sound, mut greatest, mut last) = ([0.0; 3], 0.0, [0.0; 2], [f64::NAN; 2]);
-    for k in 0..block.len() {
-        let here @ [_, y, f] = channels.map(|channel| channel[k]);
-        if (here[0] + y + f).is_finite() {
-            greatest = [greater(greatest[0], (y - last[0]).abs()), greater(greatest[1], (f - last[1]).abs())];
-            sums = [sums[0] + here[0], sums[1] + y, sums[2] + f];
-            (sound, last) = (sound + 1.0, [y, f]);
+/// Means of motor, δX and load over the complete samples of a block that are no spikes of δX or the load, beyond some
+/// steps; none where they are fewer than half.
+fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> Option<[f64; 3]> {
+    let Samples { motor_m, dx_m, load_n, .. } = *samples;
+    let (mut sums, mut sound, least) = ([0.0; 3], 0.0, 0.5 * block.len() as f64);
+    for i in block {
+        let [x, y, f] = [motor_m[i], dx_m[i], load_n[i]];
+        if (x + y + f).is_finite() && !is_spike(dx_m, i, steps[0]) && !is_spike(load_n, i, steps[1]) {
+            sums = [sums[0] + x, sums[1] + y, sums[2] + f];
+            sound += 1.0;
         }
     }
-    let is_smooth = greatest[0] <= leaps[0] && greatest[1] <= leaps[1];
-    (is_smooth && 2.0 * sound >= block.len() as f64).then(|| sums.map(|sum| sum / sound))
+    (sound >= least).then(|| sums.map(|sum| sum / sound))
+}
+
+/// Whether a sample leaps by more than some step, and the next one leaps back: a new level is no spike.
+fn is_spike(channel: &[f64], i: usize, longest: f64) -> bool {
+    let from = channel[i] - channel[i.saturating_sub(1)];
+    let back = || channel[i] - channel.get(i + 1).unwrap_or(&f64::NAN);
+    from.abs() > longest && back() * from.signum() > longest
 }
 
 /// The longest step between neighbours of a channel that is no spike, in the channel's unit: by the 90 % quantile of the

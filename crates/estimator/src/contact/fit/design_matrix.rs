@@ -84,7 +84,7 @@ impl RowSource<'_> {
         let mut open = [DesignRow::ZERO; 4];
         let most = scaling.row_blocks(blocks.period_s) as f64;
         let firm_n = FIRM_SHARE * scaling.load_n;
-        let mut stretch = 0;
+        let (mut stretch, mut last) = (0, (0, 0));
         for segment in blocks.segments() {
             for (k, around) in (segment.start + BEFORE..).zip(couplings[segment].array_windows()) {
                 let Some(kind) = touch(around, firm_n).filter(|_| blocks.is_complete(k)) else { continue };
@@ -95,7 +95,10 @@ impl RowSource<'_> {
                         .for_each(|(kind, row)| design.close(kind, row, blocks.period_s));
                     stretch = here;
                 }
-                if open[kind].blocks >= most {
+                // Two touches share a row where the first leaves half of it free.
+                let full = if last == (kind, k.wrapping_sub(1)) { most } else { 0.5 * most };
+                last = (kind, k);
+                if open[kind].blocks >= full {
                     design.close(kind, &mut open[kind], blocks.period_s);
                 }
                 open[kind].add(&self.row(k, &couplings[k]));

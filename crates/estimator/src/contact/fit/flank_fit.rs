@@ -81,11 +81,12 @@ const CLIPPED: f64 = 1.5;
 /// Friction counts up to this share of the load in the growth of the error.
 const MAX_FRICTION_SHARE: f64 = 0.6;
 /// Weights of the four parts of the error and of the exponents of its growth, by maximum likelihood (Student's t with five
-/// degrees of freedom) over 2,800 simulated flights; that of the difference so large that a bent load cell counts.
-const JACKKNIFE: f64 = 0.85;
-const SPREAD: f64 = 0.5;
-const DIFFERENCE: f64 = 3.0;
-const FLOOR: (f64, f64) = (5e-4, 0.4);
+/// degrees of freedom) over 2,800 simulated flights; that of the bend so large that a bent load cell counts.
+const JACKKNIFE: f64 = 0.8;
+const SPREAD: f64 = 0.45;
+const CHOICE: f64 = 2.6;
+const BEND: f64 = 3.0;
+const FLOOR: (f64, f64) = (4.5e-4, 0.4);
 const GROWTH: (f64, f64) = (1.3, 0.8);
 
 /// What the standard error of a gap is made of.
@@ -316,14 +317,16 @@ fn gap_and_doubt(
     let sigma = difference_m.abs() / (error_m + LEAST_DIFFERENCE_M);
     let weight = sigma * sigma / (sigma * sigma + ALIKE);
     let (windup_m, FrictionState { stiffness_n_per_m, friction, .. }) = (scaling.windup_m(), line.state);
-    let bend_m = weight * difference_m / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2));
+    // What hangs on the choice between both fits, and the bend that a load cell may have.
+    let choice = CHOICE * (1.0 - weight);
+    let bend = BEND / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2));
     let vibration_m = friction.lost_share * vibration_n / stiffness_n_per_m;
     let changes = rows.array_windows().filter(|[before, row]| before.x[GAP] * row.x[GAP] < 0.0).count();
     let friction_share = (friction.at_n(scaling.load_n) / scaling.load_n).min(MAX_FRICTION_SHARE);
     let growth = GROWTH.0 / (changes.max(1) as f64).sqrt() + GROWTH.1 * friction_share;
     let doubt = Doubt {
         jackknife_m: JACKKNIFE * jackknife_m,
-        candidates_m: (SPREAD * spread_m).hypot(DIFFERENCE * bend_m),
+        candidates_m: (SPREAD * spread_m).hypot(weight * difference_m * choice.hypot(bend)),
         floor_m: (FLOOR.0 * windup_m).hypot(FLOOR.1 * vibration_m),
         growth: growth.exp() * if whole.is_clipped() { CLIPPED } else { 1.0 },
     };

@@ -85,13 +85,8 @@ pub(crate) fn search(
 pub(crate) fn start(scaling: &Scaling) -> FrictionState {
     FrictionState {
         stiffness_n_per_m: scaling.stiffness_n_per_m,
-        gap_m: 0.0,
         friction: Friction { dry_n: FRICTION_DRY.0 * scaling.load_n, lost_share: FRICTION_SHARE.0 },
-        stribeck: 0.0,
-        bristle_m_per_n: 0.0,
-        load_zero_n: 0.0,
-        load_delay_s: 0.0,
-        skew_s: 0.0,
+        ..FrictionState::default()
     }
 }
 

@@ -21,11 +21,7 @@ pub(crate) fn integrate(
     couplings.resize(blocks.len(), Coupling::UNKNOWN);
     let params = CouplingParams::new(state, motor_sense);
     for segment in blocks.segments() {
-        let channels = Channels {
-            motor_m: &blocks.motor_m[segment.clone()],
-            load_n: &blocks.load_n[segment.clone()],
-            slowness: &blocks.slowness[segment.clone()],
-        };
+        let channels = Channels::of(blocks, segment.clone());
         integrate_segment(params, channels, &mut couplings[segment]);
     }
 }
@@ -38,9 +34,17 @@ struct Channels<'a> {
     slowness: &'a [f64],
 }
 
-impl Channels<'_> {
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
+impl<'a> Channels<'a> {
+    fn of(blocks: &'a BlockMeans, segment: Range<usize>) -> Self {
+        Self {
+            motor_m: &blocks.motor_m[segment.clone()],
+            load_n: &blocks.load_n[segment.clone()],
+            slowness: &blocks.slowness[segment],
+        }
+    }
+
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn at(&self, k: usize) -> Drive {
         Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
     }
@@ -180,19 +184,14 @@ mod tests {
                 stribeck: 0.3,
                 bristle_m_per_n: bristle / 5e7,
                 load_zero_n,
-                load_delay_s: 0.0,
-                skew_s: 0.0,
+                ..FrictionState::default()
             };
             let mut couplings = Vec::new();
             integrate(&blocks, &state, 1.0, &mut couplings);
             for segment in blocks.segments() {
                 let (params, mut screw) = (CouplingParams::new(&state, 1.0), None);
                 for k in segment {
-                    let drive = Drive {
-                        motor_m: blocks.motor_m[k],
-                        load_n: blocks.load_n[k],
-                        slowness: blocks.slowness[k],
-                    };
+                    let drive = Channels::of(&blocks, k..k + 1).at(0);
                     let bits = |c: Coupling| {
                         [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
                     };
