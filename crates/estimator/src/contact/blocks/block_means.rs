@@ -57,6 +57,8 @@ pub(crate) struct BlockMeans {
     pub(crate) period_s: f64,
     /// One over the length of two blocks, 1/s.
     pub(crate) per_two_s: f64,
+    /// Blocks on either side over which the speed of the motor is taken.
+    speed_reach: usize,
     /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
     is_calm: bool,
     /// The block at which each segment starts.
@@ -126,6 +128,7 @@ impl BlockMeans {
         starts.clear();
         self.phases.clear();
         (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
+        self.speed_reach = ((SPEED_S / period_s).round() as usize).max(1);
     }
 
     /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
@@ -256,10 +259,9 @@ impl BlockMeans {
 
     /// Speed of the motor by the difference over [`SPEED_S`] on either side, m/s; NaN at the ends and near gaps.
     pub(crate) fn speed_m_per_s(&self, at: usize) -> f64 {
-        let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
-        let Some(from) = at.checked_sub(reach) else { return f64::NAN };
-        let to_m = self.motor_m.get(at + reach).copied().unwrap_or(f64::NAN);
-        (to_m - self.motor_m[from]) / (2.0 * reach as f64 * self.period_s)
+        let Some(from) = at.checked_sub(self.speed_reach) else { return f64::NAN };
+        let to_m = self.motor_m.get(at + self.speed_reach).copied().unwrap_or(f64::NAN);
+        (to_m - self.motor_m[from]) / (2.0 * self.speed_reach as f64 * self.period_s)
     }
 
     /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
@@ -358,12 +360,17 @@ fn cubic(u: f64) -> [f64; 4] {
 fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> Option<[f64; 3]> {
     let Samples { motor_m, dx_m, load_n, .. } = *samples;
     let (mut sums, mut sound, least) = ([0.0; 3], 0.0, 0.5 * block.len() as f64);
-    for i in block {
-        let [x, y, f] = [motor_m[i], dx_m[i], load_n[i]];
-        if (x + y + f).is_finite() && !is_spike(dx_m, i, steps[0]) && !is_spike(load_n, i, steps[1]) {
+    let before = block.start.saturating_sub(1);
+    let (mut last_y, mut last_f) = (dx_m[before], load_n[before]);
+    let positions = motor_m[block.clone()].iter().zip(&dx_m[block.clone()]);
+    for (i, ((&x, &y), &f)) in block.clone().zip(positions.zip(&load_n[block])) {
+        let leaps = (y - last_y).abs() > steps[0] || (f - last_f).abs() > steps[1];
+        let is_wild = leaps && (is_spike(dx_m, i, steps[0]) || is_spike(load_n, i, steps[1]));
+        if (x + y + f).is_finite() && !is_wild {
             sums = [sums[0] + x, sums[1] + y, sums[2] + f];
             sound += 1.0;
         }
+        (last_y, last_f) = (y, f);
     }
     (sound >= least).then(|| sums.map(|sum| sum / sound))
 }

@@ -185,7 +185,11 @@ fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
     let here_n = around[BEFORE].force_n;
     let is_firm = here_n.abs() > firm_n;
     let least_n = if is_firm { firm_n } else { 0.0 };
-    let is_kept = around.iter().all(|coupling| here_n.signum() * coupling.force_n > least_n);
+    let is_kept = if here_n > 0.0 {
+        around.iter().all(|coupling| coupling.force_n > least_n)
+    } else {
+        around.iter().all(|coupling| coupling.force_n < -least_n)
+    };
     is_kept.then_some(2 * usize::from(is_firm) + usize::from(here_n > 0.0))
 }
 
