@@ -72,6 +72,7 @@ pub(crate) struct RowSource<'a> {
     pub(crate) scaling: &'a Scaling,
 }
 
+#[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
 impl RowSource<'_> {
     /// Rows of all blocks that keep their flank, none of which mixes flank and gap.
     ///
