@@ -44,47 +44,22 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
     let reach = ((TURN_S / blocks.period_s).round() as usize).max(1);
     let (near_n, turn_n) = (NEAR_ZERO * scaling.load_n, LEAST_TURN * scaling.load_n);
-    let state = &contact.line.at;
-    let (mut falling, mut rising) = (Branch::default(), Branch::default());
-    for k in reach..blocks.len().saturating_sub(reach) {
-        let load_n = blocks.load_n[k] - state.load_zero_n;
+    let position = |side: f64, k: usize| {
+        let load_n = blocks.load_n[k] - contact.line.at.load_zero_n;
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
-        let branch = match () {
-            () if load_n.abs() > near_n || !blocks.is_complete(k) => continue,
-            () if load_n >= 0.0 && turned_n < -turn_n => &mut falling,
-            () if load_n <= 0.0 && turned_n > turn_n => &mut rising,
-            () => continue,
+        let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
+        let on_branch_m = || {
+            RowSource { blocks, scaling }.without_slow_parts_m(k, &contact.line.fit.beta)
+                - load_n * contact.compliance_m_per_n.0
         };
-        let wound_m = load_n * contact.compliance_m_per_n.0;
-        branch.add(
-            RowSource { blocks, scaling }.without_slow_parts_m(k, &contact.line.fit.beta) - wound_m,
-            blocks.stretch(k),
-        );
-    }
-    let (upper, lower) = (falling.median_m()?, rising.median_m()?);
+        is_on_branch.then(on_branch_m).filter(|m| m.is_finite()).map(|m| (m, blocks.stretch(k)))
+    };
+    let branch_m = |side: f64| {
+        let inner = reach..blocks.len().saturating_sub(reach);
+        median_and_error_m(inner.filter_map(|k| position(side, k)))
+    };
+    let (upper, lower) = (branch_m(1.0)?, branch_m(-1.0)?);
     Some((upper.0 - lower.0, upper.1.hypot(lower.1)))
-}
-
-/// Positions on one branch of the loop, and the stretches in which they were seen.
-#[derive(Default)]
-struct Branch {
-    positions_m: Vec<f64>,
-    stretches: Vec<u32>,
-}
-
-impl Branch {
-    fn add(&mut self, position_m: f64, stretch: u32) {
-        self.positions_m.push(position_m);
-        if self.stretches.last() != Some(&stretch) {
-            self.stretches.push(stretch);
-        }
-    }
-
-    /// Their median, and its standard error with the positions of one stretch taken as one.
-    fn median_m(mut self) -> Option<(f64, f64)> {
-        (self.positions_m.len() >= FEWEST_ROWS)
-            .then(|| median_and_error_m(&mut self.positions_m, self.stretches.len()))
-    }
 }
 
 /// Lost motion at zero load, friction taken off, from the lightly loaded rows, which the straight fit never saw, m.
@@ -103,37 +78,30 @@ pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) ->
     let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
     let beta = &contact.line.fit.beta;
     let line_m = beta[GAP] + 2.0 * load * beta[FORCE];
-    Some(put_together(contact, line_m, beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
+    let (upper, lower) = (beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?);
+    // The uncertainty of the gap (drift, transducer, friction) applies here too; the scatter of the medians is added.
+    Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))
 }
 
-/// Lost motion: a travel along the fitted line, and the distances of both flanks beyond it. The uncertainty of the gap
-/// (drift, transducer, friction) applies here too; the scatter of the medians is added.
-fn put_together(contact: &FlankFit, line_m: f64, upper: (f64, f64), lower: (f64, f64)) -> (f64, f64) {
-    (line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1)))
-}
-
-/// How far outwards of the fitted line the rows of a flank lie, m: their median, and its standard error with
-/// the rows of one stretch taken as one.
+/// How far outwards of the fitted line the rows of a flank lie, m, and the standard error.
 fn beyond_m<'a>(
     contact: &FlankFit,
     rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>,
     flank: Flank,
 ) -> Option<(f64, f64)> {
-    let (mut outward_m, mut stretches): (Vec<f64>, Vec<u32>) = rows
-        .filter(|row| row.x[GAP] * flank.sign() > 0.0)
-        .map(|row| (flank.sign() * contact.line.fit.residual_m(row), row.stretch))
-        .unzip();
-    if outward_m.len() < FEWEST_ROWS {
+    let of_flank = rows.filter(|row| row.x[GAP] * flank.sign() > 0.0);
+    median_and_error_m(of_flank.map(|row| (flank.sign() * contact.line.fit.residual_m(row), row.stretch)))
+}
+
+/// The median of lengths, m, and its standard error with those of one stretch taken as one; none of too few.
+fn median_and_error_m(lengths: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
+    let (mut lengths_m, mut stretches): (Vec<f64>, Vec<u32>) = lengths.unzip();
+    if lengths_m.len() < FEWEST_ROWS {
         return None;
     }
     stretches.sort_unstable();
     stretches.dedup();
-    Some(median_and_error_m(&mut outward_m, stretches.len()))
-}
-
-/// The median of some values and its standard error for a number of independent ones, m.
-fn median_and_error_m(values_m: &mut [f64], independent: usize) -> (f64, f64) {
-    let median_m = median(values_m);
-    values_m.iter_mut().for_each(|e| *e = (*e - median_m).abs());
-    (median_m, MEDIAN * MAD * median(values_m) / (independent as f64).sqrt())
+    let median_m = median(&mut lengths_m);
+    lengths_m.iter_mut().for_each(|m| *m = (*m - median_m).abs());
+    Some((median_m, MEDIAN * MAD * median(&mut lengths_m) / (stretches.len() as f64).sqrt()))
 }

@@ -13,8 +13,8 @@
 //!
 //! 1. `block_means` averages whole samples, without missing ones and spikes; `sign_check` rejects wrong mappings.
 //! 2. `parameter_search` finds, in an excerpt of a long flight, what derivatives do not show: the zero of the load cell
-//!    (in contact it merges with δX₀; it shows where the flank is left), pre-sliding of the friction, and whether a late
-//!    load channel is delayed or filtered. Each candidate is refined by `gauss_newton`.
+//!    (in contact it merges with δX₀; it shows where the flank is left), and pre-sliding of the friction. Each candidate is
+//!    refined by `gauss_newton`.
 //! 3. `flank_fit` extrapolates the stiff part of both flanks to zero load and states the error.
 //!
 //! A toe below the loads that occur is, to the data, extra gap: `gap_m` is the distance of the stiff flanks extrapolated
@@ -39,8 +39,10 @@ pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, PartPrior};
 
 use crate::error::Error;
 use crate::{Samples, model};
+use fit::design_matrix::{DRY, FORCE, LOAD_RATE, SHARE, SPEED};
 use fit::flank_fit::{self, FlankFit};
-use fit::scaling::Scaling;
+use fit::gauss_newton::GaussNewtonResult;
+use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
 use types::{LONGEST_STEP_S, NORMAL_95};
 
@@ -167,6 +169,10 @@ fn report(
     let gap_se_m = contact.gap_m.1;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
 
+    let GaussNewtonResult { design, fit, state, .. } = &contact.line;
+    let error_m = |terms: &[(usize, f64)]| fit.standard_error_of_sum_m(terms, &design.firm);
+    // A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
+    let friction_error_n = |terms: &[(usize, f64)]| error_m(terms) / compliance;
     let lost_motion =
         prior.reference_load_n.and_then(|load_n| lost_motion::lost_motion_m(contact, frame, load_n));
     let mut found = ContactEstimate {
@@ -175,21 +181,25 @@ fn report(
         gap_bounds_m: (gap_m - NORMAL_95 * gap_se_m, gap_m + NORMAL_95 * gap_se_m),
         stiffness_n_per_m: compliance.recip(),
         stiffness_se_n_per_m: compliance_se / (compliance * compliance),
-        skew_s: contact.state.skew_s,
-        skew_se_s: contact.skew_se_s,
-        load_zero_n: contact.state.load_zero_n,
+        skew_s: state.skew_s,
+        skew_se_s: error_m(&[(SPEED, 1.0)]) / SPEED_M_PER_S,
+        load_zero_n: state.load_zero_n,
         load_zero_se_n: contact.load_zero_se_n,
-        load_delay_s: contact.state.load_delay_s + contact.state.load_lag_s,
-        load_delay_se_s: contact.load_delay_se_s,
-        friction: contact.state.friction,
-        friction_se: contact.friction_se,
+        load_delay_s: state.load_delay_s,
+        load_delay_se_s: error_m(&[(LOAD_RATE, 1.0)]) * LATE_S / fit.beta[FORCE],
+        friction: state.friction,
+        friction_se: FrictionErrors {
+            dry_n: friction_error_n(&[(DRY, 1.0)]),
+            lost_share: friction_error_n(&[(SHARE, 1.0)]) / frame.load_n,
+            at_p95_n: friction_error_n(&[(DRY, 1.0), (SHARE, 1.0)]),
+        },
         gap_largest_m: contact.profile.map(|p| (p.largest_m.0, p.largest_m.1, p.largest_at_m)),
         preload_n,
         loop_width_m: loop_width.map(|(m, _)| m),
         loop_width_se_m: loop_width.map(|(_, se_m)| se_m),
         lost_motion_m: lost_motion.map(|(m, _)| m),
         lost_motion_se_m: lost_motion.map(|(_, se_m)| se_m),
-        touched_s: contact.touched_s,
+        touched_s: design.touched_s,
         load_p95_n: frame.load_n,
         midrange_at_fit_m,
         flags: Vec::new(),

@@ -80,7 +80,7 @@ pub struct ContactEstimate {
     pub load_zero_n: f64,
     /// Its standard error, N.
     pub load_zero_se_n: f64,
-    /// τ in `load_logged(t) = F(t − τ)`, s: delay and time constant of a first-order lag together.
+    /// τ in `load_logged(t) = F(t − τ)`, s; of a first-order lag about its time constant.
     pub load_delay_s: f64,
     /// Its standard error, s.
     pub load_delay_se_s: f64,

@@ -38,7 +38,7 @@ pub fn load_band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> 
 const BLOCK: usize = 64;
 
 /// Changes from beyond one side of a threshold to beyond the other.
-fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
+pub(crate) fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     let (mut side, mut changes, mut at) = (0.0, 0, 0);
     while at < load_n.len() {
         at += BLOCK * run_length_on_side(&load_n[at..], side);

@@ -9,17 +9,17 @@ use std::ops::Range;
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SHARE, SIDE_FORCE, SPEED,
+    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
-use crate::contact::fit::scaling::{LATE_S, SEARCH_ROW_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
+use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::stats::{median, second_difference_rms};
-use crate::contact::types::FrictionErrors;
+use crate::contact::stats::second_difference_rms;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -64,8 +64,6 @@ const UNKNOWN_FORCE_SHARE: f64 = 0.02;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
 
-/// Flanks count as bent where the two fits differ by more than about this many jackknife errors.
-const BEND_SIGMA: f64 = 2.0;
 /// Difference of the two fits, over the wind-up, above which flanks are softer than any load cell is nonlinear: 3 % of
 /// its range bends them by 1 %.
 const NONLINEAR_SHARE: f64 = 0.012;
@@ -80,65 +78,35 @@ const LEAST_PERIODIC_M: f64 = 2e-7;
 /// Factor of the error where the load cell is at its end for a part of the time: the friction model is driven by its reading.
 const CLIPPED: f64 = 1.5;
 
-/// The uncertainty grows with the share of friction in the load up to this share.
-const MAX_DOUBTED_SHARE: f64 = 0.6;
+/// Friction counts up to this share of the load in the growth of the error.
+const MAX_FRICTION_SHARE: f64 = 0.6;
+/// Weights of the four parts of the error and of the exponents of its growth, by maximum likelihood (Student's t with five
+/// degrees of freedom) over 2,800 simulated flights; that of the bend so large that a bent load cell counts.
+const JACKKNIFE: f64 = 0.8;
+const SPREAD: f64 = 0.45;
+const CHOICE: f64 = 2.6;
+const BEND: f64 = 3.0;
+const FLOOR: (f64, f64) = (4.5e-4, 0.4);
+const GROWTH: (f64, f64) = (1.3, 0.8);
 
-/// Parts of the uncertainty of a gap, m: its variance is the sum of the squared parts, each weighted, times the
-/// square of a factor for few changes of the flank and for heavy friction. The weights are fitted by maximum likelihood
-/// (Student's t with five degrees of freedom) to the errors of 4,000 simulated flights of all classes.
+/// What the standard error of a gap is made of.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Doubt {
-    /// Jackknife error of the gap over groups of rows.
-    pub(crate) jackknife_m: f64,
-    /// Spread of the gaps of all candidates of the parameter search.
-    pub(crate) search_m: f64,
-    /// What hangs on the choice between the two fits.
-    pub(crate) choice_m: f64,
-    /// Bend of the flanks that a load cell's nonlinearity may make: the difference of the two fits as far as it is
-    /// significant and small.
-    pub(crate) bend_m: f64,
-    /// How far lightly loaded rows lie off the line.
-    pub(crate) light_m: f64,
-    /// Friction between two samples that the load's slow part does not show: the lost share of the load's rms second
-    /// difference, over the stiffness.
-    pub(crate) vibration_m: f64,
-    /// Flanks that are mixed because the load vibrates faster than it is sampled.
-    pub(crate) aliased_m: f64,
-    /// What no flight averages out.
-    pub(crate) floor_m: f64,
-    /// One over the root of the number of changes from flank to flank.
-    pub(crate) changes: f64,
-    /// Friction at the 95 % load over that load.
-    pub(crate) friction_share: f64,
+struct Doubt {
+    /// Jackknife error of the gap over groups of rows, m.
+    jackknife_m: f64,
+    /// Spread of the candidates: those of the parameter search, and both fits as far as their difference is significant
+    /// and no softer flank than a load cell may show, m.
+    candidates_m: f64,
+    /// What no flight averages out: a share of the wind-up, and friction between two samples that the load's slow part
+    /// does not show, m.
+    floor_m: f64,
+    /// Factor for few changes of the flank, for heavy friction, and for a load cell at its end.
+    growth: f64,
 }
 
 impl Doubt {
     fn standard_error_m(&self) -> f64 {
-        let weighted_m = [
-            0.92 * self.jackknife_m,
-            0.48 * self.search_m,
-            2.65 * self.choice_m,
-            3.0 * self.bend_m,
-            0.095 * self.light_m,
-            0.36 * self.vibration_m,
-            0.5 * self.aliased_m,
-            1.13 * self.floor_m,
-        ];
-        let variance_m2: f64 = weighted_m.iter().map(|part_m| part_m * part_m).sum();
-        let growth = 0.58 * self.changes + 1.42 * self.friction_share.min(MAX_DOUBTED_SHARE);
-        variance_m2.sqrt() * growth.exp()
-    }
-}
-
-/// Standard errors of the friction of a fit. A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
-fn friction_errors(line: &GaussNewtonResult, scaling: &Scaling) -> FrictionErrors {
-    let stiffness = scaling.load_n / line.fit.beta[FORCE];
-    let error_n =
-        |columns: &[usize]| stiffness * line.fit.standard_error_of_sum_m(columns, &line.design.firm);
-    FrictionErrors {
-        dry_n: error_n(&[DRY]),
-        lost_share: error_n(&[SHARE]) / scaling.load_n,
-        at_p95_n: error_n(&[DRY, SHARE]),
+        self.jackknife_m.hypot(self.candidates_m).hypot(self.floor_m) * self.growth
     }
 }
 
@@ -149,16 +117,11 @@ pub(crate) struct FlankFit {
     pub(crate) gap_m: (f64, f64),
     /// 1/K and its standard error, m/N.
     pub(crate) compliance_m_per_n: (f64, f64),
-    pub(crate) skew_se_s: f64,
     pub(crate) load_zero_se_n: f64,
-    pub(crate) load_delay_se_s: f64,
-    pub(crate) friction_se: FrictionErrors,
-    pub(crate) touched_s: (f64, f64),
     /// Rms of the residuals of single blocks, m.
     pub(crate) residual_rms_m: f64,
     /// Length of a block, s.
     pub(crate) period_s: f64,
-    pub(crate) state: FrictionState,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
     /// Whether higher loads alone read another gap.
@@ -176,10 +139,7 @@ impl FlankFit {
 
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
-        (FORCE + 1..COLUMNS)
-            .filter(|&column| column != SIDE_FORCE)
-            .map(|column| self.line.fit.beta[column] * row.x[column])
-            .sum()
+        dot(&self.line.fit.beta[DRY..], &row.x[DRY..])
     }
 }
 
@@ -190,35 +150,26 @@ impl FlankFit {
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
-    let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
+    let compliance_se = line.fit.standard_error_m(FORCE, &line.design.firm);
     let windup_m = scaling.windup_m();
     let vibration_n = second_difference_rms(&workspace.whole.load_n);
     if vibration_n > ALIASED_LOAD * scaling.load_n && scale_m > ALIASED_RESIDUAL * windup_m {
         return Err(Rejection::RateTooLow);
     }
-    let (gap_m, doubt, sigma) = gap_and_doubt(&line, spread_m, scale_m, vibration_n, scaling);
+    let (line_m, doubt, sigma) = gap_and_doubt(&line, spread_m, vibration_n, scaling, &workspace.whole);
     let profile = stroke_profile(&line, &workspace.whole, scaling);
-    let gap_m = profile.map_or((gap_m, doubt.standard_error_m()), |profile| {
-        let (mean_m, jackknife_m) = profile.mean_m;
+    let gap_m = profile.map_or((line_m, doubt.standard_error_m()), |profile| {
         // What one gap for the whole stroke leaves unexplained is explained now.
-        let (search_m, choice_m, bend_m, light_m) = (0.0, 0.0, 0.0, 0.0);
-        (mean_m, Doubt { jackknife_m, search_m, choice_m, bend_m, light_m, ..doubt }.standard_error_m())
+        let jackknife_m = JACKKNIFE * profile.mean_m.1;
+        (profile.mean_m.0, Doubt { jackknife_m, candidates_m: 0.0, ..doubt }.standard_error_m())
     });
-    let is_clipped =
-        workspace.whole.in_range_n.start.is_finite() || workspace.whole.in_range_n.end.is_finite();
-    let gap_m = (gap_m.0, gap_m.1 * if is_clipped { CLIPPED } else { 1.0 });
     let fit = FlankFit {
         gap_m,
         profile,
-        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
-        skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
+        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, compliance_se / scaling.load_n),
         load_zero_se_n,
-        load_delay_se_s: error_m(LOAD_RATE) * LATE_S / line.fit.beta[FORCE],
-        friction_se: friction_errors(&line, scaling),
-        touched_s: line.design.touched_s,
         residual_rms_m: scale_m,
         period_s: workspace.whole.period_s,
-        state: line.state,
         is_soft: sigma > SOFT_CONTACT_SIGMA,
         line,
     };
@@ -272,9 +223,7 @@ fn midrange_of_m(
 ) -> Option<f64> {
     let source = RowSource { blocks, scaling };
     let beta = &fit.line.fit.beta;
-    let residual =
-        |k: usize| if blocks.is_complete(k) { source.without_slow_parts_m(k, beta) } else { f64::NAN };
-    let dx_m: Vec<f64> = (0..blocks.len()).map(residual).collect();
+    let dx_m: Vec<f64> = (0..blocks.len()).map(|k| source.without_slow_parts_m(k, beta)).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
     let segments: Vec<Range<usize>> = blocks.segments().collect();
     let stiffness_n_per_m = fit.compliance_m_per_n.0.recip();
@@ -310,7 +259,7 @@ pub(crate) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 
 
 /// Searches with long rows, in an excerpt as long as it must be, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
-    let ContactWorkspace { whole, excerpt, path } = workspace;
+    let ContactWorkspace { whole, excerpt, couplings } = workspace;
     let has_period = scaling.per_period > 0.0;
     let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
     let mut blocks = EXCERPT_BLOCKS;
@@ -319,7 +268,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         if has_period {
             excerpt.find_phases(scaling.per_period);
         }
-        match ParameterSearch::new(excerpt, path, &coarse).run() {
+        match ParameterSearch::new(excerpt, couplings, &coarse).run() {
             Ok(best) => break best,
             Err(why) if !whole.is_longer(blocks) => return Err(why),
             Err(_) => blocks *= LONGER,
@@ -330,7 +279,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     }
     let (most, least) = WHOLE_ITERATIONS;
     let iterations = if whole.len() < SHORT_BLOCKS { most } else { least };
-    let found = search((whole, path), scaling, best.found.state, (iterations, REWEIGHTINGS))?;
+    let found = search((whole, couplings), scaling, best.found.state, (iterations, REWEIGHTINGS))?;
     Ok(SearchResult { found, ..best })
 }
 
@@ -342,24 +291,23 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
     })
 }
 
-/// The gap, its uncertainty, and by how many errors the fit of higher loads differs.
+/// The gap, what its error is made of, and by how many errors the fit of higher loads differs.
 fn gap_and_doubt(
     line: &GaussNewtonResult,
-    search_m: f64,
-    residual_m: f64,
+    spread_m: f64,
     vibration_n: f64,
     scaling: &Scaling,
+    whole: &BlockMeans,
 ) -> (f64, Doubt, f64) {
-    let (windup_m, load_n) = (scaling.windup_m(), scaling.load_n);
     let rows = &line.design.firm;
     let groups = groups(rows);
     let refit = |least: f64| line.fit.leave_one_out(GAP, rows, &groups, (FORCE, least));
-    let line_m = line.fit.beta[GAP];
-    let standard_error_m = line.fit.standard_error_m(GAP, rows);
     let low = refit(FIRM_SHARE);
     let high = refit(STIFF_SHARE).filter(|_| has_both_flanks(rows));
-    let jackknife_m =
-        low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_error_m(parts.iter().copied()));
+    let jackknife_m = low.as_ref().map_or_else(
+        || line.fit.standard_error_m(GAP, rows),
+        |(_, parts)| jackknife_error_m(parts.iter().copied()),
+    );
     let (difference_m, error_m) = match (&low, &high) {
         (Some((low_m, lows)), Some((high_m, highs))) => {
             (high_m - low_m, jackknife_error_m(lows.iter().zip(highs).map(|(low_m, high_m)| high_m - low_m)))
@@ -368,32 +316,21 @@ fn gap_and_doubt(
     };
     let sigma = difference_m.abs() / (error_m + LEAST_DIFFERENCE_M);
     let weight = sigma * sigma / (sigma * sigma + ALIKE);
-    let bend = sigma.powi(4) / (sigma.powi(4) + BEND_SIGMA.powi(4));
-    let FrictionState { stiffness_n_per_m, friction, .. } = line.state;
+    let (windup_m, FrictionState { stiffness_n_per_m, friction, .. }) = (scaling.windup_m(), line.state);
+    // What hangs on the choice between both fits, and the bend that a load cell may have.
+    let choice = CHOICE * (1.0 - weight);
+    let bend = BEND / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2));
+    let vibration_m = friction.lost_share * vibration_n / stiffness_n_per_m;
     let changes = rows.array_windows().filter(|[before, row]| before.x[GAP] * row.x[GAP] < 0.0).count();
-    let mut outward_m: Vec<f64> =
-        line.design.light.iter().map(|row| line.fit.residual_m(row) * row.x[GAP].signum()).collect();
-    let gap_m = line_m + weight * difference_m;
+    let friction_share = (friction.at_n(scaling.load_n) / scaling.load_n).min(MAX_FRICTION_SHARE);
+    let growth = GROWTH.0 / (changes.max(1) as f64).sqrt() + GROWTH.1 * friction_share;
     let doubt = Doubt {
-        jackknife_m,
-        search_m,
-        choice_m: weight * (1.0 - weight) * difference_m,
-        bend_m: bend * difference_m / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2)),
-        light_m: (1.0 - weight) * median(&mut outward_m),
-        vibration_m: friction.lost_share * vibration_n / stiffness_n_per_m,
-        aliased_m: aliased_share(vibration_n / load_n, residual_m / windup_m) * windup_m,
-        floor_m: (3e-4 * windup_m).hypot(2e-4 * gap_m),
-        changes: (changes.max(1) as f64).sqrt().recip(),
-        friction_share: friction.at_n(load_n) / load_n,
+        jackknife_m: JACKKNIFE * jackknife_m,
+        candidates_m: (SPREAD * spread_m).hypot(weight * difference_m * choice.hypot(bend)),
+        floor_m: (FLOOR.0 * windup_m).hypot(FLOOR.1 * vibration_m),
+        growth: growth.exp() * if whole.is_clipped() { CLIPPED } else { 1.0 },
     };
-    (gap_m, doubt, sigma)
-}
-
-/// Error of the gap under a load that vibrates faster than it is sampled, as a share of the wind-up: about the fourth
-/// power of the residual's share of it, as simulated at 50 to 100 samples a second under vibration of 20 to 80 Hz.
-fn aliased_share(load_share: f64, residual_share: f64) -> f64 {
-    let vibrates = load_share.powi(4) / (load_share.powi(4) + ALIASED_LOAD.powi(4));
-    vibrates * (residual_share / ALIASED_RESIDUAL).min(1.0).powi(4)
+    (line.fit.beta[GAP] + weight * difference_m, doubt, sigma)
 }
 
 /// Rows of even numbers of correlation blocks, in order of time.
@@ -442,23 +379,17 @@ fn is_explained(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &Flank
 /// How far δX travels, m: as seen once everything else is taken off, as gap and wind-up predict, and by noise alone;
 /// each from the 5 % to the 95 % quantile.
 fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> (f64, f64, f64) {
-    let ContactWorkspace { excerpt: blocks, path, .. } = workspace;
+    let ContactWorkspace { excerpt: blocks, couplings, .. } = workspace;
     let state = &fit.line.at;
-    blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
+    blocks.apply_delays(state);
+    integrate(blocks, state, scaling.motor_sense, couplings);
     let source = RowSource { blocks, scaling };
-    path.integrate(blocks, state, scaling.motor_sense);
     let stride = blocks.len().div_ceil(LOOKS).max(1);
-    let (mut seen_m, mut expected_m) = (Vec::new(), Vec::new());
-    for k in (0..blocks.len()).step_by(stride).filter(|&k| blocks.is_complete(k)) {
-        let force_n = path.couplings[k].force_n;
-        if !force_n.is_finite() {
-            continue;
-        }
-        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        let row = source.sum(&path.couplings, k..k + 1, side);
-        seen_m.push(row.y_m - fit.other_m(&row));
-        expected_m.push(fit.flank_m(side, row.x[FORCE].abs()));
-    }
+    let looks = (0..blocks.len()).step_by(stride);
+    let sound = looks.filter(|&k| blocks.is_complete(k) && couplings[k].force_n.is_finite());
+    let rows = sound.map(|k| source.row(k, &couplings[k]));
+    let (seen_m, expected_m): (Vec<f64>, Vec<f64>) =
+        rows.map(|row| (row.y_m - fit.other_m(&row), dot(&fit.line.fit.beta[..DRY], &row.x[..DRY]))).unzip();
     let firm = &fit.line.design.firm;
     let noise_m = span_m(firm.iter().map(|row| fit.line.fit.residual_m(row)).collect());
     (span_m(seen_m), span_m(expected_m), noise_m)

@@ -3,13 +3,13 @@
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
+    COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
     RowSource, SHARE, SIDE_FORCE, SPEED, STRIBECK,
 };
 use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
-use crate::contact::friction::coupling_path::CouplingPath;
-use crate::contact::friction::friction_model::{Friction, FrictionState};
+use crate::contact::friction::coupling_path::integrate;
+use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
 use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
 /// Relative spread of 1/K about the part's.
@@ -62,16 +62,17 @@ pub(crate) struct GaussNewtonResult {
 /// # Errors
 /// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
 pub(crate) fn search(
-    (blocks, path): (&mut BlockMeans, &mut CouplingPath),
+    (blocks, couplings): (&mut BlockMeans, &mut Vec<Coupling>),
     scaling: &Scaling,
     mut state: FrictionState,
     (iterations, rounds): (usize, usize),
 ) -> Result<GaussNewtonResult, Rejection> {
     let mut found = None;
     for _ in 0..iterations {
-        blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
-        let design = design_matrix::rows(RowSource { blocks, scaling }, &state, path);
-        check_contact(&design)?;
+        blocks.apply_delays(&state);
+        integrate(blocks, &state, scaling.motor_sense, couplings);
+        let design = RowSource { blocks, scaling }.rows(couplings);
+        rejection_of_contact(design.touched_s.0.min(design.touched_s.1))?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
         found = Some(GaussNewtonResult { design, fit, at: state, state: after });
@@ -84,19 +85,9 @@ pub(crate) fn search(
 pub(crate) fn start(scaling: &Scaling) -> FrictionState {
     FrictionState {
         stiffness_n_per_m: scaling.stiffness_n_per_m,
-        gap_m: 0.0,
         friction: Friction { dry_n: FRICTION_DRY.0 * scaling.load_n, lost_share: FRICTION_SHARE.0 },
-        stribeck: 0.0,
-        bristle_m_per_n: 0.0,
-        load_zero_n: 0.0,
-        load_delay_s: 0.0,
-        load_lag_s: 0.0,
-        skew_s: 0.0,
+        ..FrictionState::default()
     }
-}
-
-fn check_contact(design: &DesignMatrix) -> Result<(), Rejection> {
-    rejection_of_contact(design.touched_s.0.min(design.touched_s.1))
 }
 
 /// The reason of a flight whose less pressed flank is pressed for a time, s.
@@ -128,10 +119,9 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         // A screw that is locked has no delay.
         SPEED if scaling.motor_sense < 0.0 => zero(LOCKED_SKEW_S * SPEED_M_PER_S),
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
-        LOAD_RATE => GaussianPrior {
-            mean: -(state.load_delay_s + state.load_lag_s) / LATE_S * here_m,
-            sd: SKEW_S / LATE_S * here_m,
-        },
+        LOAD_RATE => {
+            GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: SKEW_S / LATE_S * here_m }
+        }
         SIDE_FORCE => zero(COMPLIANCE_SIDE * windup_m),
         FORCE_DRIFT => zero(COMPLIANCE_DRIFT * windup_m),
         _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),

@@ -2,7 +2,7 @@
 
 pub(super) mod design_matrix;
 pub(super) mod flank_fit;
-mod gauss_newton;
+pub(super) mod gauss_newton;
 mod parameter_search;
 mod robust_regression;
 pub(super) mod scaling;

@@ -7,7 +7,6 @@ use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::contact::fit::design_matrix::DesignRow;
 use crate::contact::stats::{MAD, median};
-use crate::simd::Lanes;
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
@@ -110,90 +109,39 @@ fn variance_of_a_row<const N: usize>(rows: &[DesignRow<N>], weights: &[f64], res
     (size / total).max(LEAST_SPREAD_M * LEAST_SPREAD_M) * inflation
 }
 
-/// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
+/// Rows that stay in the first cache while every column takes them in.
+const CHUNK: usize = 64;
+
+/// Σ w x xᵀ and Σ w x y.
 fn normal_equations<const N: usize>(
     rows: &[DesignRow<N>],
     weights: &[f64],
 ) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
-    let squares = products(rows, weights);
-    // δX comes before the columns of x.
-    let sum = |i: usize, j: usize| {
-        squares[square_index(i / Lanes::COUNT, j / Lanes::COUNT)][i % Lanes::COUNT].0[j % Lanes::COUNT]
-    };
-    (
-        SMatrix::from_fn(|i, j| if j <= i { sum(i + 1, j + 1) } else { 0.0 }),
-        SVector::from_fn(|i, _| sum(i + 1, 0)),
-    )
+    let mut sums = ([[0.0; N]; N], [0.0; N]);
+    add_products(rows, weights, &mut sums);
+    (SMatrix::from_fn(|i, j| sums.0[i][j]), SVector::from(sums.1))
 }
 
-/// Most lanes of a row: δX and the columns of x.
-const ROW_LANES: usize = 5;
-/// Squares on and below the diagonal.
-const SQUARES: usize = ROW_LANES * (ROW_LANES + 1) / 2;
-/// Rows whose lanes stay in the first cache while every square takes them in.
-const CHUNK: usize = 32;
-
-/// Sums of products of eight columns with eight others.
-type Square = [Lanes; Lanes::COUNT];
-
-/// Where the square of two lanes of a row stands, the second of which is not after the first.
-const fn square_index(line: usize, column: usize) -> usize {
-    line * (line + 1) / 2 + column
-}
-
-/// Sums over rows: Σ w z zᵀ with z = [y, x], in squares on and below the diagonal, filled up with zeros. Whole squares:
-/// what is above the diagonal comes for nothing.
+/// Adds the products of some rows: whole columns, since what is above the diagonal comes for nothing.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> [Square; SQUARES] {
-    const { assert!(N < ROW_LANES * Lanes::COUNT) };
-    let mut squares = [[Lanes::ZERO; Lanes::COUNT]; SQUARES];
-    let mut plain = [[Lanes::ZERO; CHUNK]; ROW_LANES];
-    let mut weighted = plain;
-    let lines = N / Lanes::COUNT + 1;
+fn add_products<const N: usize>(
+    rows: &[DesignRow<N>],
+    weights: &[f64],
+    (squares, right): &mut ([[f64; N]; N], [f64; N]),
+) {
     for (rows, weights) in rows.chunks(CHUNK).zip(weights.chunks(CHUNK)) {
-        for (k, (row, &w)) in rows.iter().zip(weights).enumerate() {
-            for line in 0..lines {
-                let mut lanes = Lanes::ZERO;
-                for (lane, value) in lanes.0.iter_mut().enumerate() {
-                    let column = line * Lanes::COUNT + lane;
-                    *value = match column {
-                        0 => row.y_m,
-                        _ if column <= N => row.x[column - 1],
-                        _ => 0.0,
-                    };
-                }
-                plain[line][k] = lanes;
-                weighted[line][k] = Lanes::all(w).times(lanes);
-            }
-        }
-        for line in 0..lines {
-            let left = &weighted[line][..rows.len()];
-            for column in 0..=line {
-                let square = &mut squares[square_index(line, column)];
-                let right = &plain[column][..rows.len()];
-                match N + 1 - line * Lanes::COUNT {
-                    0..=2 => add_products::<2>(square, left, right),
-                    3..=4 => add_products::<4>(square, left, right),
-                    _ => add_products::<{ Lanes::COUNT }>(square, left, right),
+        for (i, (square, right)) in squares.iter_mut().zip(right.iter_mut()).enumerate() {
+            let mut sums = *square;
+            for (row, weight) in rows.iter().zip(weights) {
+                let weighted = weight * row.x[i];
+                *right += weighted * row.y_m;
+                for (sum, x) in sums.iter_mut().zip(row.x) {
+                    *sum += weighted * x;
                 }
             }
+            *square = sums;
         }
     }
-    squares
-}
-
-/// Adds the products of some rows to the first lines of a square, which stay in registers.
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
-fn add_products<const LINES: usize>(square: &mut Square, left: &[Lanes], right: &[Lanes]) {
-    let mut sums = [Lanes::ZERO; LINES];
-    sums.copy_from_slice(&square[..LINES]);
-    for (left, right) in left.iter().zip(right) {
-        for (sum, weighted) in sums.iter_mut().zip(left.0) {
-            *sum = sum.plus(Lanes::all(weighted).times(*right));
-        }
-    }
-    square[..LINES].copy_from_slice(&sums);
 }
 
 fn solve<const N: usize>(
@@ -278,20 +226,13 @@ impl<const N: usize> RobustFit<N> {
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
     pub(crate) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
-        self.standard_error_of_sum_m(&[column], rows)
+        self.standard_error_of_sum_m(&[(column, 1.0)], rows)
     }
 
-    /// As [`standard_error_m`](Self::standard_error_m), of a sum of coefficients.
-    pub(crate) fn standard_error_of_sum_m(&self, columns: &[usize], rows: &[DesignRow<N>]) -> f64 {
-        let mut combination = [0.0; N];
-        columns.iter().for_each(|&column| combination[column] = 1.0);
-        self.standard_error_of_m(&combination, rows)
-    }
-
-    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of all coefficients.
-    pub(crate) fn standard_error_of_m(&self, combination: &[f64; N], rows: &[DesignRow<N>]) -> f64 {
+    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of coefficients.
+    pub(crate) fn standard_error_of_sum_m(&self, terms: &[(usize, f64)], rows: &[DesignRow<N>]) -> f64 {
         let influence: [f64; N] = std::array::from_fn(|i| {
-            (0..N).map(|column| combination[column] * self.inverse[(column, i)]).sum()
+            terms.iter().map(|&(column, weight)| weight * self.inverse[(column, i)]).sum()
         });
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;

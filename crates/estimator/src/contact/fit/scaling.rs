@@ -101,4 +101,9 @@ impl Scaling {
     pub(crate) fn time_share(&self, time_s: f64) -> f64 {
         (time_s - self.time_s.0) * self.per_time
     }
+
+    /// A place from −1 at one end of the stroke seen to 1 at the other.
+    pub(crate) fn place_share(&self, screw_m: f64) -> f64 {
+        (screw_m - self.place_m.0) * self.per_place
+    }
 }

@@ -61,10 +61,9 @@ pub(crate) fn stroke_profile(
         found.beta[GAP] + weights.iter().zip(&found.beta[COLUMNS..]).map(|(w, b)| w * b).sum::<f64>()
     };
     let error_m = |gap: f64, weights: &[f64; KNOTS]| {
-        let mut combination = [0.0; ALL];
-        combination[GAP] = gap;
-        combination[COLUMNS..COLUMNS + KNOTS].copy_from_slice(weights);
-        found.standard_error_of_m(&combination, &rows)
+        let knots = (COLUMNS..).zip(weights.iter().copied());
+        let terms: Vec<(usize, f64)> = knots.chain(std::iter::once((GAP, gap))).collect();
+        found.standard_error_of_sum_m(&terms, &rows)
     };
     let only = |knot: usize| std::array::from_fn(|k| f64::from(u8::from(k == knot)));
     let mean_m = value_m(&shares);

@@ -1,12 +1,12 @@
 //! Scratch memory of the contact regression.
 
 use crate::contact::blocks::block_means::BlockMeans;
-use crate::contact::friction::coupling_path::CouplingPath;
+use crate::contact::friction::friction_model::Coupling;
 
 /// Scratch memory of a regression, reused from flight to flight.
 #[derive(Debug, Default)]
 pub struct ContactWorkspace {
     pub(crate) whole: BlockMeans,
     pub(crate) excerpt: BlockMeans,
-    pub(crate) path: CouplingPath,
+    pub(crate) couplings: Vec<Coupling>,
 }

@@ -5,110 +5,24 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use crate::contact::blocks::block_means::BlockMeans;
-use crate::contact::friction::flank::{FIRM_SHARE, Flank};
 use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, FrictionState, ScrewState};
-use crate::simd::Lanes;
 
-/// Blocks before one that must keep its flank and firmness; one after it must as well.
-const BEFORE: usize = 2;
-/// All of them.
-const KEPT: usize = BEFORE + 2;
+/// Parts of a segment that are integrated side by side.
+const LANES: usize = 8;
 
-/// Which flank a block presses, and whether firmly, in bits; none in the gap, or where the force is unknown.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Touch(u8);
-
-impl Touch {
-    const NONE: Self = Self(0);
-    const UPPER: u8 = 1;
-    const LOWER: u8 = 2;
-    const FIRM: u8 = 4;
-
-    fn of(force_n: f64, firm_n: f64) -> Self {
-        let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
-        let firm = u8::from(force_n.abs() > firm_n);
-        Self((upper * Self::UPPER) | (lower * Self::LOWER) | (firm * Self::FIRM))
-    }
-
-    /// Whether this block and those around it press one flank, all of them firmly where it does.
-    fn is_kept(self, around: &[Self]) -> bool {
-        let all = around.iter().fold(u8::MAX, |all, touch| all & touch.0);
-        all & (Self::UPPER | Self::LOWER) != 0 && self.0 & !all & Self::FIRM == 0
-    }
-
-    pub(crate) fn flank(self) -> Flank {
-        if self.0 & Self::UPPER == 0 { Flank::Lower } else { Flank::Upper }
-    }
-
-    /// A number for each flank, loaded or lightly loaded: 0 to 3.
-    pub(crate) fn index(self) -> usize {
-        usize::from(self.flank() == Flank::Lower) + 2 * usize::from(self.0 & Self::FIRM != 0)
-    }
-
-    /// Whether an [index](Self::index) is of loaded contact.
-    pub(crate) fn is_firm_index(index: usize) -> bool {
-        index >= 2
-    }
-}
-
-/// The coupling of every block under one set of parameters.
-#[derive(Debug, Default)]
-pub(crate) struct CouplingPath {
-    pub(crate) couplings: Vec<Coupling>,
-    touches: Vec<Touch>,
-    /// Touches of the complete blocks whose neighbours have the same contact state.
-    kept: Vec<Touch>,
-}
-
-impl CouplingPath {
-    /// Integrates the coupling over all segments.
-    pub(crate) fn integrate(&mut self, blocks: &BlockMeans, state: &FrictionState, motor_sense: f64) {
-        self.couplings.clear();
-        self.couplings.resize(blocks.len(), Coupling::UNKNOWN);
-        let params = CouplingParams::new(state, motor_sense);
-        for segment in blocks.segments() {
-            let channels = Channels {
-                motor_m: &blocks.motor_m[segment.clone()],
-                load_n: &blocks.load_n[segment.clone()],
-                slowness: &blocks.slowness[segment.clone()],
-            };
-            integrate_segment(params, channels, &mut self.couplings[segment]);
-        }
-    }
-
-    /// Marks the complete blocks that keep flank and contact state, so that no row mixes flank and gap.
-    pub(crate) fn mark_stable(&mut self, blocks: &BlockMeans, load_n: f64) {
-        let firm_n = FIRM_SHARE * load_n;
-        self.touches.clear();
-        self.touches.extend(self.couplings.iter().map(|coupling| Touch::of(coupling.force_n, firm_n)));
-        self.kept.clear();
-        self.kept.resize(blocks.len(), Touch::NONE);
-        for segment in blocks.segments() {
-            let around = self.touches[segment.clone()].array_windows::<KEPT>();
-            for (k, around) in (segment.start + BEFORE..).zip(around) {
-                if around[BEFORE].is_kept(around) && blocks.is_complete(k) {
-                    self.kept[k] = around[BEFORE];
-                }
-            }
-        }
-    }
-
-    /// The next run of stable blocks with one contact state: no longer than `most`, and within one correlation block.
-    pub(crate) fn next_stable_run(
-        &self,
-        blocks: &BlockMeans,
-        within: Range<usize>,
-        most: usize,
-    ) -> Option<(Touch, Range<usize>)> {
-        let start =
-            within.start + self.kept[within.clone()].iter().position(|touch| *touch != Touch::NONE)?;
-        let (touch, stretch) = (self.kept[start], blocks.stretch(start));
-        let mut end = start + 1;
-        let last = within.end.min(start + most);
-        while end < last && self.kept[end] == touch && blocks.stretch(end) == stretch {
-            end += 1;
-        }
-        Some((touch, start..end))
+/// Integrates the coupling of every block over all segments under one set of parameters.
+pub(crate) fn integrate(
+    blocks: &BlockMeans,
+    state: &FrictionState,
+    motor_sense: f64,
+    couplings: &mut Vec<Coupling>,
+) {
+    couplings.clear();
+    couplings.resize(blocks.len(), Coupling::UNKNOWN);
+    let params = CouplingParams::new(state, motor_sense);
+    for segment in blocks.segments() {
+        let channels = Channels::of(blocks, segment.clone());
+        integrate_segment(params, channels, &mut couplings[segment]);
     }
 }
 
@@ -120,9 +34,17 @@ struct Channels<'a> {
     slowness: &'a [f64],
 }
 
-impl Channels<'_> {
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
+impl<'a> Channels<'a> {
+    fn of(blocks: &'a BlockMeans, segment: Range<usize>) -> Self {
+        Self {
+            motor_m: &blocks.motor_m[segment.clone()],
+            load_n: &blocks.load_n[segment.clone()],
+            slowness: &blocks.slowness[segment],
+        }
+    }
+
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn at(&self, k: usize) -> Drive {
         Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
     }
@@ -131,17 +53,17 @@ impl Channels<'_> {
 /// Integrates eight parts in parallel lanes, each from an arbitrary state; then from the true start of each part until the
 /// sequential integration meets what the lane found.
 fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut [Coupling]) {
-    let part = found.len() / Lanes::COUNT;
+    let part = found.len() / LANES;
     let ends = integrate_lanes(params, channels, part, found);
     let mut screw = None;
-    for number in 0..Lanes::COUNT {
+    for number in 0..LANES {
         let part = number * part..(number + 1) * part;
         if recompute_until_match(params, &mut screw, channels, part, found) {
             screw = Some(ends.get(number));
         }
     }
     // No lane covers the rest of the segment.
-    recompute_until_match(params, &mut screw, channels, Lanes::COUNT * part..found.len(), found);
+    recompute_until_match(params, &mut screw, channels, LANES * part..found.len(), found);
 }
 
 /// Integrates through a part until its values are those found before: once the screw has slipped, its force determines
@@ -168,19 +90,13 @@ fn recompute_until_match(
 /// Eight screws in parallel lanes.
 #[derive(Clone, Copy)]
 struct ScrewStates8 {
-    motor_m: [f64; Lanes::COUNT],
-    anchor_m: [f64; Lanes::COUNT],
-    memory: [[f64; Lanes::COUNT]; 3],
+    motor_m: [f64; LANES],
+    anchor_m: [f64; LANES],
+    memory: [[f64; LANES]; 3],
 }
 
 #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
 impl ScrewStates8 {
-    const ZERO: Self = Self {
-        motor_m: [0.0; Lanes::COUNT],
-        anchor_m: [0.0; Lanes::COUNT],
-        memory: [[0.0; Lanes::COUNT]; 3],
-    };
-
     #[inline(always)]
     fn get(&self, lane: usize) -> ScrewState {
         ScrewState {
@@ -210,14 +126,15 @@ fn integrate_lanes(
     part: usize,
     found: &mut [Coupling],
 ) -> ScrewStates8 {
-    let mut screws = ScrewStates8::ZERO;
+    let zero = [0.0; LANES];
+    let mut screws = ScrewStates8 { motor_m: zero, anchor_m: zero, memory: [zero; 3] };
     for k in 0..part {
-        let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; Lanes::COUNT];
+        let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; LANES];
         for (lane, drive) in drives.iter_mut().enumerate() {
             *drive = channels.at(lane * part + k);
         }
-        let mut couplings = [Coupling::UNKNOWN; Lanes::COUNT];
-        for lane in 0..Lanes::COUNT {
+        let mut couplings = [Coupling::UNKNOWN; LANES];
+        for lane in 0..LANES {
             let is_known = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
             let screw = params.step(&screws.get(lane), drives[lane]);
             screws.set(lane, is_known, &screw);
@@ -267,24 +184,18 @@ mod tests {
                 stribeck: 0.3,
                 bristle_m_per_n: bristle / 5e7,
                 load_zero_n,
-                load_delay_s: 0.0,
-                load_lag_s: 0.0,
-                skew_s: 0.0,
+                ..FrictionState::default()
             };
-            let mut path = CouplingPath::default();
-            path.integrate(&blocks, &state, 1.0);
+            let mut couplings = Vec::new();
+            integrate(&blocks, &state, 1.0, &mut couplings);
             for segment in blocks.segments() {
                 let (params, mut screw) = (CouplingParams::new(&state, 1.0), None);
                 for k in segment {
-                    let drive = Drive {
-                        motor_m: blocks.motor_m[k],
-                        load_n: blocks.load_n[k],
-                        slowness: blocks.slowness[k],
-                    };
+                    let drive = Channels::of(&blocks, k..k + 1).at(0);
                     let bits = |c: Coupling| {
                         [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
                     };
-                    prop_assert_eq!(bits(path.couplings[k]), bits(params.follow(&mut screw, drive)), "block {}", k);
+                    prop_assert_eq!(bits(couplings[k]), bits(params.follow(&mut screw, drive)), "block {}", k);
                 }
             }
         }

@@ -14,7 +14,7 @@
 //! shows the loop that the sign of the motor's speed cannot show.
 
 /// Dry friction of the screw and the share of the load that is lost (equation 1).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Friction {
     /// `F_d`, N.
     pub dry_n: f64,
@@ -38,7 +38,7 @@ impl Friction {
 const HEAVY: f64 = 3.0;
 
 /// Parameters of the screw, its coupling and the channels that the regression iterates over.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FrictionState {
     pub(crate) stiffness_n_per_m: f64,
     pub(crate) gap_m: f64,
@@ -51,8 +51,6 @@ pub(crate) struct FrictionState {
     pub(crate) load_zero_n: f64,
     /// τ in `load_logged(t) = F(t − τ)`, s.
     pub(crate) load_delay_s: f64,
-    /// Time constant of the load channel's first-order lag, s.
-    pub(crate) load_lag_s: f64,
     /// τ in `screw_logged(t) = X₂(t − τ)`, s.
     pub(crate) skew_s: f64,
 }
@@ -119,6 +117,7 @@ pub(crate) struct ScrewState {
     pub(crate) has_slipped: bool,
 }
 
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
 impl CouplingParams {
     pub(crate) fn new(state: &FrictionState, motor_sense: f64) -> Self {
         let compliance_m_per_n = state.stiffness_n_per_m.recip();
@@ -137,7 +136,6 @@ impl CouplingParams {
     /// The screw a block later. Both the held and the slipping solution are computed and one is selected, so that
     /// several screws can be integrated in parallel lanes.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     pub(crate) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
         let load_n = drive.load_n - self.load_zero_n;
         let anchor_m = before.anchor_m - self.motor_sense * (drive.motor_m - before.motor_m);
@@ -205,7 +203,6 @@ impl CouplingParams {
 
     /// Relative position on a flank under a force, m.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn relative_m(&self, force_n: f64) -> f64 {
         let above_m = if force_n > 0.0 { self.half_gap_m } else { 0.0 };
         let flank_m = if force_n < 0.0 { -self.half_gap_m } else { above_m };
