@@ -139,6 +139,7 @@ fn an_open_request_is_on_the_work_list_and_on_the_page_of_its_unit() {
         by: Some(HOSTILE.to_owned()),
         reason: Some(HOSTILE.to_owned()),
         until_utc: Some("2027-01-31T00:00:00Z".parse().unwrap()),
+        due_utc: None,
         changed_utc: "2026-11-02T00:00:00Z".parse().unwrap(),
         closed_by: None,
         closed_utc: None,
