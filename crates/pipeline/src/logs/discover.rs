@@ -325,12 +325,12 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 
-/// The path of a log in records and messages. Bytes that are no text are written as `%FF`, so that each file has a path of
+/// The path of a log in records and messages. Bytes that are no text are written as `%ff`, so that each file has a path of
 /// its own.
 fn log_path(config: &Config, path: &Path) -> String {
     let path = path.strip_prefix(&config.folder).unwrap_or(path);
     let as_text = |chunk: Utf8Chunk<'_>| {
-        let others: String = chunk.invalid().iter().map(|byte| format!("%{byte:02X}")).collect();
+        let others = chunk.invalid().escape_ascii().to_string().replace("\\x", "%");
         chunk.valid().replace('\\', "/") + &others
     };
     path.as_os_str().as_encoded_bytes().utf8_chunks().map(as_text).collect()
