@@ -134,16 +134,18 @@ fn nested(depth: usize) -> Vec<u8> {
     footer(&schema, depth as u64 + 2, 10, &list(1, 12, 0, &[]))
 }
 
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut writer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    writer.write_all(bytes).unwrap();
+    writer.finish().unwrap()
+}
+
 /// Zeros, packed.
 fn zeros(codec: i64, bytes: usize) -> Vec<u8> {
     let block = vec![0_u8; bytes];
     let mut packed = Vec::new();
     match codec {
-        GZIP => {
-            let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::fast());
-            writer.write_all(&block).unwrap();
-            writer.finish().unwrap();
-        }
+        GZIP => return gzip(&block),
         BROTLI => brotli::CompressorWriter::new(&mut packed, 4096, 1, 22).write_all(&block).unwrap(),
         _ => {
             let mut writer = lz4_flex::frame::FrameEncoder::new(&mut packed);
@@ -165,18 +167,11 @@ pub(crate) fn all() -> Vec<Hostile> {
     let one = [root, leaf("x", DOUBLE)].concat();
     let many = i64::from(i32::MAX);
     let long = [&250_000_u32.to_le_bytes()[..], &vec![b'1'; 250_000]].concat();
-    let mut packed = Vec::new();
-    let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::best());
-    writer.write_all(&long).unwrap();
-    writer.finish().unwrap();
-    let texts = [page(2, 1, long.len() as i64, 0, &packed), {
-        let codes = [levels(100_000, true), vec![1], varint(100_000 << 1), vec![0]].concat();
-        let mut packed = Vec::new();
-        let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::best());
-        writer.write_all(&codes).unwrap();
-        writer.finish().unwrap();
-        page(0, 100_000, codes.len() as i64, 8, &packed)
-    }];
+    let codes = [levels(100_000, true), vec![1], varint(100_000 << 1), vec![0]].concat();
+    let texts = [
+        page(2, 1, long.len() as i64, 0, &gzip(&long)),
+        page(0, 100_000, codes.len() as i64, 8, &gzip(&codes)),
+    ];
     let hostile = |name, bytes, code, says| Hostile { name, bytes, code, says };
     let rows = 1_000_000_000;
     let mut all = vec![

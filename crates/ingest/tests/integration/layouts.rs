@@ -458,16 +458,19 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     assert!(other.message.contains("another day"), "{other}");
     // A date alone in the flights table, of a log without one.
     m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
-    let row = || IdentityFields::from([(IdentityField::DepartureUtc, "2026-11-06".to_owned())]);
-    let of_table = |columns: &[(&str, ArrayRef)]| {
+    let of_table = |departure: &str, columns: &[(&str, ArrayRef)]| {
+        let row = || IdentityFields::from([(IdentityField::DepartureUtc, departure.to_owned())]);
         let (_dir, file) = place("N1_x.parquet");
         write(&file, columns);
         let found = opened(&file, &m).identity(|_, _| row()).map_err(|e| e.diagnostic().message);
         found.map(|identity| identity.departure_utc.to_string())
     };
-    assert_eq!(of_table(&[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
-    assert!(of_table(&[("t", instant(3))]).unwrap_err().contains("another day"));
-    assert!(of_table(&[("other", instant(0))]).unwrap_err().contains("the flights table"));
+    assert_eq!(of_table("2026-11-06", &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
+    assert!(of_table("2026-11-06", &[("t", instant(3))]).unwrap_err().contains("another day"));
+    assert!(of_table("2026-11-06", &[("other", instant(0))]).unwrap_err().contains("the flights table"));
+    // An instant of the table, whatever form the departures of the logs have.
+    let at = "2026-11-06T05:00:00Z";
+    assert_eq!(of_table(at, &[("t", instant(0))]).unwrap(), at);
 }
 
 /// Two hours before the landing by the hours that the log states, or 20 s before it by its clock.
