@@ -405,7 +405,15 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
 
 #[cfg(test)]
 mod tests {
-    use super::longest_step;
+    use super::{is_spike, longest_step};
+
+    /// By hand: away and back to either side; a new level is no spike, since a screw crosses its gap within a sample.
+    #[test]
+    fn a_spike_leaps_away_and_back() {
+        let channel = [0.0, 0.0, 9.0, 0.0, -9.0, 0.0, 9.0, 9.0, 0.0, f64::NAN, 9.0, 9.0];
+        let found: Vec<usize> = (0..channel.len()).filter(|&i| is_spike(&channel, i, 1.0)).collect();
+        assert_eq!(found, [2, 4]);
+    }
 
     /// Ten rows for each load, and every forty-fifth step in the subsample: none of them is one of the load's.
     #[test]

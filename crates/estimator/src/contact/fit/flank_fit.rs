@@ -367,32 +367,24 @@ fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
     ((count - 1.0) / count * parts_m.map(|part_m| (part_m - mean_m).powi(2)).sum::<f64>()).sqrt()
 }
 
-/// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
-/// that is another actuator's, leaves travel over that no flank accounts for.
+/// Whether gap and wind-up travel as far as δX does, from the 5 % to the 95 % quantile. A screw that friction holds within
+/// its gap, or a load that is another actuator's, leaves travel over that no flank accounts for.
 fn is_explained(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> bool {
-    let (seen_m, expected_m, noise_m) = travels_m(workspace, scaling, fit);
-    // A bad fit leaves noise enough to explain anything: it may explain only so much.
-    let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
-    seen_m - blurred_m <= UNEXPLAINED * expected_m
-}
-
-/// How far δX travels, m: as seen once everything else is taken off, as gap and wind-up predict, and by noise alone;
-/// each from the 5 % to the 95 % quantile.
-fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> (f64, f64, f64) {
     let ContactWorkspace { excerpt: blocks, couplings, .. } = workspace;
-    let state = &fit.line.at;
-    blocks.apply_delays(state);
-    integrate(blocks, state, scaling.motor_sense, couplings);
+    let GaussNewtonResult { design, fit: line, at, .. } = &fit.line;
+    blocks.apply_delays(at);
+    integrate(blocks, at, scaling.motor_sense, couplings);
     let source = RowSource { blocks, scaling };
-    let stride = blocks.len().div_ceil(LOOKS).max(1);
-    let looks = (0..blocks.len()).step_by(stride);
+    let looks = (0..blocks.len()).step_by(blocks.len().div_ceil(LOOKS).max(1));
     let sound = looks.filter(|&k| blocks.is_complete(k) && couplings[k].force_n.is_finite());
     let rows = sound.map(|k| source.row(k, &couplings[k]));
     let (seen_m, expected_m): (Vec<f64>, Vec<f64>) =
-        rows.map(|row| (row.y_m - fit.other_m(&row), dot(&fit.line.fit.beta[..DRY], &row.x[..DRY]))).unzip();
-    let firm = &fit.line.design.firm;
-    let noise_m = span_m(firm.iter().map(|row| fit.line.fit.residual_m(row)).collect());
-    (span_m(seen_m), span_m(expected_m), noise_m)
+        rows.map(|row| (row.y_m - fit.other_m(&row), dot(&line.beta[..DRY], &row.x[..DRY]))).unzip();
+    let (seen_m, expected_m) = (span_m(seen_m), span_m(expected_m));
+    let noise_m = span_m(design.firm.iter().map(|row| line.residual_m(row)).collect());
+    // A bad fit leaves noise enough to explain anything: it may explain only so much.
+    let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
+    seen_m - blurred_m <= UNEXPLAINED * expected_m
 }
 
 fn span_m(mut values: Vec<f64>) -> f64 {
