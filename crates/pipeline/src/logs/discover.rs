@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::str::Utf8Chunk;
 
-use ingest::LogFiles;
+use ingest::log::flight_rows::split_path;
+use ingest::{IdentityMapping, LogFiles};
 use jiff::Timestamp;
 use job::Config;
-use job::flight_log::{MAX_BETWEEN_PIECES, identify, identify_companion};
+use job::flight_log::{MAX_BETWEEN_PIECES, flights_in, identify, identify_companion};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
@@ -39,9 +40,12 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
     let mut seen = SeenObjects::new();
     let mut unlisted = BTreeMap::new();
     let main = matching(config, &config.document.logs.files, &mut seen, &mut unlisted)?;
+    let main = flights_of(config, main, &config.document.identity, &mut unlisted);
     let mut companions = Vec::new();
     for (name, group) in &config.document.group {
         let files = matching(config, &group.files, &mut seen, &mut unlisted)?;
+        let identity = group.identity.as_ref().unwrap_or(&config.document.identity);
+        let files = flights_of(config, files, identity, &mut unlisted);
         companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
     let mut found = if companions.is_empty() && !config.document.logs.has_pieces() {
@@ -54,6 +58,49 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
     Ok(DiscoveredLogs { seen, ..found })
 }
 
+/// The flights of some files, each with a name and a path of its own; a file that cannot be read keeps its name, and is
+/// a log in error.
+fn flights_of(
+    config: &Config,
+    files: Vec<(String, PathBuf)>,
+    identity: &IdentityMapping,
+    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+) -> Vec<(String, PathBuf)> {
+    if !identity.by_row {
+        return files;
+    }
+    let split: Vec<_> =
+        files.into_par_iter().map(|(name, path)| (flights_in(&path, &name, identity), name, path)).collect();
+    let mut found = Vec::new();
+    for (flights, name, path) in split {
+        match flights {
+            Ok(paths) => found.extend(paths.into_iter().map(|path| (log_path(config, &path), path))),
+            Err(diagnostic) if is_passing(&diagnostic.code) => {
+                unlisted.insert(name, (path, diagnostic));
+            }
+            Err(_) => found.push((name, path)),
+        }
+    }
+    found
+}
+
+/// The flights of files given by hand, as paths of their own.
+pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
+    let of = |path: &PathBuf| {
+        flights_in(path, "", &config.document.identity).unwrap_or_else(|_| vec![path.clone()])
+    };
+    paths.iter().flat_map(of).collect()
+}
+
+/// The logs that files given by hand hold or belong to, each with its name.
+///
+/// # Errors
+/// As [`discover`], where groups or pieces must be searched.
+pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<(LogFiles, String)>, Error> {
+    let named = |path: &PathBuf| Ok((log_containing(config, path)?, path.display().to_string()));
+    flight_paths(config, paths).iter().map(named).collect()
+}
+
 /// The whole log that a file given by hand belongs to.
 ///
 /// # Errors
@@ -62,10 +109,12 @@ pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     if config.document.group.is_empty() && !config.document.logs.has_pieces() {
         return Ok(LogFiles::one(path));
     }
-    let same = |other: &PathBuf| {
-        let whole = |path: &Path| std::fs::canonicalize(path).ok();
-        other == path || whole(other).is_some_and(|other| Some(other) == whole(path))
+    let whole = |path: &Path| {
+        let (file, rows) = split_path(path, &config.document.identity);
+        Some((std::fs::canonicalize(file).ok()?, rows))
     };
+    let same =
+        |other: &PathBuf| other == path || whole(other).is_some_and(|other| Some(other) == whole(path));
     let found = discover(config)?.logs.into_values().find(|files| files.all().any(same));
     Ok(found.unwrap_or_else(|| LogFiles::one(path)))
 }

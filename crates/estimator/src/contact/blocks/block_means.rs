@@ -404,6 +404,7 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
 }
 
 #[cfg(test)]
+#[allow(clippy::single_range_in_vec_init, reason = "one range of rows is what is meant")]
 mod tests {
     use super::{is_spike, longest_step};
 
@@ -421,7 +422,7 @@ mod tests {
         let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();
         let found = longest_step(&held, &[0..held.len()]);
         assert!(found.is_ok_and(|step| (0.07..0.09).contains(&step)));
-        assert!(longest_step(&[3.0; 50_000], &[0..50_000]).is_err());
+        assert!(longest_step(&vec![3.0; 50_000], &[0..50_000]).is_err());
     }
 
     /// However little of a long log counts, its steps are known from as many looks as those of a short one.
