@@ -134,7 +134,6 @@ fn an_open_request_is_on_the_work_list_and_on_the_page_of_its_unit() {
         position: Some(HOSTILE.to_owned()),
         quantity: "gap".to_owned(),
         finding: None,
-        due_utc: None,
         opened_utc: "2026-11-01T04:13:00Z".parse().unwrap(),
         by: Some(HOSTILE.to_owned()),
         reason: Some(HOSTILE.to_owned()),

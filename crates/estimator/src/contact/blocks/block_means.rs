@@ -404,9 +404,14 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
 }
 
 #[cfg(test)]
-#[allow(clippy::single_range_in_vec_init, reason = "one range of rows is what is meant")]
 mod tests {
-    use super::{is_spike, longest_step};
+    use std::ops::Range;
+
+    use super::is_spike;
+
+    fn longest_step(values: &[f64], segment: Range<usize>) -> Option<f64> {
+        super::longest_step(values, std::slice::from_ref(&segment)).ok()
+    }
 
     /// By hand: away and back to either side; a new level is no spike, since a screw crosses its gap within a sample.
     #[test]
@@ -420,9 +425,8 @@ mod tests {
     #[test]
     fn a_channel_that_is_held_moves() {
         let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();
-        let found = longest_step(&held, &[0..held.len()]);
-        assert!(found.is_ok_and(|step| (0.07..0.09).contains(&step)));
-        assert!(longest_step(&vec![3.0; 50_000], &[0..50_000]).is_err());
+        assert!(longest_step(&held, 0..held.len()).is_some_and(|step| (0.07..0.09).contains(&step)));
+        assert!(longest_step(&vec![3.0; 50_000], 0..50_000).is_none());
     }
 
     /// However little of a long log counts, its steps are known from as many looks as those of a short one.
@@ -432,6 +436,6 @@ mod tests {
         let mut long = vec![f64::NAN; 3_000_000];
         let counts = 1_234_567..1_234_567 + wave.len();
         long[counts.clone()].copy_from_slice(&wave);
-        assert_eq!(longest_step(&long, &[counts]), longest_step(&wave, &[0..wave.len()]));
+        assert_eq!(longest_step(&long, counts), longest_step(&wave, 0..wave.len()));
     }
 }

@@ -80,7 +80,8 @@ impl RowSource<'_> {
     /// full or its stretch ends.
     pub(crate) fn rows(&self, couplings: &[Coupling]) -> DesignMatrix {
         let Self { blocks, scaling } = self;
-        let mut design = DesignMatrix::default();
+        let rows = blocks.len() / scaling.row_blocks(blocks.period_s);
+        let mut design = DesignMatrix { firm: Vec::with_capacity(rows), ..DesignMatrix::default() };
         // Of the lower and the upper flank, lightly and firmly touched.
         let mut open = [DesignRow::ZERO; 4];
         let most = scaling.row_blocks(blocks.period_s) as f64;

@@ -17,7 +17,6 @@ pub(crate) fn integrate(
     motor_sense: f64,
     couplings: &mut Vec<Coupling>,
 ) {
-    couplings.clear();
     couplings.resize(blocks.len(), Coupling::UNKNOWN);
     let params = CouplingParams::new(state, motor_sense);
     for segment in blocks.segments() {
@@ -62,7 +61,8 @@ fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut
             screw = Some(ends.get(number));
         }
     }
-    // No lane covers the rest of the segment.
+    // No lane covers the rest of the segment, which may hold another integration.
+    found[LANES * part..].fill(Coupling::UNKNOWN);
     recompute_until_match(params, &mut screw, channels, LANES * part..found.len(), found);
 }
 
