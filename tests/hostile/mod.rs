@@ -31,7 +31,7 @@ fn a_night_with_hostile_logs_stores_all_sound_ones() {
             std::fs::write(folder.join(format!("{}.parquet", hostile.name)), hostile.bytes).unwrap();
         }
     }
-    for command in ["check -v", "run -v --jobs 2"] {
+    for command in ["check -v --limit 100", "run -v --jobs 2"] {
         let result = limited(&fleet, command, 1 << 20);
         assert_eq!(result.code, Some(1), "{command}: {}", result.err);
         for hostile in corpus::all() {

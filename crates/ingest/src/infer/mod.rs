@@ -74,24 +74,11 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
     let file = &table.files[0];
     let leaves = file.leaves();
-    let owned = |facts: BTreeMap<IdentityField, &str>| -> BTreeMap<IdentityField, String> {
-        facts.into_iter().map(|(fact, name)| (fact, name.to_owned())).collect()
-    };
-    let mut metadata = owned(facts_of(&file.metadata_keys()));
+    let stated = facts_of(&file.metadata_keys()).into_iter().map(|(fact, name)| (fact, name.to_owned()));
+    let mut metadata: BTreeMap<IdentityField, String> = stated.collect();
     metadata.remove(&IdentityField::Position);
     let constant = |name: &str| table.constant(name, "fact").ok().flatten();
-    let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
-    let facts: Vec<_> =
-        facts_of(&single).into_iter().filter(|(fact, _)| !metadata.contains_key(fact)).collect();
-    let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
-    let varies =
-        |name: &str| constant(name).is_none() && table.texts(name).is_ok_and(|texts| texts.len() > 1);
-    let by_row = facts.iter().any(|(fact, name)| of_flight(*fact) && varies(name));
-    let is_date = |name: &str| leaves.iter().any(|leaf| leaf.name == name && leaf.kind == DataType::Date32);
-    let is_kept = |(fact, name): &(IdentityField, &str)| {
-        constant(name).is_some() || (by_row && (of_flight(*fact) || is_date(name)))
-    };
-    let columns = owned(facts.into_iter().filter(is_kept).collect());
+    let (columns, by_row) = identity_columns(&table, &metadata);
     let layout = layout(&table, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
@@ -149,6 +136,24 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         tails,
         ..found
     })
+}
+
+/// The columns that hold facts, and whether they name more than one flight.
+fn identity_columns(
+    table: &RowTable,
+    metadata: &BTreeMap<IdentityField, String>,
+) -> (BTreeMap<IdentityField, String>, bool) {
+    let leaves = table.files[0].leaves();
+    let is_constant = |name: &str| table.constant(name, "fact").is_ok_and(|text| text.is_some());
+    let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
+    let mut facts = facts_of(&single);
+    facts.retain(|fact, _| !metadata.contains_key(fact));
+    let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
+    let varies = |name: &str| !is_constant(name) && table.texts(name).is_ok_and(|texts| texts.len() > 1);
+    let by_row = facts.iter().any(|(fact, name)| of_flight(*fact) && varies(name));
+    let is_date = |name: &str| leaves.iter().any(|leaf| leaf.name == name && leaf.kind == DataType::Date32);
+    facts.retain(|fact, name| is_constant(name) || (by_row && (of_flight(*fact) || is_date(name))));
+    (facts.into_iter().map(|(fact, name)| (fact, name.to_owned())).collect(), by_row)
 }
 
 /// The layout that columns of names, values and positions show.
@@ -397,7 +402,7 @@ mod tests {
         let rows = 300;
         let names = ["rudder_motor_deg", "rudder_screw_mm", "rudder_load_n"];
         let departure: jiff::Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
-        let columns = [
+        let mut columns = [
             ("departure_utc", Column::Instant(vec![departure; rows])),
             ("tail_number", Column::Text(vec!["N412FP".into(); rows])),
             ("flight_id", Column::Text(vec!["0413".into(); rows])),
@@ -405,7 +410,12 @@ mod tests {
             ("parameter", Column::Text((0..rows).map(|k| names[k % 3].to_owned()).collect())),
             ("value", Column::Real((0..rows).map(|k| k as f64).collect())),
         ];
-        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
+        let write = |columns: &[(&str, Column)]| {
+            let columns: Vec<_> =
+                columns.iter().map(|(name, own)| ((*name).to_owned(), own.clone())).collect();
+            write_parquet(&file, &columns, &[]).unwrap();
+        };
+        write(&columns);
         let found = propose(&file).unwrap();
         assert_eq!(found.clock, Some(("stamp_ms".to_owned(), Some("ms"))));
         assert_eq!(found.layout.name_column.as_deref(), Some("parameter"));
@@ -414,5 +424,9 @@ mod tests {
         let facts: Vec<&str> = found.columns.values().map(String::as_str).collect();
         assert_eq!((facts, found.by_row), (vec!["tail_number", "flight_id", "departure_utc"], false));
         assert!(found.tails.iter().eq(["N412FP"]));
+        columns[1].1 = Column::Text((0..rows).map(|k| format!("N41{}FP", k / 200)).collect());
+        write(&columns);
+        let found = propose(&file).unwrap();
+        assert!(found.by_row && found.tails.iter().eq(["N410FP", "N411FP"]), "{found:?}");
     }
 }
