@@ -10,63 +10,11 @@ use jiff::Timestamp;
 use records::Installation;
 
 use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
+use crate::fleet::places::Positions;
 use crate::fleet::settings_counts::SettingsCounts;
 use crate::fleet::unit_rows::UnitRows;
 
-/// Part number where known, and serial number.
-pub type UnitKey = (Option<String>, String);
-
-/// Position of a unit, as far as its rows hold it.
-#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct TailPosition {
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-}
-
-impl TailPosition {
-    /// Tail and position of an installation.
-    pub(crate) fn of(installation: &Installation) -> Self {
-        Self {
-            tail_number: Some(installation.tail_number.to_string()),
-            position: Some(installation.position.to_string()),
-        }
-    }
-
-    fn is(&self, tail_number: Option<&str>, position: Option<&str>) -> bool {
-        self.tail_number.as_deref() == tail_number && self.position.as_deref() == position
-    }
-}
-
-/// A unit's places, as they come.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Positions(Vec<TailPosition>);
-
-impl Positions {
-    /// The place with a number.
-    pub(crate) fn get(&self, number: u32) -> &TailPosition {
-        &self.0[number as usize]
-    }
-
-    /// The number of a place.
-    pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
-        // A unit sits where it sat in the row before, or in one of a handful of places.
-        let known = self.0.iter().rposition(|place| place.is(tail_number, position));
-        let at = known.unwrap_or_else(|| {
-            let owned = |name: Option<&str>| name.map(str::to_owned);
-            self.0.push(TailPosition { tail_number: owned(tail_number), position: owned(position) });
-            self.0.len() - 1
-        });
-        at as u32
-    }
-
-    /// The numbers of others.
-    pub(crate) fn numbers(&mut self, others: &Self) -> Vec<u32> {
-        let number =
-            |place: &TailPosition| self.number(place.tail_number.as_deref(), place.position.as_deref());
-        others.0.iter().map(number).collect()
-    }
-}
+pub use crate::fleet::places::{TailPosition, UnitKey};
 
 /// A unit's flights, by departure.
 #[derive(Debug, Clone, Default)]

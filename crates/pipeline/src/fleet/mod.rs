@@ -5,6 +5,7 @@ pub mod builder;
 pub mod external_estimates;
 pub mod flight_row;
 pub mod histories;
+pub mod places;
 pub mod row_keys;
 mod settings_counts;
 pub(crate) mod unit_rows;

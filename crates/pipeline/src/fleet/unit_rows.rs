@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use store::ColumnScan;
 
 use crate::error::Error;
-use crate::fleet::histories::{Positions, UnitKey};
+use crate::fleet::places::{Positions, UnitKey};
 use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey};
 use crate::fleet::settings_counts::SettingsCounts;
 

@@ -206,7 +206,7 @@ fn a_due_date_does_not_move_with_the_day_on_which_the_report_is_made() {
         let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1 + days)), ..UnitSelection::default() };
         let installations = Installations::default();
         let report = compose(&config(), &installations, &store, &ask, day(DAYS + days), "test").unwrap();
-        let age = format!("newest log {}, {} days old", day(LAST).strftime("%-d %b"), DAYS - 1 + days - LAST);
+        let age = format!("Newest log {}, {} days old", day(LAST).strftime("%-d %b"), DAYS - 1 + days - LAST);
         let pages = report::fleet_pages(&report, &report::Peers::of(&report)).unwrap();
         assert!(String::from_utf8_lossy(&pages[0].body).contains(&age), "{days}: {age}");
         let of = |unit: UnitView| (unit.row.serial_number.clone(), unit.row);

@@ -9,7 +9,7 @@ use store::{Query, Store};
 
 use crate::error::Error;
 use crate::findings::monitoring::median;
-use crate::fleet::histories::{Positions, TailPosition, UnitKey};
+use crate::fleet::places::{Positions, TailPosition, UnitKey};
 use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
