@@ -460,12 +460,8 @@ const CHANNELS: [(Role, &str); 4] = [
 
 /// The usual unit of a channel.
 fn usual(role: Role) -> Unit {
-    match role {
-        Role::Motor => Unit::Degree,
-        Role::Screw => Unit::Millimetre,
-        Role::Load => Unit::Newton,
-        Role::Temperature => Unit::Celsius,
-    }
+    let units = [(Role::Motor, Unit::Degree), (Role::Screw, Unit::Millimetre), (Role::Load, Unit::Newton)];
+    units.iter().find(|(of, _)| *of == role).map_or(Unit::Celsius, |(_, unit)| *unit)
 }
 
 /// Files whose channels lie in kinds of files, each with a part of them: a main log and groups.
