@@ -13,7 +13,7 @@ use store::{Holder, Store};
 use crate::harness::TestFleet;
 
 /// State, date, gap and limit of a unit.
-type Told = (String, Option<Timestamp>, Option<f64>, Option<f64>);
+type Shown = (String, Option<Timestamp>, Option<f64>, Option<f64>);
 
 fn rows(fleet: &TestFleet, args: &[&str]) -> Vec<Value> {
     serde_json::from_str(&fleet.run_ok(&[args, &["--json"]].concat())).unwrap()
@@ -23,15 +23,15 @@ fn date(value: &Value) -> Option<Timestamp> {
     value.as_str().map(|text| text.parse().unwrap())
 }
 
-fn told(unit: &Value) -> Option<Told> {
+fn shown(unit: &Value) -> Option<Shown> {
     let state = unit["state"].as_str().filter(|state| *state != "not_assessed")?.to_owned();
     Some((state, date(&unit["due_utc"]), unit["gap_m"].as_f64(), unit["limit_m"].as_f64()))
 }
 
-fn by_serial<'v>(units: impl IntoIterator<Item = (&'v Value, &'v Value)>) -> BTreeMap<String, Told> {
+fn by_serial<'v>(units: impl IntoIterator<Item = (&'v Value, &'v Value)>) -> BTreeMap<String, Shown> {
     let named = units
         .into_iter()
-        .filter_map(|(name, unit)| Some((name["serial_number"].as_str().unwrap().to_owned(), told(unit)?)));
+        .filter_map(|(name, unit)| Some((name["serial_number"].as_str().unwrap().to_owned(), shown(unit)?)));
     named.collect()
 }
 
@@ -77,8 +77,8 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         fleet.run_ok(&["run", "--quiet", "--metrics", "freeplay.prom"]);
         let units = rows(&fleet, &["trend"]);
         let trend = by_serial(units.iter().map(|unit| (unit, unit)));
-        let counts = trend.values().fold(BTreeMap::<&str, u64>::new(), |mut counts, told| {
-            *counts.entry(&told.0).or_default() += 1;
+        let counts = trend.values().fold(BTreeMap::<&str, u64>::new(), |mut counts, shown| {
+            *counts.entry(&shown.0).or_default() += 1;
             counts
         });
         counts.iter().for_each(|(state, n)| *seen.entry((*state).to_owned()).or_default() += *n as usize);
@@ -88,8 +88,8 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         assert!(due.is_sorted(), "by date: {due:?}");
         let dates =
             requests.iter().map(|r| (r["serial_number"].as_str(), r["state"].as_str(), date(&r["due_utc"])));
-        let wanted = trend.iter().filter(|(_, told)| matches!(told.0.as_str(), "plan" | "act"));
-        let wanted = wanted.map(|(serial, told)| (Some(serial.as_str()), Some(told.0.as_str()), told.1));
+        let wanted = trend.iter().filter(|(_, shown)| matches!(shown.0.as_str(), "plan" | "act"));
+        let wanted = wanted.map(|(serial, shown)| (Some(serial.as_str()), Some(shown.0.as_str()), shown.1));
         assert_eq!(dates.collect::<BTreeSet<_>>(), wanted.collect());
 
         let message = std::fs::read_dir(fleet.path("alerts")).unwrap().next().unwrap().unwrap().path();
@@ -105,7 +105,7 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         assert!(!alerted.is_empty());
         for unit in alerted.iter().filter(|unit| unit["quantity"] == "gap") {
             let serial = unit["serial_number"].as_str().unwrap();
-            assert_eq!(told(unit).as_ref(), trend.get(serial), "{unit}");
+            assert_eq!(shown(unit).as_ref(), trend.get(serial), "{unit}");
             let statement = unit["statement"].as_str().unwrap();
             let is_request = matches!(unit["state"].as_str(), Some("plan" | "act"));
             assert!(
@@ -126,10 +126,10 @@ fn every_surface_has_the_same_states_dates_and_counts() {
 
 /// Without new flights, a date until when moves by two days at most, or the state says why: the unit is now over its limit,
 /// or its data are too old.
-fn dates_stay(fleet: &TestFleet, trend: &BTreeMap<String, Told>, newest: Timestamp) {
-    let plans = trend.iter().filter(|(_, told)| told.0 == "plan");
+fn dates_stay(fleet: &TestFleet, trend: &BTreeMap<String, Shown>, newest: Timestamp) {
+    let plans = trend.iter().filter(|(_, shown)| shown.0 == "plan");
     let before: BTreeMap<&String, Timestamp> =
-        plans.filter_map(|(serial, told)| Some((serial, told.1?))).collect();
+        plans.filter_map(|(serial, shown)| Some((serial, shown.1?))).collect();
     for days in [12, 28, 60, 90] {
         let as_of = (newest + SignedDuration::from_hours(24 * days)).to_string();
         let units = rows(fleet, &["trend", "--as-of", &as_of]);

@@ -496,12 +496,9 @@ mod tests {
     fn a_change_and_the_maintenance_that_explains_it_are_one_event() {
         let change = |kind, day: &str, step_m| ChangePoint {
             departure_utc: format!("{day}T06:00:00Z").parse().unwrap(),
-            flight_id: None,
             kind,
             step_m,
-            step_se_m: 1e-6,
-            certainty: 1.0,
-            tail_wide: false,
+            ..ChangePoint::default()
         };
         let row = TrendRow {
             change_points: vec![

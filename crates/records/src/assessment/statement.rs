@@ -32,6 +32,10 @@ impl TrendRow {
     /// known.
     pub fn chance_text(&self) -> Option<String> {
         let state = self.state?;
+        // A hangar check made the state; how the records stand to the limit says nothing of it.
+        if self.reason_code == Some("inspected") {
+            return None;
+        }
         if state == "act" {
             return self.over_limit_probability.map(|share| format!("{} over now", percent(share)));
         }
@@ -134,15 +138,7 @@ mod tests {
     }
 
     fn change(kind: &'static str, day: &str, step_m: f64) -> ChangePoint {
-        ChangePoint {
-            departure_utc: at(day),
-            flight_id: None,
-            kind,
-            step_m,
-            step_se_m: 1e-6,
-            certainty: 1.0,
-            tail_wide: false,
-        }
+        ChangePoint { departure_utc: at(day), kind, step_m, certainty: 1.0, ..ChangePoint::default() }
     }
 
     /// A unit at 159.13 µm of 180, on 24 November 2026.
@@ -178,6 +174,7 @@ mod tests {
             ..row("watch", "changed")
         };
         let still = TrendRow { rate_m_per_hour: Some(-1e-12), ..row("normal", "clear") };
+        let measured = TrendRow { over_limit_probability: Some(1e-9), ..row("act", "inspected") };
         let gone = TrendRow { removed_utc: Some(at("2026-09-29")), state: None, ..still.clone() };
         let cases = [
             (&gone, "removed 29 Sep; last 159.1 µm", None),
@@ -191,6 +188,7 @@ mod tests {
             (&fell, "fell from 196.1 to 159.1 µm on 7 Oct, not on record", Some("certain")),
             (&still, "159.1 of 180.0 µm, steady", None),
             (&row("unassessed", "no_record"), "the whole reason", None),
+            (&measured, "the whole reason", None),
         ];
         for (row, why, chance) in cases {
             assert_eq!((row.why_text().as_str(), row.chance_text().as_deref()), (why, chance));

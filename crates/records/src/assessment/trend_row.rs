@@ -8,7 +8,7 @@ use crate::row_schema::NoColumn;
 
 row! {
     /// A change point of a unit.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct ChangePoint {
         /// Departure of the first flight after the change.
         pub departure_utc: Timestamp,
