@@ -73,12 +73,7 @@ pub(crate) fn add_external(
     rows: &mut RowsByUnit<(StoredFlight, ())>,
     chunk: &TableBatch,
 ) -> Result<(), ingest::Error> {
-    let columns = FlightColumns::external(chunk)?;
-    rows.add_rows(chunk, |row, unit, place| {
-        let flight = columns.flight(row, unit, place)?;
-        unit.rows.push((flight, ()));
-        Ok(())
-    })
+    FlightColumns::external(chunk)?.add_to(rows, |_| ())
 }
 
 /// Adds rows of the store.
@@ -90,12 +85,7 @@ pub(crate) fn add_stored(
     chunk: &TableBatch,
     batch: &RecordBatch,
 ) -> Result<(), ingest::Error> {
-    let columns = FlightColumns::stored(chunk, batch)?;
-    rows.add_rows(chunk, |row, unit, place| {
-        let flight = columns.flight(row, unit, place)?;
-        unit.rows.push((flight, ()));
-        Ok(())
-    })
+    FlightColumns::stored(chunk, batch)?.add_to(rows, |_| ())
 }
 
 /// The histories of units, and what else `R` holds of each flight, by unit in the order of the flights.
@@ -178,11 +168,27 @@ impl<'a> FlightColumns<'a> {
         })
     }
 
+    /// Adds the flights of the rows to those of their units, each with what else `further` makes of its row.
+    ///
+    /// # Errors
+    /// The first row without a serial number, or without a departure that a calendar has.
+    pub(crate) fn add_to<R>(
+        &self,
+        rows: &mut RowsByUnit<(StoredFlight, R)>,
+        further: impl Fn(usize) -> R,
+    ) -> Result<(), ingest::Error> {
+        rows.add_rows(self.chunk, |row, unit, place| {
+            let flight = self.flight(row, unit, place)?;
+            unit.rows.push((flight, further(row)));
+            Ok(())
+        })
+    }
+
     /// The flight of a row in a place of its unit, which takes its name and counts its settings.
     ///
     /// # Errors
     /// A departure that is missing or that no calendar has.
-    pub(crate) fn flight<R>(
+    fn flight<R>(
         &self,
         row: usize,
         unit: &mut UnitRows<R>,

@@ -73,19 +73,9 @@ fn as_part(
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
     let found = estimate_unidentified(&LogFiles::one(path), log_path, config, part_of(config, number)?)?;
     let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
-        tail_number: None,
         position: Some(position.to_string()),
-        part_number: Some(number.to_string()),
-        serial_number: None,
-        flight_id: None,
-        departure_utc: None,
-        flight_hours: None,
-        tail_hours_end: None,
-        estimate,
         log_path: Some(log_path.to_owned()),
-        log_digest: None,
-        config_digest: config.digest_of_part(number),
-        program_version: program_version.to_owned(),
+        ..unidentified(estimate, config, number, program_version)
     };
     Ok(found.into_iter().map(row).collect())
 }
@@ -142,7 +132,17 @@ pub fn of_arrays(
     let own = Position::new("arrays").map_err(|e| Diagnostic::new("empty_name", e))?;
     let channels = arrays.to_channels(own).map_err(|e| e.diagnostic())?;
     let estimate = job::estimate::estimate(&channels, part, &config.document.estimate)?;
-    Ok(EstimateRow {
+    Ok(unidentified(estimate, config, number, program_version))
+}
+
+/// The row of an estimate of a part, of which neither aircraft nor flight is known.
+fn unidentified(
+    estimate: GapEstimate,
+    config: &Config,
+    number: &PartNumber,
+    program_version: &str,
+) -> EstimateRow {
+    EstimateRow {
         tail_number: None,
         position: None,
         part_number: Some(number.to_string()),
@@ -156,5 +156,5 @@ pub fn of_arrays(
         log_digest: None,
         config_digest: config.digest_of_part(number),
         program_version: program_version.to_owned(),
-    })
+    }
 }

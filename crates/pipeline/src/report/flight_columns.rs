@@ -73,16 +73,11 @@ fn add(
     let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
     let reasons = TextColumn::of(chunk, &["reason"])?;
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
-    rows.add_rows(chunk, |row, unit, place| {
-        let extras = FlightExtras {
-            numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
-            reason: reasons.get(row).map(Into::into),
-            flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
-            quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
-        };
-        let flight = flights.flight(row, unit, place)?;
-        unit.rows.push((flight, extras));
-        Ok(())
+    flights.add_to(rows, |row| FlightExtras {
+        numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
+        reason: reasons.get(row).map(Into::into),
+        flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
+        quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
     })
 }
 
