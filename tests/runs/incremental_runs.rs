@@ -105,13 +105,15 @@ fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
     assert_eq!(fleet.exported(), plain.exported());
 }
 
-/// Two recordings of one flight: the one whose name sorts first is used, and the other is named.
+/// Two recordings of one flight: the one whose name sorts first is used, and the other is named, also where two recorders
+/// write the flight id differently.
 #[test]
 fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
-    for jobs in ["1", "2"] {
+    for (jobs, flight_id) in [("1", None), ("2", None), ("1", Some("412-4"))] {
         let fleet = TestFleet::sample();
         let logs = fleet.logs();
-        let truth = facts(&logs[3]);
+        let mut truth = facts(&logs[3]);
+        truth.extend(flight_id.map(|id| ("flight_id".to_owned(), id.to_owned())));
         rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &truth, |_| true, |_| true);
         let result = fleet.freeplay(&["run", "--jobs", jobs]);
         assert_eq!(result.code, Some(1), "{result:?}");

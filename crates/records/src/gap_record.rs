@@ -212,7 +212,8 @@ fn column_order(column: &str) -> usize {
     }
 }
 
-/// Key of a record: one actuator has one record per flight.
+/// Key of a record: one actuator has one record per departure of its aircraft. The flight id is no part of it: tables
+/// correct it, and two recorders may write it differently.
 ///
 /// Its order is the order in which records are shown and exported.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -221,22 +222,19 @@ pub struct RecordKey {
     pub departure_us: i64,
     /// The aircraft.
     pub tail_number: String,
-    /// The flight.
-    pub flight_id: String,
     /// Position on the aircraft.
     pub position: String,
 }
 
 impl RecordKey {
     /// The key columns, in the order of the fields.
-    pub const COLUMNS: [&'static str; 4] = ["departure_utc", "tail_number", "flight_id", "position"];
+    pub const COLUMNS: [&'static str; 3] = ["departure_utc", "tail_number", "position"];
 
     /// The key of a record.
     pub fn of(record: &GapRecord) -> Self {
         Self {
             departure_us: record.flight.departure_utc.as_microsecond(),
             tail_number: record.flight.tail_number.to_string(),
-            flight_id: record.flight.flight_id.to_string(),
             position: record.position.to_string(),
         }
     }

@@ -106,15 +106,12 @@ impl LogRecord {
 
     /// Keys of the records that its flight may have, one per position; none where the log was not identified.
     pub fn keys(&self) -> Vec<RecordKey> {
-        let (Some(tail), Some(flight), Some(departure)) =
-            (&self.tail_number, &self.flight_id, self.departure_utc)
-        else {
+        let Some((tail, departure)) = self.tail_number.as_ref().zip(self.departure_utc) else {
             return Vec::new();
         };
         let key = |position: &String| RecordKey {
             departure_us: departure.as_microsecond(),
             tail_number: tail.clone(),
-            flight_id: flight.clone(),
             position: position.clone(),
         };
         self.positions.iter().map(key).collect()

@@ -275,10 +275,9 @@ pub fn digests(account: &LogRecord) -> Option<(String, String)> {
         .flatten()
 }
 
-/// Whether two logs are of one flight, by tail, flight id and departure.
+/// Whether two logs are of one flight: one departure of one aircraft.
 pub fn is_same_flight(one: &LogRecord, other: &LogRecord) -> bool {
-    (&one.tail_number, &one.flight_id, one.departure_utc)
-        == (&other.tail_number, &other.flight_id, other.departure_utc)
+    (&one.tail_number, one.departure_utc) == (&other.tail_number, other.departure_utc)
 }
 
 /// Flight of a log record, where its log was identified.

@@ -406,7 +406,9 @@ impl WorkerContext<'_> {
             return None;
         }
         let is_known = |before: &&LogRecord| {
-            plan::digests(before).as_ref() == Some(&digests) && plan::is_same_flight(before, account)
+            plan::digests(before).as_ref() == Some(&digests)
+                && plan::is_same_flight(before, account)
+                && before.flight_id == account.flight_id
         };
         if let Some(own) = work.before.as_ref().filter(is_known) {
             return Some((own.estimated, own.refused));

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use jiff::Timestamp;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
 use records::GapRecord;
@@ -82,23 +83,20 @@ impl Writer {
     }
 }
 
-/// A flight: tail, flight and departure.
-type FlightKey<'a> = (&'a str, &'a str, i64);
+/// A flight: tail and departure.
+type FlightKey<'a> = (&'a str, i64);
 
 /// Logs with more records than are stored of their flight, and the number that is stored. A flight with several logs is
 /// left out: a later log may have replaced records of an earlier one.
 fn incomplete_logs<'a>(logs: &'a [LogRecord], keys: &[RecordKey]) -> Vec<(&'a LogRecord, i64)> {
     let mut stored: BTreeMap<FlightKey<'_>, i64> = BTreeMap::new();
     for key in keys {
-        *stored.entry((&key.tail_number, &key.flight_id, key.departure_us)).or_default() += 1;
+        *stored.entry((&key.tail_number, key.departure_us)).or_default() += 1;
     }
     let mut by_flight: BTreeMap<FlightKey<'_>, Vec<&LogRecord>> = BTreeMap::new();
     for log in logs {
-        let (Some(tail), Some(flight), Some(at)) = (&log.tail_number, &log.flight_id, log.departure_utc)
-        else {
-            continue;
-        };
-        by_flight.entry((tail, flight, at.as_microsecond())).or_default().push(log);
+        let Some((tail, at)) = log.tail_number.as_ref().zip(log.departure_utc) else { continue };
+        by_flight.entry((tail, at.as_microsecond())).or_default().push(log);
     }
     let single = by_flight.into_iter().filter_map(|(flight, logs)| match logs.as_slice() {
         [log] => Some((*log, stored.get(&flight).copied().unwrap_or_default())),
@@ -116,8 +114,10 @@ fn incomplete_log(log: &LogRecord, stored: i64) -> Diagnostic {
 }
 
 fn duplicate(key: &RecordKey) -> Diagnostic {
-    let RecordKey { tail_number, flight_id, position, .. } = key;
-    Diagnostic::new("store_duplicate", format!("{tail_number} {flight_id} {position} is stored twice"))
+    let RecordKey { tail_number, departure_us, position } = key;
+    let departure_utc = Timestamp::from_microsecond(*departure_us).unwrap_or_default();
+    let what = format!("{tail_number} {position}, departure {departure_utc}, is stored twice");
+    Diagnostic::new("store_duplicate", what)
         .hint("did another program compact the table while a run was writing? `freeplay run --redo` fixes it")
 }
 

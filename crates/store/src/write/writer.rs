@@ -71,8 +71,16 @@ pub struct Writer {
     _lock: Option<Lock>,
 }
 
-/// What becomes of each record named: a new one, or none.
-type MergeDecisions<'a> = BTreeMap<RecordKey, Option<&'a GapRecord>>;
+/// What becomes of the stored record of a key.
+#[derive(Clone, Copy)]
+enum Decision<'a> {
+    /// This record takes its place.
+    Replaced(&'a GapRecord),
+    /// It goes if it has the samples of this log digest, which have another key now.
+    Moved(Option<&'a str>),
+}
+
+type MergeDecisions<'a> = BTreeMap<RecordKey, Decision<'a>>;
 
 impl Store {
     /// Locks the store for writing; waits at most `wait` for another writer.
@@ -126,10 +134,9 @@ impl Writer {
     /// # Errors
     /// As [`Store::records`].
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
-        const COLUMNS: [&str; 12] = [
+        const COLUMNS: [&str; 11] = [
             "departure_utc",
             "tail_number",
-            "flight_id",
             "position",
             "log_path",
             "log_digest",
@@ -140,7 +147,7 @@ impl Writer {
             "load_p95_n",
             "samples",
         ];
-        let wanted: MergeDecisions<'_> = keys.iter().map(|key| (key.clone(), None)).collect();
+        let wanted: BTreeMap<RecordKey, ()> = keys.iter().map(|key| (key.clone(), ())).collect();
         let snapshot = self.store.gaps.snapshot()?;
         let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
         let files: Vec<_> = snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
@@ -149,9 +156,9 @@ impl Writer {
         let columns = COLUMNS.iter().map(|name| schema.index_of(name)).collect::<Result<Vec<_>, _>>()?;
         let mut held = BTreeMap::new();
         for batch in scan::read_files(&files, &Arc::new(schema.project(&columns)?), &[])? {
-            let [logs, digests, statuses] = [4, 5, 6].map(|at| batch.column(at).as_string::<i32>());
-            let numbers = [7, 8, 9, 10].map(|at| batch.column(at).as_primitive::<Float64Type>());
-            let samples = batch.column(11).as_primitive::<Int64Type>();
+            let [logs, digests, statuses] = [3, 4, 5].map(|at| batch.column(at).as_string::<i32>());
+            let numbers = [6, 7, 8, 9].map(|at| batch.column(at).as_primitive::<Float64Type>());
+            let samples = batch.column(10).as_primitive::<Int64Type>();
             for (row, key) in keys_of(&batch)?.into_iter().enumerate() {
                 let status = statuses.value(row);
                 if keys.contains(&key) && status != Status::Withdrawn.as_str() {
@@ -227,7 +234,11 @@ impl Writer {
                 }
             }
         }
-        let new: Vec<GapRecord> = decisions.values().copied().flatten().cloned().collect();
+        let new = decisions.values().filter_map(|decision| match decision {
+            Decision::Replaced(record) => Some((*record).clone()),
+            Decision::Moved(_) => None,
+        });
+        let new: Vec<GapRecord> = new.collect();
         if !new.is_empty() {
             change.add.push(data_file::write(location, version, &to_batch(&new)?, true)?);
         }
@@ -238,7 +249,9 @@ impl Writer {
     fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
         let files = slice::from_ref(&file.path);
         self.store.check(files)?;
-        let keys = Arc::new(GapRecord::schema().project(&key_columns(&GapRecord::schema())?)?);
+        let schema = GapRecord::schema();
+        let columns = key_columns(&schema)?.into_iter().chain([schema.index_of("log_digest")?]);
+        let keys = Arc::new(schema.project(&columns.collect::<Vec<_>>())?);
         if is_kept(&scan::read_table(files, &keys, &[])?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
@@ -268,40 +281,41 @@ pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(
 fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     let mut decisions = MergeDecisions::new();
     for result in results {
-        decisions.extend(result.moved_from.iter().map(|key| (key.clone(), None)));
-        decisions.extend(result.records.iter().map(|record| (RecordKey::of(record), Some(record))));
+        let moved = Decision::Moved(result.account.log_digest.as_deref());
+        decisions.extend(result.moved_from.iter().map(|key| (key.clone(), moved)));
+        let replaced = |record| (RecordKey::of(record), Decision::Replaced(record));
+        decisions.extend(result.records.iter().map(replaced));
     }
     decisions
 }
 
 /// Whether the file may hold one of the records, by its bounds.
-fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
+fn may_hold_any<T>(file: &DataFile, decisions: &BTreeMap<RecordKey, T>) -> bool {
     let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
-    let from = |departure_us| RecordKey {
-        departure_us,
-        tail_number: String::new(),
-        flight_id: String::new(),
-        position: String::new(),
-    };
+    let from = |departure_us| RecordKey { departure_us, tail_number: String::new(), position: String::new() };
     let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));
     in_time.map(|(key, _)| key).any(|key| file.stats.may_hold("tail_number", &key.tail_number))
 }
 
-/// Mask of the rows without a merge decision.
+/// Mask of the rows that no merge decision takes away.
 fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
-    let keys = keys_of(batch)?;
-    Ok(keys.iter().map(|key| Some(!decisions.contains_key(key))).collect())
+    let digests = batch.column(batch.schema_ref().index_of("log_digest")?).as_string::<i32>();
+    let is_kept = |(row, key): (usize, RecordKey)| match decisions.get(&key) {
+        None => true,
+        Some(Decision::Replaced(_)) => false,
+        Some(Decision::Moved(digest)) => *digest != Some(digests.value(row)),
+    };
+    Ok(keys_of(batch)?.into_iter().enumerate().map(|row| Some(is_kept(row))).collect())
 }
 
 /// The keys of a batch, row by row.
 pub(crate) fn keys_of(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
     let keys = batch.project(&key_columns(batch.schema_ref())?)?;
     let departures = keys.column(0).as_primitive::<TimestampMicrosecondType>();
-    let [tails, flights, positions] = [1, 2, 3].map(|column| keys.column(column).as_string::<i32>());
+    let [tails, positions] = [1, 2].map(|column| keys.column(column).as_string::<i32>());
     let key = |row| RecordKey {
         departure_us: departures.value(row),
         tail_number: tails.value(row).to_owned(),
-        flight_id: flights.value(row).to_owned(),
         position: positions.value(row).to_owned(),
     };
     Ok((0..departures.len()).map(key).collect())

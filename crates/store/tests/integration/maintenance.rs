@@ -155,7 +155,7 @@ fn verify_finds_records_that_are_there_twice() {
     let findings = writer.store().verify();
     assert_eq!(findings.len(), 5);
     assert_eq!(findings[0].message, "a commit was written by another program and carries no digest");
-    assert_eq!(findings[1].message, "N1 F0005 aileron_left is stored twice");
+    assert_eq!(findings[1].message, "N1 aileron_left, departure 2026-01-06T06:00:00Z, is stored twice");
     assert_eq!(findings[4].message, "3 more records are stored twice");
 }
 
