@@ -1,10 +1,12 @@
 //! Corrected tables: what is stored stays, and every surface shows the correction at once, with or without the logs.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde_json::Value;
 
+use crate::fuzz::engine::is_gate;
 use crate::harness::{TestFleet, facts, rewrite};
 
 const TABLE: &str = "sample-data/installations.csv";
@@ -115,7 +117,7 @@ fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
 #[test]
 fn departures_in_another_zone_are_named() {
     let fleet = TestFleet::processed();
-    let row = |log: std::path::PathBuf| {
+    let row = |log: PathBuf| {
         let facts: BTreeMap<String, String> = facts(&log).into_iter().collect();
         let departure: jiff::Timestamp = facts["departure_utc"].parse().unwrap();
         let local = (departure - jiff::SignedDuration::from_hours(5)).strftime("%Y-%m-%d %H:%M:%S");
@@ -403,4 +405,75 @@ fn a_known_name_is_enough_for_a_query() {
     assert!(unknown.err.contains("`N412FP`"), "{}", unknown.err);
     assert_eq!(fleet.freeplay(&["query"]).code, Some(2));
     assert!(fleet.freeplay(&["query", "wing", "N412FP"]).err.contains("cannot be selected by `wing`"));
+}
+
+/// Versions of the installations table: as it is; another unit on the left aileron; the elevators swapped earlier.
+fn table(version: usize, text: &str) -> String {
+    match version {
+        0 => text.to_owned(),
+        1 => text.replace(
+            "N412FP,aileron_left,EMA-27-1040,1040-0005",
+            "N412FP,aileron_left,EMA-27-1040,1040-0099",
+        ),
+        _ => text.replace("2026-10-12", "2026-09-25"),
+    }
+}
+
+/// Logs that arrive, go and are corrected, corrected tables, flights taken out and brought back, and killed runs, through
+/// the command in any order: what is stored and stated in the end is what one run over the last logs and tables makes.
+#[test]
+fn any_order_of_commands_ends_where_one_run_does() {
+    let source = TestFleet::sample();
+    source.configure("logs/**/*.parquet", "logs/N412FP/*.parquet");
+    let whole = std::fs::read_to_string(source.path(TABLE)).unwrap();
+    let logs: Vec<PathBuf> = source.logs().into_iter().take(5).collect();
+    let name = |log: &Path| log.strip_prefix(source.path("")).unwrap().to_owned();
+    for seed in 0..if is_gate() { 24 } else { 2 } {
+        let mut chance = fastrand::Rng::with_seed(seed);
+        let fleet = source.copied();
+        fleet.logs().iter().for_each(|log| std::fs::remove_file(log).unwrap());
+        let mut contents: Vec<PathBuf> = logs.clone();
+        for _ in 0..12 {
+            let k = chance.usize(..logs.len());
+            let here = fleet.path(name(&logs[k]).to_str().unwrap());
+            match chance.usize(..10) {
+                0 | 1 => drop(std::fs::copy(&contents[k], &here).unwrap()),
+                2 => drop(std::fs::remove_file(&here)),
+                3 => std::fs::write(fleet.path(TABLE), table(chance.usize(..3), &whole)).unwrap(),
+                4 => {
+                    contents[k] = fleet.path(&format!("{k}-{}.corrected", chance.usize(..1_000)));
+                    let first = 200 + chance.usize(..200);
+                    rewrite(&logs[k], &contents[k], &facts(&logs[k]), |_| true, |row| row >= first);
+                }
+                5 => {
+                    let flight = format!("N412FP-{:04}", k + 1);
+                    let undo = if chance.usize(..2) == 0 { &["--undo"][..] } else { &[] };
+                    fleet.freeplay(&[&["store", "forget", "--flight", &flight], undo].concat());
+                }
+                _ => {
+                    let silent = std::process::Stdio::null;
+                    let mut run = fleet.command(&["run"]).stdout(silent()).stderr(silent()).spawn().unwrap();
+                    if chance.usize(..3) > 0 {
+                        std::thread::sleep(Duration::from_millis(20 * chance.usize(..20) as u64));
+                        drop(run.kill());
+                    }
+                    run.wait().unwrap();
+                }
+            }
+        }
+        let once = source.copied();
+        let version = chance.usize(..3);
+        for fleet in [&fleet, &once] {
+            std::fs::write(fleet.path(TABLE), table(version, &whole)).unwrap();
+            fleet.logs().iter().for_each(|log| std::fs::remove_file(log).unwrap());
+            for (log, content) in logs.iter().zip(&contents) {
+                std::fs::copy(content, fleet.path(name(log).to_str().unwrap())).unwrap();
+            }
+            fleet.freeplay(&["store", "forget", "--tail", "N412FP", "--undo"]);
+            fleet.run_ok(&["run", "-q"]);
+            fleet.run_ok(&["store", "verify"]);
+        }
+        assert_eq!(fleet.exported(), once.exported(), "seed {seed}");
+        assert_eq!(trend(&fleet), trend(&once), "seed {seed}");
+    }
 }

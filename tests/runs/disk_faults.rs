@@ -8,7 +8,7 @@
 use crate::fuzz::engine::is_gate;
 use crate::harness::{TestFleet, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records, seed};
-use crate::runs::interruption::{Chance, small, whole_flights};
+use crate::runs::interruption::{small, whole_flights};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -116,20 +116,25 @@ impl<'b> Disk<'b> {
 
 /// One power cut: some runs that finish, then a cut at a random instant of another run, or right after the last one.
 /// Returns how many records the store holds afterwards, or what is wrong with them.
-fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bool) -> Result<usize, String> {
+fn cut(
+    disk: &mut Disk<'_>,
+    chance: &mut fastrand::Rng,
+    preload: Option<&Path>,
+    mid: bool,
+) -> Result<usize, String> {
     let run = || {
         let mut command = disk.fleet.command(&["run", "--jobs", "1", "--limit", "3", "-q"]);
         command.stdout(Stdio::null()).stderr(Stdio::null());
         command.envs(preload.map(|library| ("LD_PRELOAD", library)));
         command
     };
-    let runs = if mid { (chance.next() * 3.0) as usize } else { 1 };
+    let runs = if mid { (chance.f64() * 3.0) as usize } else { 1 };
     for _ in 0..runs {
         assert!(run().status().unwrap().success());
     }
     let copy = if mid {
         // A run makes some twenty files.
-        let files = files_of(disk.fleet) + 1 + (chance.next() * 20.0) as usize;
+        let files = files_of(disk.fleet) + 1 + (chance.f64() * 20.0) as usize;
         let mut child = run().spawn().unwrap();
         let mut is_over = false;
         wait_until(|| {
@@ -190,7 +195,7 @@ fn a_power_cut_at_any_instant_loses_nothing_that_was_promised() {
     plain.run_ok(&["run"]);
     let wanted = plain.exported();
     let (seed, cuts) = (seed(), CUTS[usize::from(is_gate())]);
-    let (mut chance, mut partly) = (Chance(seed), 0);
+    let (mut chance, mut partly) = (fastrand::Rng::with_seed(seed), 0);
     for number in 0..cuts {
         let fleet = on_a_disk();
         let mut disk = match Disk::new(&fleet) {
@@ -217,7 +222,7 @@ fn is_caught(what: &str, flags: &[&str]) {
     if let Err(why) = done(&mut compile) {
         return print_line(&format!("skipped: no C compiler: {why}"));
     }
-    let mut chance = Chance(1);
+    let mut chance = fastrand::Rng::with_seed(1);
     for number in 1..=CONTROL_CUTS {
         let fleet = on_a_disk();
         let mut disk = match Disk::new(&fleet) {

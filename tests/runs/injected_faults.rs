@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use crate::fuzz::engine::is_gate;
 use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
-use crate::runs::interruption::{Chance, small, whole_flights};
+use crate::runs::interruption::{small, whole_flights};
 
 /// Numbers of `errno(3)`.
 const EIO: &str = "5";
@@ -490,10 +490,10 @@ fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     let kills = if is_gate() { 200 } else { 8 };
     let wanted = few_records();
     let count = injector.count(&few(), RUN, "results", "write");
-    let mut chance = Chance(seed());
+    let mut chance = fastrand::Rng::with_seed(seed());
     let (mut fleet, mut kept, mut killed, mut finished, mut partly) = (few(), 0, 0, 0, 0);
     while killed < kills {
-        let fault = Fault::at("results", "write", "kill", 1 + (chance.next() * count as f64) as usize);
+        let fault = Fault::at("results", "write", "kill", 1 + (chance.f64() * count as f64) as usize);
         let ended = injector.run(&fleet, RUN, &fault);
         let now = whole_flights(&fleet);
         assert!(now >= kept, "{kept} records were kept, now {now}, after {fault:?}");
@@ -566,14 +566,14 @@ fn two_faults_in_one_run_lose_nothing() {
     let Some(injector) = Injector::get() else { return };
     let wanted = few_records();
     let seed = seed();
-    let mut chance = Chance(seed);
+    let mut chance = fastrand::Rng::with_seed(seed);
     for (make, store) in [NEW, GROWN] {
         let command = Struck { injector, before: make(), args: RUN, wanted };
         let count = injector.count(&command.before.copied(), RUN, "results", "both");
         let tries = sample().min(count);
         let mut codes = ExitCodes::default();
         for _ in 0..tries {
-            let mut below = |count: usize| (chance.next() * count as f64) as usize;
+            let mut below = |count: usize| (chance.f64() * count as f64) as usize;
             let (first, second) = (below(count), below(count));
             let (mode, also) = (MODES[below(3)], MODES[below(4)]);
             let fault = Fault::at("results", "both", mode, 1 + first.min(second));

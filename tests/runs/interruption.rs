@@ -82,16 +82,6 @@ pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
     records.len()
 }
 
-/// Numbers from 0 to 1, the same for the same seed on every machine.
-pub(crate) struct Chance(pub(crate) u64);
-
-impl Chance {
-    pub(crate) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// A file that may not grow: the write fails at some byte, the run reports it with code 3, and what was stored
 /// before stays whole. With room again the next run finishes.
 #[cfg(unix)]

@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::fuzz::engine::is_gate;
 use crate::harness::{TestFleet, facts, print_line, rewrite};
 use crate::runs::injected_faults::Injector;
-use crate::runs::interruption::{Chance, whole_flights};
+use crate::runs::interruption::whole_flights;
 
 /// Days of the test, and of the gate.
 const DAYS: [usize; 2] = [2, 6];
@@ -90,7 +90,7 @@ fn a_year_of_faults_ends_with_the_store_of_one_run() {
         .ok()
         .and_then(|n| n.parse().ok())
         .unwrap_or(DAYS[usize::from(is_gate())]);
-    let mut chance = Chance(7);
+    let mut chance = fastrand::Rng::with_seed(7);
     let (fleet, sources) = bare();
     let (mut peaks, mut counts) = (Vec::new(), [0; 6]);
     let mut broken: Vec<(std::path::PathBuf, Vec<u8>)> = Vec::new();
@@ -102,20 +102,20 @@ fn a_year_of_faults_ends_with_the_store_of_one_run() {
         for flight in day * FLIGHTS..(day + 1) * FLIGHTS {
             let log = fleet.path(&format!("logs/{flight:05}.parquet"));
             fly(&sources[flight % sources.len()], &log, flight);
-            if chance.next() < 0.1 {
+            if chance.f64() < 0.1 {
                 let bytes = std::fs::read(&log).unwrap();
-                std::fs::write(&log, &bytes[..(bytes.len() as f64 * chance.next()) as usize]).unwrap();
+                std::fs::write(&log, &bytes[..(bytes.len() as f64 * chance.f64()) as usize]).unwrap();
                 broken.push((log, bytes));
                 counts[5] += 1;
             }
         }
-        let kind = (chance.next() * 5.0) as usize;
+        let kind = (chance.f64() * 5.0) as usize;
         counts[kind] += 1;
         match kind {
-            0 => drop(run_watched(&fleet, Some(Duration::from_secs_f64(3.0 * chance.next())))),
+            0 => drop(run_watched(&fleet, Some(Duration::from_secs_f64(3.0 * chance.f64())))),
             1 => drop(injector.with_clock(&fleet, &["run", "-q"], 86_400 * 3650)),
             2 => drop(injector.with_clock(&fleet, &["run", "-q"], -86_400 * 400)),
-            3 => injector.random_fault(&fleet, (chance.next() * 300.0) as usize),
+            3 => injector.random_fault(&fleet, (chance.f64() * 300.0) as usize),
             _ => peaks.extend(run_watched(&fleet, None)),
         }
     }

@@ -283,21 +283,13 @@ mod tests {
         add_stored(rows, &chunk(batch), batch)
     }
 
-    /// Pseudo-random whole numbers below a bound.
-    fn chances() -> impl FnMut(u64) -> u64 {
-        let mut state = 7_u64;
-        move |bound| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % bound
-        }
-    }
-
     /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
     type Cells = ([Option<String>; 5], i64, Option<f64>);
 
     /// Serial numbers of two parts, units that move about, names with a blank, and flights that arrive late.
     fn rows() -> Vec<Cells> {
-        let mut chance = chances();
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut chance = |bound: u64| random.u64(..bound);
         let mut row = |at: i64| {
             let mut text = |name: &str, count| (chance(9) > 0).then(|| format!("{name}{}", chance(count)));
             let (part, tail, position, flight) =

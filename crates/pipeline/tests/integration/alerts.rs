@@ -17,16 +17,6 @@ const STATES: [Option<&str>; 5] = [None, Some("normal"), Some("watch"), Some("pl
 const SERIALS: [&str; 6] =
     ["1040-0009", "../../etc/x", "$(reboot)", "\"},{\"id\":\"", "S\n\u{202e}1", "Ünït 7"];
 
-/// Numbers of a linear congruential generator (Knuth, MMIX).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
-}
-
 fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
     let as_of_utc = Timestamp::from_second(1_780_000_000 + 86_400 * day).unwrap();
     Finding {
@@ -63,7 +53,7 @@ struct Killed;
 struct World {
     table: BTreeMap<(String, String), AlertRecord>,
     received: Vec<(String, String)>,
-    random: Random,
+    random: fastrand::Rng,
     /// Writes until the kill, and whether the last of them is durable.
     kill_in: Option<(u64, bool)>,
     is_calm: bool,
@@ -116,7 +106,7 @@ impl Courier for World {
 
     fn send(&mut self, row: &AlertRecord) -> Attempt {
         let why = "a fault".to_owned();
-        let (attempt, is_received) = match self.random.below(10) {
+        let (attempt, is_received) = match self.random.u64(..10) {
             0..=1 if !self.is_calm => (Attempt::NotSent(why), false),
             2 if !self.is_calm => (Attempt::Unknown(why), true),
             3 if !self.is_calm => (Attempt::Unknown(why), false),
@@ -141,7 +131,7 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
     let mut world = World {
         table: BTreeMap::new(),
         received: Vec::new(),
-        random: Random(25),
+        random: fastrand::Rng::with_seed(25),
         kill_in: None,
         is_calm: false,
     };
@@ -150,13 +140,13 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
     let (mut expected, mut kills) = (0, 0);
     let mut known = truth.clone();
     for number in 0..1000 {
-        if world.random.below(3) > 0 {
-            let serial = SERIALS[world.random.below(6) as usize];
-            truth.insert(serial, STATES[world.random.below(5) as usize]);
+        if world.random.u64(..3) > 0 {
+            let serial = SERIALS[world.random.u64(..6) as usize];
+            truth.insert(serial, STATES[world.random.u64(..5) as usize]);
         }
-        let is_killed = world.random.below(3) == 0;
-        let step = world.random.below(5);
-        world.kill_in = is_killed.then_some((step, world.random.below(2) == 0));
+        let is_killed = world.random.u64(..3) == 0;
+        let step = world.random.u64(..5);
+        world.kill_in = is_killed.then_some((step, world.random.u64(..2) == 0));
         // A back-fill on the same date changes states as well.
         let day = number as i64 / 4;
         let findings: Vec<Finding> =

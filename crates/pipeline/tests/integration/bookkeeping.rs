@@ -21,16 +21,6 @@ const FLIGHTS: i64 = 6;
 const POSITIONS: [&str; 2] = ["aileron_left", "aileron_right"];
 const VERSIONS: u64 = 6;
 
-/// Pseudo-random whole numbers below a bound.
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % bound
-    }
-}
-
 fn departure(flight: i64) -> Timestamp {
     "2026-03-01T06:00:00Z".parse::<Timestamp>().unwrap() + SignedDuration::from_hours(24 * flight)
 }
@@ -201,24 +191,23 @@ fn any_order_of_logs_corrections_and_kills_ends_where_one_ordered_run_does() {
     let versions: Vec<(Config, Installations)> = (0..VERSIONS).map(tables).collect();
     let sequences = if is_gate() { 1_000 } else { 12 };
     let sequence = |seed: u64| {
-        let mut chance = Chance(seed);
+        let mut chance = fastrand::Rng::with_seed(seed);
         let dir = tempfile::tempdir().unwrap();
         let mixed = dir.path().join("results");
         // The content of each log that was stored last, and flights that are withdrawn.
         let mut stored = BTreeMap::<i64, u64>::new();
         let mut withdrawn = BTreeMap::<i64, u64>::new();
-        for number in 0..2 + chance.below(4) as i64 {
-            let logs: Vec<(i64, u64)> = (0..chance.below(4))
-                .map(|_| (chance.below(FLIGHTS as u64) as i64, chance.below(3)))
-                .collect();
-            let steps = chance.below(logs.len() as u64 + 4);
-            let version = &versions[chance.below(VERSIONS) as usize];
+        for number in 0..2 + chance.i64(..4) {
+            let logs: Vec<(i64, u64)> =
+                (0..chance.u64(..4)).map(|_| (chance.i64(..FLIGHTS), chance.u64(..3))).collect();
+            let steps = chance.u64(..logs.len() as u64 + 4);
+            let version = &versions[chance.u64(..VERSIONS) as usize];
             for (flight, correction) in run(&mixed, number, &logs, version, steps) {
                 stored.insert(flight, correction);
                 withdrawn.remove(&flight);
             }
-            if chance.below(5) == 0 {
-                let flight = chance.below(FLIGHTS as u64) as i64;
+            if chance.u64(..5) == 0 {
+                let flight = chance.i64(..FLIGHTS);
                 let until_utc = Some(departure(flight) + SignedDuration::from_hours(1));
                 let query = Query { since_utc: Some(departure(flight)), until_utc, ..Query::default() };
                 let undo = withdrawn.contains_key(&flight);
@@ -231,7 +220,7 @@ fn any_order_of_logs_corrections_and_kills_ends_where_one_ordered_run_does() {
                 }
             }
         }
-        let last = &versions[chance.below(VERSIONS) as usize];
+        let last = &versions[chance.u64(..VERSIONS) as usize];
         // What one run over the last tables stores, in order of departure.
         let logs = stored.into_iter().map(|(flight, content)| result(flight, content, last));
         let expected: Vec<GapRecord> = logs.flat_map(|result| result.records).collect();

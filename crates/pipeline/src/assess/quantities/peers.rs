@@ -189,15 +189,8 @@ mod tests {
 
     /// Stiffnesses of twelve tails with four units each, with a scatter of 2 % between units.
     fn fleet(seed: u64, plant: impl Fn(usize, usize) -> f64) -> Vec<QuantityRow> {
-        let mut state = seed.wrapping_mul(2_862_933_555_777_941_757).wrapping_add(3_037_000_493);
-        let mut normal = || {
-            let mut sum = -6.0;
-            for _ in 0..12 {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
-            }
-            sum
-        };
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
         let mut rows = Vec::new();
         for tail in 0..12 {
             for position in 0..4 {
