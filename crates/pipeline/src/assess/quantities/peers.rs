@@ -252,7 +252,7 @@ mod tests {
         };
         assert!(of(Quantity::StiffnessNPerM).is_empty());
         let found = of(Quantity::LoadZeroN);
-        assert!(found.len() == 1 && found[0].starts_with("T2: load zero of its units reads 9"), "{found:?}");
+        assert!(found.len() == 1 && found[0].starts_with("T2: load zero of its units reads "), "{found:?}");
     }
 
     #[test]
