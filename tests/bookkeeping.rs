@@ -111,6 +111,15 @@ fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
     for column in ["flights", "unit_hours", "gap_m", "state"] {
         assert_eq!(now[column], before[column], "{column}");
     }
+    // One of them is named by its departure, and each is drawn from its own log.
+    let refused = fleet.freeplay(&["explain", "FP100", "aileron_left"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.err.contains("10 flights") && refused.err.contains("--since"), "{}", refused.err);
+    let second = ["--since", "2026-09-12", "--until", "2026-09-20"];
+    let explained = fleet.run_ok(&[&["explain", "FP100", "aileron_left"][..], &second].concat());
+    assert!(explained.contains("20260919T141840Z_N412FP-0002.parquet"), "{explained}");
+    fleet.run_ok(&["report", "--output", "report", "--serial", "1040-0005", "--diagnostics"]);
+    assert_eq!(std::fs::read_dir(fleet.path("report/flight")).unwrap().count(), 3);
 }
 
 /// A flights table in local time, five hours behind UTC, is named; the logs' own departures stay.

@@ -11,10 +11,10 @@ use pipeline::assess::backtest;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
 use pipeline::findings::work_list::{self, WorkSelection};
 use pipeline::fleet::external_estimates;
-use pipeline::inspect::explain::RecordKey;
 use pipeline::inspect::store_diff::compare_stores;
 use pipeline::report::{compose, data, publish};
 use pyo3::prelude::*;
+use store::Query;
 
 use crate::VERSION;
 use crate::arrow_capsule;
@@ -121,17 +121,26 @@ pub(crate) fn explain(
     flight: String,
     position: String,
     tail: Option<String>,
+    departures: [Option<String>; 2],
 ) -> PyResult<(String, Table)> {
     let installations = config.installations(py)?;
     let config = &config.inner;
-    let key = RecordKey { flight_id: flight, position, tail_number: tail };
+    let [since_utc, until_utc] = departures.each_ref().map(|text| instant(py, text.as_deref()));
+    let query = Query {
+        flight_id: Some(flight),
+        position: Some(position),
+        tail_number: tail,
+        since_utc: since_utc?,
+        until_utc: until_utc?,
+        ..Query::default()
+    };
     let found = py
         .detach(|| {
             pipeline::inspect::explain::explain(
                 config,
                 installations,
                 &pipeline::open_store(config, installations)?,
-                &key,
+                &query,
             )
         })
         .map_err(|error| to_run_exception(py, error))?;

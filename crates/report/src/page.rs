@@ -1,8 +1,10 @@
 //! One file of a report: its path, its content, and the errors of writing it.
 
+use jiff::Timestamp;
+use records::sanitize::escape_invisible;
+
 use crate::file_names::file_stem;
 use crate::model::UnitView;
-use records::sanitize::escape_invisible;
 
 /// One file of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,8 +40,9 @@ pub fn unit_path(unit: &UnitView) -> String {
 }
 
 /// Path of the page with the diagnostic plot of an actuator in a flight, relative to the report folder.
-pub fn flight_path(tail_number: &str, flight_id: &str, position: &str) -> String {
-    format!("flight/{}.html", file_stem("flight", &[tail_number, flight_id, position]))
+pub fn flight_path(tail_number: &str, departure_utc: Timestamp, position: &str) -> String {
+    let departure = departure_utc.strftime("%Y%m%dT%H%M%S%fZ").to_string();
+    format!("flight/{}.html", file_stem("flight", &[tail_number, &departure, position]))
 }
 
 /// Path of a page of a part number, relative to the report folder; a part with many units has several.

@@ -20,7 +20,7 @@ pub(crate) use results::{
 };
 pub(crate) use rows::{Format, RowFormatArgs};
 pub(crate) use run::{FailOn, RunArgs};
-pub(crate) use selection::UnitFilterArgs;
+pub(crate) use selection::{DepartureArgs, UnitFilterArgs};
 pub(crate) use store::{ForgetArgs, StoreArgs, StoreCommand, Table};
 pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 

@@ -98,6 +98,8 @@ pub(crate) struct ExplainArgs {
     /// Tail number, if several aircraft have a flight of this name.
     #[arg(long, add = ArgValueCompleter::new(completion::tails))]
     pub tail: Option<String>,
+    #[command(flatten)]
+    pub departures: DepartureArgs,
     /// Print JSON, SI.
     #[arg(long)]
     pub json: bool,

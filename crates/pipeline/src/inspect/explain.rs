@@ -10,17 +10,6 @@ use store::{Query, Store};
 use crate::error::Error;
 use crate::logs::discover;
 
-/// Which record to explain.
-#[derive(Debug, Clone)]
-pub struct RecordKey {
-    /// Flight of the record.
-    pub flight_id: String,
-    /// Position of the actuator.
-    pub position: String,
-    /// Tail number, if several aircraft have a flight of this name.
-    pub tail_number: Option<String>,
-}
-
 /// A record, and its recomputation.
 #[derive(Debug)]
 pub struct Explanation {
@@ -64,17 +53,17 @@ pub fn remedy(estimate: &GapEstimate) -> Option<&'static str> {
     code.and_then(job::rejection::remedy)
 }
 
-/// Explains one record of a store.
+/// Explains the one record of a store that a query selects, usually by flight and position.
 ///
 /// # Errors
-/// When the store cannot be read, or holds no such record.
+/// When the store cannot be read, or the query selects no record or several.
 pub fn explain(
     config: &Config,
     installations: &Installations,
     store: &Store,
-    key: &RecordKey,
+    query: &Query,
 ) -> Result<Explanation, Error> {
-    let record = find(key, store)?;
+    let record = find(query, store)?;
     let replayed = replay(&record, config, installations);
     let flight = &record.flight;
     let installed = installations.installed_at(&flight.tail_number, &record.position, flight.departure_utc);
@@ -84,29 +73,22 @@ pub fn explain(
     Ok(Explanation { record, replayed, verdict, config_digest })
 }
 
-fn find(key: &RecordKey, store: &Store) -> Result<GapRecord, Error> {
-    let query = Query {
-        tail_number: key.tail_number.clone(),
-        flight_id: Some(key.flight_id.clone()),
-        position: Some(key.position.clone()),
-        ..Query::default()
-    };
-    let mut found = store.records(&query)?;
-    let (what, hint) = match found.len() {
-        1 => return Ok(found.remove(0)),
-        0 => (
-            format!(
-                "no record of {} in flight {}{}",
-                key.position,
-                key.flight_id,
-                key.tail_number.as_ref().map(|tail| format!(" of tail {tail}")).unwrap_or_default()
-            ),
-            format!("list its records with `freeplay query flight {}`", key.flight_id),
-        ),
-        _ => {
-            let tails: Vec<String> = found.iter().map(|r| r.flight.tail_number.to_string()).collect();
-            let what = format!("flight {} exists for several tails: {}", key.flight_id, tails.join(", "));
-            (what, "select one with `--tail`".to_owned())
+fn find(query: &Query, store: &Store) -> Result<GapRecord, Error> {
+    let mut found = store.records(query)?;
+    let named = |name: &Option<String>| name.clone().unwrap_or_default();
+    let (flight, position) = (named(&query.flight_id), named(&query.position));
+    let (what, hint) = match found.as_slice() {
+        [_] => return Ok(found.remove(0)),
+        [] => {
+            let tail = query.tail_number.as_ref().map(|tail| format!(" of tail {tail}")).unwrap_or_default();
+            let what = format!("no record of {position} in flight {flight}{tail}");
+            (what, format!("list its records with `freeplay query flight {flight}`"))
+        }
+        [.., last] => {
+            let (count, last) = (found.len(), &last.flight);
+            let (tail, day) = (&last.tail_number, last.departure_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
+            let what = format!("{count} flights are named {flight}; the latest is of {tail}, {day}");
+            (what, format!("select one with `--tail {tail} --since {day}`, and `--until` for an earlier one"))
         }
     };
     Err(Error::refused(Diagnostic::new("no_such_record", what).hint(hint)))

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ::report::{Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
+use jiff::Timestamp;
 use job::Config;
 use job::flight_log::FlightLog;
 use rayon::prelude::*;
@@ -61,8 +62,7 @@ pub fn draw(
         let logs_of_flights = log_paths(view, flights.start, store)?;
         for flight in flights.rev() {
             let row = &view.flights[flight];
-            let Some(log) = logs_of_flights.get(&(row.tail_number.to_string(), row.flight_id.to_string()))
-            else {
+            let Some(log) = logs_of_flights.get(&(row.tail_number.to_string(), row.departure_utc)) else {
                 continue;
             };
             if chosen == MAX_PLOTS {
@@ -106,12 +106,12 @@ fn by_urgency(report: &Report) -> Vec<usize> {
 /// Path of a log, and the digest that it had when its records were stored.
 type StoredLog = (String, String);
 
-/// Logs of a unit's flights from one on, by tail and flight.
+/// Logs of a unit's flights from one on, by tail and departure.
 fn log_paths(
     unit: &UnitView,
     first: usize,
     store: &Store,
-) -> Result<BTreeMap<(String, String), StoredLog>, Error> {
+) -> Result<BTreeMap<(String, Timestamp), StoredLog>, Error> {
     let Some(first) = unit.flights.get(first) else { return Ok(BTreeMap::new()) };
     let query = Query {
         serial_number: Some(unit.row.serial_number.clone()),
@@ -121,7 +121,7 @@ fn log_paths(
     };
     let key = |record: records::GapRecord| {
         let (flight, source) = (record.flight, record.provenance);
-        let key = (flight.tail_number.to_string(), flight.flight_id.to_string());
+        let key = (flight.tail_number.to_string(), flight.departure_utc);
         (key, (source.log_path, source.log_digest))
     };
     Ok(store.records(&query)?.into_iter().map(key).collect())
@@ -153,7 +153,7 @@ fn of_log(
             Diagnostic::new("no_position", what).in_file(log)
         })?;
         let row = &unit.flights[wanted.flight];
-        let path = flight_path(&row.tail_number, &row.flight_id, &row.position);
+        let path = flight_path(&row.tail_number, row.departure_utc, &row.position);
         let back = format!("../{}", unit_path(unit));
         let html = estimate_plot_html(std::slice::from_ref(plot), Some((&back, &unit.name())))
             .map_err(|e| Diagnostic::new("cannot_draw", e).in_file(log))?;

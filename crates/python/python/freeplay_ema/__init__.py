@@ -300,9 +300,17 @@ def diff(before: Path, after: Path, *, min_change_m: float = 0.0) -> Table:
     return _freeplay.diff(fspath(before), fspath(after), min_change_m)
 
 
-def explain(flight: str, position: str, config: Settings = _USUAL, *, tail: str | None = None) -> Explanation:
-    """One stored estimate with its settings, recomputed from its log."""
-    text, record = _freeplay.explain(load(config), flight, position, tail)
+def explain(
+    flight: str,
+    position: str,
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    since: Instant | None = None,
+    until: Instant | None = None,
+) -> Explanation:
+    """One stored estimate with its settings, recomputed from its log; departures select among flights of one name."""
+    text, record = _freeplay.explain(load(config), flight, position, tail, [_text(since), _text(until)])
     return Explanation.from_json(text, record)
 
 

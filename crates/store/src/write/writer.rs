@@ -147,7 +147,8 @@ impl Writer {
             "load_p95_n",
             "samples",
         ];
-        let wanted: BTreeMap<RecordKey, ()> = keys.iter().map(|key| (key.clone(), ())).collect();
+        let wanted: MergeDecisions<'_> =
+            keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
         let snapshot = self.store.gaps.snapshot()?;
         let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
         let files: Vec<_> = snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
@@ -290,7 +291,7 @@ fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
 }
 
 /// Whether the file may hold one of the records, by its bounds.
-fn may_hold_any<T>(file: &DataFile, decisions: &BTreeMap<RecordKey, T>) -> bool {
+fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
     let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
     let from = |departure_us| RecordKey { departure_us, tail_number: String::new(), position: String::new() };
     let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));

@@ -4,16 +4,17 @@ use std::fmt::Write as _;
 
 use ingest::{ActuatorChannels, Quality};
 use job::Config;
-use pipeline::inspect::explain::{Explanation, Recomputation, RecordKey, remedy};
+use pipeline::inspect::explain::{Explanation, Recomputation, remedy};
 use records::uncertainty::NORMAL_95;
 use serde_json::Value;
+use store::Query;
 
-use crate::args::{ExplainArgs, Global};
+use crate::args::{DepartureArgs, ExplainArgs, Global};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::table::{self, number, text};
 
-use crate::commands::context::{KnownNames, load_with_installations};
+use crate::commands::context::{KnownNames, check_range, load_with_installations};
 
 /// Explains one record.
 ///
@@ -22,13 +23,18 @@ use crate::commands::context::{KnownNames, load_with_installations};
 /// makes the exit code 1.
 pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let key = RecordKey {
-        flight_id: args.flight.clone(),
-        position: args.position.clone(),
+    let DepartureArgs { since, until } = args.departures;
+    check_range(since, until)?;
+    let query = Query {
+        flight_id: Some(args.flight.clone()),
+        position: Some(args.position.clone()),
         tail_number: args.tail.clone(),
+        since_utc: since,
+        until_utc: until,
+        ..Query::default()
     };
     let store = pipeline::open_store(&config, &installations)?;
-    let found = match pipeline::inspect::explain::explain(&config, &installations, &store, &key) {
+    let found = match pipeline::inspect::explain::explain(&config, &installations, &store, &query) {
         Ok(found) => found,
         Err(error) => {
             let known = KnownNames::of(&config);
