@@ -118,6 +118,9 @@ fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
     let second = ["--since", "2026-09-12", "--until", "2026-09-20"];
     let explained = fleet.run_ok(&[&["explain", "FP100", "aileron_left"][..], &second].concat());
     assert!(explained.contains("20260919T141840Z_N412FP-0002.parquet"), "{explained}");
+    let normalized = fleet.run_ok(&["normalize", "--output", "normalized"]);
+    assert!(normalized.contains("120 normalized logs"), "{normalized}");
+    assert!(fleet.run_ok(&["diff", "results", "results"]).starts_with("0 of 120 "));
     fleet.run_ok(&["report", "--output", "report", "--serial", "1040-0005", "--diagnostics"]);
     assert_eq!(std::fs::read_dir(fleet.path("report/flight")).unwrap().count(), 3);
 }

@@ -10,7 +10,8 @@ use records::{Diagnostic, Installations};
 use crate::config::Config;
 use crate::flight_log::{FlightLog, catch_panic};
 
-/// Writes the normalized logs of one log below a folder, as `TAIL/FLIGHT/POSITION.parquet`.
+/// Writes the normalized logs of one log below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight
+/// number flies again.
 ///
 /// An actuator that cannot be used becomes a diagnostic; the others are written.
 ///
@@ -50,7 +51,8 @@ fn one(
     let (installation, part) = opened.unit(at, config, installations)?;
     let channels = opened.channels(at, part)?;
     let id = &opened.identity;
-    let names = [id.tail_number.as_str(), id.flight_id.as_str(), at.position.as_str()].map(file_name);
+    let flight = format!("{}_{}", id.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight_id);
+    let names = [id.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
     let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
     claim(&file, &opened.digest)?;
     let provenance = BTreeMap::from([

@@ -57,7 +57,7 @@ pub(crate) struct EstimateArgs {
 pub(crate) struct NormalizeArgs {
     /// Logs to read; default: those of the configuration.
     pub logs: Vec<PathBuf>,
-    /// Write TAIL/FLIGHT/POSITION.parquet below this folder.
+    /// Write TAIL/DEPARTURE_FLIGHT/POSITION.parquet below this folder.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
     /// Parquet encoding.

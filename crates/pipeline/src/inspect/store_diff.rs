@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use records::GapRecord;
-use store::{Query, Store};
+use store::{Query, RecordKey, Store};
 
 use crate::error::Error;
 
@@ -40,7 +40,7 @@ pub struct RecordCounts {
 /// Actuator-flights that differ between two stores.
 #[derive(Debug)]
 pub struct StoreDiff {
-    /// Those that differ, by tail, flight and position.
+    /// Those that differ, by departure, tail and position.
     pub rows: Vec<DiffRow>,
     /// Number of actuator-flights in either store.
     pub compared: usize,
@@ -62,19 +62,14 @@ pub fn compare_stores(before: &Path, after: &Path, min_change_m: f64) -> Result<
     Ok(StoreDiff { rows, compared: keys.len(), before: counts(&before), after: counts(&after) })
 }
 
-fn counts(all: &BTreeMap<Key, GapRecord>) -> RecordCounts {
+fn counts(all: &BTreeMap<RecordKey, GapRecord>) -> RecordCounts {
     let with_gap = all.values().filter(|record| record.estimate.gap_m.is_some()).count();
     RecordCounts { records: all.len(), with_gap }
 }
 
-type Key = (String, String, String);
-
-fn records(folder: &Path) -> Result<BTreeMap<Key, GapRecord>, Error> {
-    let store = Store::open(folder)?;
-    let key = |r: &GapRecord| {
-        (r.flight.tail_number.to_string(), r.flight.flight_id.to_string(), r.position.to_string())
-    };
-    Ok(store.records(&Query::default())?.into_iter().map(|r| (key(&r), r)).collect())
+fn records(folder: &Path) -> Result<BTreeMap<RecordKey, GapRecord>, Error> {
+    let records = Store::open(folder)?.records(&Query::default())?;
+    Ok(records.into_iter().map(|record| (RecordKey::of(&record), record)).collect())
 }
 
 fn row(before: Option<&GapRecord>, after: Option<&GapRecord>) -> Option<DiffRow> {

@@ -216,9 +216,20 @@ fn attach_companions(
     log_path: String,
     path: &Path,
 ) {
+    let (flight, position) = who;
+    let on_tail = whose.get(&flight.tail_number).map_or(&[][..], Vec::as_slice);
+    let is_placed = |other: &Option<Position>| position.is_none() || other.is_none() || position == other;
+    let placed = || on_tail.iter().filter(|((_, other), _)| is_placed(other));
+    let departs = |main: &Flight| main.departure_utc == flight.departure_utc;
+    // A flight number flies again another day: the departure decides, and the number only where none is equal.
+    let is_known = placed().any(|((main, _), _)| departs(main));
+    let is_near = |main: &Flight| {
+        let between = main.departure_utc.duration_since(flight.departure_utc).abs();
+        main.flight_id == flight.flight_id && between <= MAX_BETWEEN_PIECES
+    };
+    let is_own = |main: &Flight| if is_known { departs(main) } else { is_near(main) };
     let mut is_stray = true;
-    let on_tail = whose.get(&who.0.tail_number).map_or(&[][..], Vec::as_slice);
-    for (_, first) in on_tail.iter().filter(|(main, _)| is_same_flight(who, main)) {
+    for (_, first) in placed().filter(|((main, _), _)| is_own(main)) {
         if let Some(files) = found.logs.get_mut(first) {
             files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
             is_stray = false;
@@ -227,15 +238,6 @@ fn attach_companions(
     if is_stray {
         found.strays.push(log_path);
     }
-}
-
-fn is_same_flight((flight, position): &FlightIdentity, (main, main_position): &FlightIdentity) -> bool {
-    let same_flight = flight.flight_id == main.flight_id || flight.departure_utc == main.departure_utc;
-    let same_place = match (position, main_position) {
-        (Some(position), Some(main)) => position == main,
-        _ => true,
-    };
-    same_flight && same_place
 }
 
 /// Files that fit some patterns, each by its shown name, in order of it.

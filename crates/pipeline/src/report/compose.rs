@@ -391,16 +391,12 @@ fn tails(
     config: &Config,
     as_of: Option<Timestamp>,
 ) -> BTreeMap<String, ReportTailRow> {
-    let mut tails: BTreeMap<&str, (ReportTailRow, BTreeSet<&str>)> = BTreeMap::new();
+    let mut tails: BTreeMap<&str, (ReportTailRow, BTreeSet<i64>)> = BTreeMap::new();
     let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(move |f| (h, f)));
     for (history, record) in flown {
-        let (Some(name), Some(flight)) =
-            (history.place(record).tail_number.as_deref(), history.flight_id(record))
-        else {
-            continue;
-        };
-        let (tail, flights) = tails.entry(name).or_default();
-        flights.insert(flight);
+        let Some(name) = history.place(record).tail_number.as_deref() else { continue };
+        let (tail, departures) = tails.entry(name).or_default();
+        departures.insert(record.departure_us());
         tail.records += 1;
         tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc()));
         if record.gap_m().is_some() {
@@ -414,9 +410,9 @@ fn tails(
             *tail.flown.get_or_insert(0) += 1;
         }
     }
-    let counted = |(name, (tail, flights)): (&str, (ReportTailRow, BTreeSet<&str>))| {
+    let counted = |(name, (tail, departures)): (&str, (ReportTailRow, BTreeSet<i64>))| {
         let tail_number = name.to_owned();
-        (tail_number.clone(), ReportTailRow { tail_number, flights: flights.len() as i64, ..tail })
+        (tail_number.clone(), ReportTailRow { tail_number, flights: departures.len() as i64, ..tail })
     };
     tails.into_iter().map(counted).collect()
 }

@@ -226,7 +226,7 @@ def normalize(
     compatible: bool = False,
     jobs: int | None = None,
 ) -> list[str]:
-    """Writes the canonical log of each actuator as ``TAIL/FLIGHT/POSITION.parquet`` below ``output``.
+    """Writes the canonical log of each actuator as ``TAIL/DEPARTURE_FLIGHT/POSITION.parquet`` below ``output``.
 
     ``compatible`` keeps to encodings that every reader knows. Raises :class:`LogError` when a log cannot be used;
     its ``answer`` lists the files of the others.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use jiff::Timestamp;
 use serde::Serialize;
 
 use crate::findings::monitoring::recent::RecentDiagnostics;
@@ -20,8 +21,8 @@ pub struct RepeatedSamples {
     pub other_positions: Vec<String>,
 }
 
-/// Tail and flight.
-type Flown<'a> = (&'a str, &'a str);
+/// Tail, departure, and the flight's name, which may fly again.
+type Flown<'a> = (&'a str, Timestamp, &'a str);
 
 /// The pairs of flights with equal estimates. Noise makes two records of one motion differ.
 pub(crate) fn detect(recent: &RecentDiagnostics) -> Vec<RepeatedSamples> {
@@ -30,7 +31,7 @@ pub(crate) fn detect(recent: &RecentDiagnostics) -> Vec<RepeatedSamples> {
     for (key, flights) in recent {
         for flight in flights {
             let Some((nis, stiffness)) = flight.nis.zip(flight.stiffness_n_per_m) else { continue };
-            let flown = (key.tail_number.as_str(), &*flight.flight_id);
+            let flown = (key.tail_number.as_str(), flight.departure_utc, &*flight.flight_id);
             let place = (flown, key.position.as_str());
             let known = *first.entry((nis.to_bits(), stiffness.to_bits())).or_insert(place);
             if known != place {
@@ -44,10 +45,10 @@ pub(crate) fn detect(recent: &RecentDiagnostics) -> Vec<RepeatedSamples> {
             positions.iter().map(|(own, other)| ((*own).to_owned(), (*other).to_owned())).unzip();
         found.push(RepeatedSamples {
             tail_number: one.0.to_owned(),
-            flight_id: one.1.to_owned(),
+            flight_id: one.2.to_owned(),
             positions: own,
             other_tail_number: other.0.to_owned(),
-            other_flight_id: other.1.to_owned(),
+            other_flight_id: other.2.to_owned(),
             other_positions: others,
         });
     }
