@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
 use job::Config;
 use pipeline::assess::trends::UnitSelection;
@@ -131,7 +132,7 @@ impl KnownNames {
         let what = columns.iter().map(|column| called(column)).collect::<Vec<_>>().join(", ");
         let what =
             what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
-        let hint = match ingest::mapping::column_pattern::nearest(name, known.iter().map(String::as_str)) {
+        let hint = match nearest(name, known.iter().map(String::as_str)) {
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
             None => "list the contents of the store with `freeplay store info`".to_owned(),
         };
@@ -149,8 +150,27 @@ impl KnownNames {
         self.check(&["part_number"], units.part.as_deref())
     }
 
+    /// Why a selection has no unit: the tables have none there now, or none has flown.
+    pub(crate) fn why_nothing(&self, ask: &UnitSelection) -> String {
+        let Some((tail, Self::Store(Some(store), installations))) = ask.tail_number.as_ref().zip(Some(self))
+        else {
+            return format!("no unit{} has flown; {}", selection(ask), self.searched());
+        };
+        if !store.distinct("tail_number").is_ok_and(|flown| flown.contains(tail)) {
+            return format!("no unit{} has flown; {}", selection(ask), self.searched());
+        }
+        let tails: BTreeSet<&str> = installations.iter().map(|stay| stay.tail_number.as_str()).collect();
+        let table = if tails.contains(tail.as_str()) {
+            format!("the installations table has none{} now", selection(ask))
+        } else {
+            let near = nearest(tail, tails).map(|near| format!(" (nearest: {near})")).unwrap_or_default();
+            format!("the installations table does not know tail {tail}{near}")
+        };
+        format!("{table}; list the flights there with `freeplay query tail {tail}`")
+    }
+
     /// What was searched, as text: the departures in the store.
-    pub(crate) fn searched(&self) -> String {
+    fn searched(&self) -> String {
         let range = match self {
             Self::Store(store, _) => store
                 .as_ref()

@@ -13,9 +13,7 @@ use crate::progress::Progress;
 use crate::row_output;
 use crate::table::count;
 
-use crate::commands::context::{
-    KnownNames, VERSION, display_path, load_with_installations, note_future, selection,
-};
+use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, note_future};
 
 /// Writes the pages and prints the path of the first one.
 ///
@@ -33,7 +31,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     if report.units.is_empty() {
         let known = KnownNames::of(&config);
         known.check_units(&args.units)?;
-        let what = format!("no unit{} has flown; {}", selection(&ask), known.searched());
+        let what = known.why_nothing(&ask);
         let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
         return Err(Failure::usage("nothing_to_report", what, hint));
     }

@@ -19,7 +19,7 @@ use crate::row_output;
 use crate::sparkline::{SCALE, sparkline};
 use crate::table::{self, count, number, or_dash, state_mark, text, unit_name};
 
-use crate::commands::context::{KnownNames, load_trend_context, note_future, selection};
+use crate::commands::context::{KnownNames, load_trend_context, note_future};
 
 /// Prints one row per unit, or per query.
 ///
@@ -65,7 +65,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             None => KnownNames::of(&config),
         };
         known.check_units(&args.units)?;
-        nothing = format!("no unit{} has flown; {}\n", selection(&ask), known.searched());
+        nothing = known.why_nothing(&ask) + "\n";
     }
     let shows_all = args.all || args.queries.is_some() || args.units.serial.is_some();
     row_output::write_rows(
