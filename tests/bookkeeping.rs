@@ -330,7 +330,7 @@ fn records_are_taken_out_and_come_back() {
     assert_eq!(nothing.code, Some(2));
     assert!(nothing.err.contains("nothing_selected"), "{nothing:?}");
     let told = fleet.run_ok(&["store", "forget", "--tail", "N414FP"]);
-    assert!(told.contains("took out 40 records") && told.contains("--undo"), "{told}");
+    assert!(told.contains("took out 40 records (10 flights of 1 tail)") && told.contains("--undo"), "{told}");
     assert_eq!((records_with(&fleet, "N414FP"), trend(&fleet).contains_key("1040-0013")), (0, false));
     // Neither a run nor a compaction brings them back; an unchanged log is not read again.
     fleet.run_ok(&["run"]);

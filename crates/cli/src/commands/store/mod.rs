@@ -3,6 +3,7 @@
 mod alerts;
 mod runs;
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -202,6 +203,13 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
         let hint = "give `--flight`, `--log`, `--tail`, `--position`, `--since` or `--until`";
         return Err(Failure::usage("nothing_selected", "no record is selected", hint));
     }
+    // Counted before: a flight number may fly every day, on several tails.
+    let mut selected = store.records(&query)?;
+    selected.retain(|record| args.log.as_ref().is_none_or(|log| *log == record.provenance.log_path));
+    let flights: BTreeSet<_> =
+        selected.iter().map(|record| (&record.flight.tail_number, record.flight.departure_utc)).collect();
+    let tails: BTreeSet<_> = flights.iter().map(|(tail, _)| tail).collect();
+    let scope = format!("{} of {}", count(flights.len(), "flight"), count(tails.len(), "tail"));
     let changed =
         store.lock(&Holder::this_process(), None)?.withdraw(&query, args.log.as_deref(), args.undo)?;
     let records = count(changed, "record");
@@ -209,7 +217,7 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
         (0, _) => "no stored record matches\n".to_owned(),
         (_, true) => format!("brought back {records}\n  next  `freeplay run` assesses the fleet with them\n"),
         (_, false) => format!(
-            "took out {records}; nothing is deleted, the same command with `--undo` brings them back\n  \
+            "took out {records} ({scope}); nothing is deleted, the same command with `--undo` brings them back\n  \
              next  `freeplay run` assesses the fleet without them; with `--retry` it also stores another log of these flights\n"
         ),
     })?;
