@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use arrow::array::{
-    ArrayRef, AsArray, BooleanArray, RecordBatch, Scalar, StringArray, TimestampMicrosecondArray,
+    Array, ArrayRef, AsArray, BooleanArray, RecordBatch, Scalar, StringArray, TimestampMicrosecondArray,
     new_null_array,
 };
 use arrow::compute::kernels::cmp::{gt, gt_eq, lt, lt_eq};
@@ -204,7 +204,9 @@ fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch
         Some(column) => cast(column, field.data_type()),
         None => Ok(new_null_array(field.data_type(), batch.num_rows())),
     };
-    let columns = schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
+    let mut columns = schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
+    // The reader takes memory for a whole batch, of which a condition may leave a few rows.
+    columns.iter_mut().for_each(Array::shrink_to_fit);
     RecordBatch::try_new(Arc::clone(schema), columns)
 }
 
@@ -243,7 +245,7 @@ fn dictionary() -> DataType {
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{Array, Float64Array, LargeStringArray, TimestampNanosecondArray};
+    use arrow::array::{Float64Array, LargeStringArray, TimestampNanosecondArray};
     use parquet::arrow::ArrowWriter;
     use parquet::file::properties::WriterProperties;
     use records::GapRecord;
