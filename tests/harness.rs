@@ -10,7 +10,7 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 
 /// Prints a measurement past the test runner, which captures what tests print.
 pub(crate) fn print_line(line: &str) {

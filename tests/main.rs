@@ -7,6 +7,7 @@ mod cli_output;
 mod docs;
 mod follow_up;
 mod fuzz;
+mod gate;
 mod harness;
 mod hostile;
 mod logs;

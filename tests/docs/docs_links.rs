@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 
 use regex::Regex;
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::top;
 use crate::markdown::{Page, all};
 

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{copy, top};
 
 #[test]

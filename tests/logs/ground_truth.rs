@@ -1,6 +1,6 @@
 //! The sample fleet against its truth, and one worker against several.
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{Table, TestFleet, print_line};
 
 #[test]

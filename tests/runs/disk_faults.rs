@@ -5,7 +5,7 @@
 //! was not synced is still in the kernel's memory and not in the image, and mounting the copy replays its
 //! journal.
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{TestFleet, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records, seed};
 use crate::runs::interruption::{small, whole_flights};

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
 use crate::runs::interruption::{small, whole_flights};
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{TestFleet, facts, print_line, rewrite};
 use crate::runs::injected_faults::Injector;
 use crate::runs::interruption::whole_flights;

@@ -1,13 +1,13 @@
 //! Worker pool with a time limit for each log, so that one log cannot block the end of a run.
 //!
 //! No thread can be ended from outside. A log that takes longer than `run.log_timeout_s` is therefore reported as an
-//! error and its workers are abandoned: they end with the process. New workers take the remaining logs, and the other
-//! logs of the abandoned workers: a worker that waits for the actuators of its log processes those of other logs
-//! meanwhile, so the log with a step in progress is the late one, and the logs without one wait for it.
+//! error, and the threads of its pool are abandoned: they go on at the lowest priority until the process ends. A new
+//! pool takes the remaining logs, and the other logs of the abandoned pool: a worker that waits for the actuators of
+//! its log processes those of other logs meanwhile, so the log with a step in progress is the late one, and the logs
+//! without one wait for it.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -27,37 +27,30 @@ const TURN: Duration = Duration::from_millis(100);
 /// Time for logs in progress to finish after an interrupt: a signal is answered within two seconds.
 const STOP_GRACE: Duration = Duration::from_millis(1500);
 
-/// Abandoned workers still use processor time: a run in which more logs than this pass their limit ends.
-const MAX_ABANDONED: usize = 16;
+/// Pools abandoned in a row, without a finished log between, after which a run ends: their disk or share is gone.
+const MAX_ABANDONED_IN_A_ROW: usize = 16;
+
+/// Logs that pass their limit in one run at most: what their threads hold is free only when the process ends.
+const MAX_LATE: usize = 256;
 
 /// What does one log, by its index in the plan.
 pub(crate) type ProcessLog = dyn Fn(usize, &MemoryBudget, &StepCount) -> LogOutcomeData + Send + Sync;
 
 /// How many steps of a log (its opening, an actuator) threads are at just now.
 #[derive(Debug, Default)]
-pub(crate) struct StepCount(AtomicUsize);
-
-/// A step in progress until it is dropped.
-pub(crate) struct StepGuard<'a>(&'a StepCount);
+pub(crate) struct StepCount(Arc<()>);
 
 impl StepCount {
-    pub(crate) fn begin(&self) -> StepGuard<'_> {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        StepGuard(self)
-    }
-}
-
-impl Drop for StepGuard<'_> {
-    fn drop(&mut self) {
-        self.0.0.fetch_sub(1, Ordering::Relaxed);
+    /// Begins a step, which is in progress until the returned value is dropped.
+    pub(crate) fn begin(&self) -> Arc<()> {
+        Arc::clone(&self.0)
     }
 }
 
 /// What a worker reports; the order of one worker's messages is kept.
 enum Message {
-    Started { log: usize, generation: usize, at: Instant },
+    Started { log: usize, at: Instant },
     Finished { log: usize, outcome: Box<LogOutcomeData> },
-    Ended { generation: usize },
 }
 
 /// What comes next.
@@ -70,75 +63,90 @@ pub(crate) enum Next {
     End,
 }
 
-/// What all workers share; owned, since an abandoned worker outlives the run.
+/// What the threads of a pool share; owned, since an abandoned pool outlives the run.
 struct Shared {
-    process_log: Box<ProcessLog>,
+    process_log: Arc<ProcessLog>,
     steps: Vec<StepCount>,
-    /// Logs that no worker has taken: those that never failed, and the others.
-    rest: Mutex<[Range<usize>; 2]>,
-    /// Whether a log passed its limit: the smallest logs come first then, as the least likely to do so.
-    has_late: AtomicBool,
-    /// Logs to be done again, since their worker may wait for an abandoned one.
-    again: Mutex<VecDeque<usize>>,
-    is_stopped: AtomicBool,
-    /// Workers of an earlier generation take no log.
-    generation: AtomicUsize,
+    /// Logs that no worker has taken.
+    rest: Mutex<VecDeque<usize>>,
+    budget: MemoryBudget,
+    /// Identifiers of the pool's threads where the operating system has a priority for each.
+    threads: Mutex<Vec<i32>>,
 }
 
 impl Shared {
-    fn take(&self, generation: usize) -> Option<usize> {
-        if self.is_stopped.load(Ordering::Relaxed) || self.generation.load(Ordering::Relaxed) != generation {
-            return None;
-        }
-        let again = self.again.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-        again.or_else(|| {
-            let mut rest = self.rest.lock().unwrap_or_else(PoisonError::into_inner);
-            let [sound, failed] = &mut *rest;
-            let is_late = self.has_late.load(Ordering::Relaxed);
-            if is_late { sound.next_back() } else { sound.next() }.or_else(|| failed.next())
-        })
+    /// Takes the logs that no worker has begun: the workers end after those in progress.
+    fn stop(&self) -> VecDeque<usize> {
+        std::mem::take(&mut *self.rest.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// One worker: one log at a time, in the threads that all workers share for actuators. A thread that waits for an
     /// actuator may take a log of another worker meanwhile, but never that worker's loop.
-    fn worker_loop(
-        &self,
-        generation: usize,
-        actuators: &rayon::ThreadPool,
-        budget: &MemoryBudget,
-        done: &Sender<Message>,
-    ) {
-        let _ended = EndMessage { generation, done };
-        while let Some(log) = self.take(generation) {
-            let started = Message::Started { log, generation, at: Instant::now() };
-            if done.send(started).is_err() {
+    fn worker_loop(&self, actuators: &rayon::ThreadPool, done: &Sender<Message>) {
+        let take = || self.rest.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        while let Some(log) = take() {
+            if done.send(Message::Started { log, at: Instant::now() }).is_err() {
                 return;
             }
-            let outcome = actuators.install(|| Box::new((self.process_log)(log, budget, &self.steps[log])));
+            let outcome =
+                actuators.install(|| Box::new((self.process_log)(log, &self.budget, &self.steps[log])));
             if done.send(Message::Finished { log, outcome }).is_err() {
                 return;
             }
         }
     }
-}
 
-/// Reports the end of a worker, also by a panic.
-struct EndMessage<'a> {
-    generation: usize,
-    done: &'a Sender<Message>,
-}
+    fn register_thread(&self) {
+        let id = std::fs::read_link("/proc/thread-self").ok();
+        let id = id.and_then(|path| path.file_name()?.to_str()?.parse::<i32>().ok());
+        self.threads.lock().unwrap_or_else(PoisonError::into_inner).extend(id);
+    }
 
-impl Drop for EndMessage<'_> {
-    fn drop(&mut self) {
-        // The run may be over already.
-        let _ = self.done.send(Message::Ended { generation: self.generation });
+    /// Leaves the processor to the threads of other pools.
+    fn lower_priority(&self) {
+        for thread in self.threads.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            // A thread that has ended has none.
+            #[cfg(unix)]
+            let _ = rustix::process::setpriority_process(rustix::process::Pid::from_raw(*thread), 19);
+        }
     }
 }
 
-/// A log in progress.
-struct InProgress {
-    since: Instant,
-    generation: usize,
+/// Workers with threads and a memory budget of their own.
+struct Workers {
+    shared: Arc<Shared>,
+    /// Closed when every worker has ended.
+    messages: Receiver<Message>,
+}
+
+impl Workers {
+    fn start(
+        settings: &PoolSettings<'_>,
+        process_log: &Arc<ProcessLog>,
+        rest: VecDeque<usize>,
+    ) -> Result<Self, Error> {
+        let shared = Arc::new(Shared {
+            process_log: Arc::clone(process_log),
+            steps: settings.plan.work.iter().map(|_| StepCount::default()).collect(),
+            rest: Mutex::new(rest),
+            budget: MemoryBudget::new(settings.memory_mib),
+            threads: Mutex::default(),
+        });
+        let of_threads = Arc::clone(&shared);
+        let actuators = rayon::ThreadPoolBuilder::new()
+            .num_threads(settings.workers)
+            .start_handler(move |_| of_threads.register_thread())
+            .build()?;
+        let actuators = Arc::new(actuators);
+        let (sender, messages) = channel();
+        for _ in 0..settings.workers {
+            let (shared, actuators, sender) = (Arc::clone(&shared), Arc::clone(&actuators), sender.clone());
+            std::thread::Builder::new()
+                .spawn(move || shared.worker_loop(&actuators, &sender))
+                .map_err(Error::Thread)?;
+        }
+        Ok(Self { shared, messages })
+    }
 }
 
 /// What the workers of a run are started for.
@@ -157,13 +165,15 @@ pub(crate) struct PoolSettings<'a> {
 /// The workers of a run, seen from the thread that writes.
 pub(crate) struct WorkerPool<'a> {
     settings: PoolSettings<'a>,
-    shared: Arc<Shared>,
-    messages: (Sender<Message>, Receiver<Message>),
-    in_progress: BTreeMap<usize, InProgress>,
-    /// Workers of the current generation that have not ended.
-    running: usize,
+    process_log: Arc<ProcessLog>,
+    workers: Workers,
+    /// Logs in progress, and since when.
+    in_progress: BTreeMap<usize, Instant>,
+    /// Logs that passed their limit and are not reported yet.
+    late: Vec<usize>,
     is_finished: Vec<bool>,
-    abandoned: usize,
+    late_logs: usize,
+    abandoned_in_a_row: usize,
     stop_seen: Option<Instant>,
 }
 
@@ -174,45 +184,19 @@ impl<'a> WorkerPool<'a> {
     /// When threads cannot be started.
     pub(crate) fn start(settings: PoolSettings<'a>, process_log: Box<ProcessLog>) -> Result<Self, Error> {
         let logs = settings.plan.work.len();
-        let sound = settings.plan.work.partition_point(|work| !work.failed_before());
-        let shared = Shared {
-            process_log,
-            steps: (0..logs).map(|_| StepCount::default()).collect(),
-            rest: Mutex::new([0..sound, sound..logs]),
-            has_late: AtomicBool::new(false),
-            again: Mutex::default(),
-            is_stopped: AtomicBool::new(false),
-            generation: AtomicUsize::new(0),
-        };
-        let mut pool = Self {
+        let process_log: Arc<ProcessLog> = Arc::from(process_log);
+        let workers = Workers::start(&settings, &process_log, (0..logs).collect())?;
+        Ok(Self {
             settings,
-            shared: Arc::new(shared),
-            messages: channel(),
+            process_log,
+            workers,
             in_progress: BTreeMap::new(),
-            running: 0,
+            late: Vec::new(),
             is_finished: vec![false; logs],
-            abandoned: 0,
+            late_logs: 0,
+            abandoned_in_a_row: 0,
             stop_seen: None,
-        };
-        pool.start_generation()?;
-        Ok(pool)
-    }
-
-    /// Workers with threads and a memory budget of their own.
-    fn start_generation(&mut self) -> Result<(), Error> {
-        let workers = self.settings.workers;
-        let actuators = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(workers).build()?);
-        let budget = Arc::new(MemoryBudget::new(self.settings.memory_mib));
-        let generation = self.shared.generation.load(Ordering::Relaxed);
-        self.running = workers;
-        for _ in 0..workers {
-            let (shared, sender) = (Arc::clone(&self.shared), self.messages.0.clone());
-            let (actuators, budget) = (Arc::clone(&actuators), Arc::clone(&budget));
-            std::thread::Builder::new()
-                .spawn(move || shared.worker_loop(generation, &actuators, &budget, &sender))
-                .map_err(Error::Thread)?;
-        }
-        Ok(())
+        })
     }
 
     /// Waits for what comes of the next log, until a deadline if there is one.
@@ -221,35 +205,35 @@ impl<'a> WorkerPool<'a> {
     /// When abandoned workers cannot be replaced.
     pub(crate) fn next(&mut self, until: Option<Instant>) -> Result<Next, Error> {
         loop {
+            if let Some(log) = self.late.pop() {
+                let work = &self.settings.plan.work[log];
+                let limit_s = self.settings.limit.as_secs_f64();
+                let outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s), limit_s);
+                return Ok(self.finished(log, Box::new(outcome)));
+            }
             let now = Instant::now();
             if self.settings.stop.load(Ordering::Relaxed) {
-                self.shared.is_stopped.store(true, Ordering::Relaxed);
-                self.stop_seen.get_or_insert(now);
-            }
-            if self.running == 0 && self.in_progress.is_empty() {
-                return Ok(Next::End);
+                self.stop();
             }
             let turn = until.map_or(TURN, |until| until.saturating_duration_since(now).min(TURN));
-            match self.messages.1.recv_timeout(turn) {
-                Ok(Message::Started { log, generation, at }) => self.started(log, generation, at),
+            match self.workers.messages.recv_timeout(turn) {
+                Ok(Message::Started { log, at }) => {
+                    self.in_progress.insert(log, at);
+                    let log = self.settings.plan.work[log].log_path.clone();
+                    (self.settings.watch)(Event::Started { log });
+                }
                 Ok(Message::Finished { log, outcome }) => {
-                    // Of a log that was done twice, or abandoned, only the first outcome counts.
                     if self.in_progress.remove(&log).is_some() {
+                        self.abandoned_in_a_row = 0;
                         return Ok(self.finished(log, outcome));
                     }
                 }
-                Ok(Message::Ended { generation }) => {
-                    let is_current = generation == self.shared.generation.load(Ordering::Relaxed);
-                    self.running -= usize::from(is_current);
-                }
-                // `self` holds a sender, so the channel is never closed.
-                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                Err(RecvTimeoutError::Disconnected) => return Ok(Next::End),
+                Err(RecvTimeoutError::Timeout) => {
                     if self.stop_seen.is_some_and(|seen| seen.elapsed() > STOP_GRACE) {
                         return Ok(Next::End);
                     }
-                    if let Some(log) = self.overdue() {
-                        return self.abandon(log);
-                    }
+                    self.abandon_late()?;
                     if until.is_some_and(|until| until <= Instant::now()) {
                         return Ok(Next::Nothing);
                     }
@@ -258,13 +242,10 @@ impl<'a> WorkerPool<'a> {
         }
     }
 
-    fn started(&mut self, log: usize, generation: usize, since: Instant) {
-        if self.is_finished[log] {
-            return;
-        }
-        if self.in_progress.insert(log, InProgress { since, generation }).is_none() {
-            (self.settings.watch)(Event::Started { log: self.settings.plan.work[log].log_path.clone() });
-        }
+    /// Begins no further log.
+    fn stop(&mut self) {
+        self.stop_seen.get_or_insert_with(Instant::now);
+        self.workers.shared.stop();
     }
 
     fn finished(&mut self, log: usize, outcome: Box<LogOutcomeData>) -> Next {
@@ -273,39 +254,42 @@ impl<'a> WorkerPool<'a> {
         Next::Log(outcome)
     }
 
-    /// A log that has passed its limit; searched when all messages are read. One that only waits for another log
-    /// is late when it has waited twice as long.
-    fn overdue(&self) -> Option<usize> {
-        let is_late = |(log, held): &(&usize, &InProgress)| {
-            let is_at_work = self.shared.steps[**log].0.load(Ordering::Relaxed) > 0;
-            held.since.elapsed() > self.settings.limit.saturating_mul(if is_at_work { 1 } else { 2 })
+    /// Looks for logs that have passed their limit, when all messages are read, and replaces their workers. A log that
+    /// only waits for another log is late when it has waited twice as long.
+    fn abandon_late(&mut self) -> Result<(), Error> {
+        let limit = self.settings.limit;
+        let over = |log: usize, since: Instant| {
+            let is_at_work = Arc::strong_count(&self.workers.shared.steps[log].0) > 1;
+            since.elapsed().checked_sub(limit.saturating_mul(if is_at_work { 1 } else { 2 }))
         };
-        self.in_progress.iter().find(is_late).map(|(log, _)| *log)
-    }
-
-    /// Reports a log as an error and replaces the workers of its generation.
-    fn abandon(&mut self, log: usize) -> Result<Next, Error> {
-        let late = self.in_progress.remove(&log);
-        self.abandoned += 1;
-        self.shared.has_late.store(true, Ordering::Relaxed);
-        let current = self.shared.generation.load(Ordering::Relaxed);
-        if self.abandoned >= MAX_ABANDONED {
-            self.shared.is_stopped.store(true, Ordering::Relaxed);
-            self.stop_seen.get_or_insert_with(Instant::now);
-        } else if late.is_some_and(|late| late.generation == current) {
-            let mut again = self.shared.again.lock().unwrap_or_else(PoisonError::into_inner);
-            for (other, held) in self.in_progress.iter_mut().filter(|(_, held)| held.generation == current) {
-                again.push_back(*other);
-                *held = InProgress { since: Instant::now(), generation: current + 1 };
-            }
-            drop(again);
-            self.shared.generation.store(current + 1, Ordering::Relaxed);
-            self.start_generation()?;
+        let over: Vec<(usize, Duration)> =
+            self.in_progress.iter().filter_map(|(log, since)| Some((*log, over(*log, *since)?))).collect();
+        // Logs that began together are late together, within some turns.
+        let patience = (limit / 4).min(5 * TURN);
+        if over.iter().all(|(_, by)| *by < patience) {
+            return Ok(());
         }
-        let work = &self.settings.plan.work[log];
-        let diagnostic = log_timeout(&work.log_path, self.settings.limit.as_secs_f64());
-        let outcome = (self.settings.fail)(work, diagnostic, self.settings.limit.as_secs_f64());
-        Ok(self.finished(log, Box::new(outcome)))
+        self.late = over.into_iter().map(|(log, _)| log).collect();
+        self.late_logs += self.late.len();
+        self.abandoned_in_a_row += 1;
+        self.in_progress.retain(|log, _| !self.late.contains(log));
+        let rest = self.workers.shared.stop();
+        self.workers.shared.lower_priority();
+        if self.stop_seen.is_some()
+            || self.abandoned_in_a_row >= MAX_ABANDONED_IN_A_ROW
+            || self.late_logs >= MAX_LATE
+        {
+            self.stop();
+            return Ok(());
+        }
+        let mut rest: Vec<usize> = self.in_progress.keys().copied().chain(rest).collect();
+        // Logs that failed before stay last. The others are mixed by a multiplicative hash (Knuth 1998, section 6.4), so
+        // that logs of similar size, which may all be late, do not follow one another.
+        let mixed = |log: &usize| (*log as u32).wrapping_mul(0x9E37_79B9);
+        rest.sort_by_key(|log| (self.settings.plan.work[*log].failed_before(), mixed(log)));
+        self.in_progress.clear();
+        self.workers = Workers::start(&self.settings, &self.process_log, rest.into())?;
+        Ok(())
     }
 
     /// Logs without an outcome, by name.
@@ -318,7 +302,7 @@ impl<'a> WorkerPool<'a> {
 impl Drop for WorkerPool<'_> {
     /// A store that fails must not keep the workers reading.
     fn drop(&mut self) {
-        self.shared.is_stopped.store(true, Ordering::Relaxed);
+        self.workers.shared.stop();
     }
 }
 
@@ -329,10 +313,12 @@ mod tests {
     use crate::logs::plan::WorkReason;
     use crate::run::summary::not_reached;
 
-    /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run.
-    #[test]
-    fn no_log_waits_for_the_rest_of_the_run() {
-        const LOGS: usize = 60;
+    /// A run of as many logs by two workers with a time limit, and how many logs are finished and late.
+    fn run_pool(
+        logs: usize,
+        limit: Duration,
+        process: impl Fn(usize, &StepCount) + Send + Sync + 'static,
+    ) -> (usize, usize) {
         let work = |k: usize| WorkItem {
             files: ingest::LogFiles::one(format!("{k}.parquet")),
             fault: None,
@@ -341,37 +327,72 @@ mod tests {
             why: WorkReason::New,
             before: None,
         };
-        let plan = Plan { work: (0..LOGS).map(work).collect(), ..Plan::default() };
+        let plan = Plan { work: (0..logs).map(work).collect(), ..Plan::default() };
+        let outcome = |work: &WorkItem| LogOutcomeData::Same(Box::new(not_reached(work, "run")));
+        let accounts = plan.work.clone();
+        let process_log = move |log: usize, _: &MemoryBudget, steps: &StepCount| {
+            process(log, steps);
+            outcome(&accounts[log])
+        };
+        let late = std::cell::Cell::new(0);
+        let settings = PoolSettings {
+            plan: &plan,
+            workers: 2,
+            limit,
+            memory_mib: None,
+            stop: &AtomicBool::new(false),
+            watch: &|_| {},
+            fail: &|work, _, _| {
+                late.set(late.get() + 1);
+                outcome(work)
+            },
+        };
+        let mut pool = WorkerPool::start(settings, Box::new(process_log)).unwrap();
+        let mut outcomes = 0;
+        while let Next::Log(_) = pool.next(None).unwrap() {
+            outcomes += 1;
+        }
+        (outcomes - late.get(), late.get())
+    }
+
+    /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run.
+    #[test]
+    fn no_log_waits_for_the_rest_of_the_run() {
         for _ in 0..5 {
             let longest = Arc::new(Mutex::new(Duration::ZERO));
-            let (accounts, seen) = (plan.work.clone(), Arc::clone(&longest));
-            let process_log = move |log: usize, _: &MemoryBudget, _: &StepCount| {
+            let (seen, begun) = (Arc::clone(&longest), Instant::now());
+            let process = move |_, _: &StepCount| {
                 let begun = Instant::now();
                 let actuator = || std::thread::sleep(Duration::from_millis(2));
                 rayon::join(actuator, || rayon::join(actuator, actuator));
                 let mut longest = seen.lock().unwrap();
                 *longest = begun.elapsed().max(*longest);
-                LogOutcomeData::Same(Box::new(not_reached(&accounts[log], "run")))
             };
-            let fail = |_: &WorkItem, _: Diagnostic, _: f64| unreachable!("no log is late");
-            let settings = PoolSettings {
-                plan: &plan,
-                workers: 2,
-                limit: Duration::from_mins(1),
-                memory_mib: None,
-                stop: &AtomicBool::new(false),
-                watch: &|_| {},
-                fail: &fail,
-            };
-            let begun = Instant::now();
-            let mut pool = WorkerPool::start(settings, Box::new(process_log)).unwrap();
-            let mut done = 0;
-            while let Next::Log(_) = pool.next(None).unwrap() {
-                done += 1;
-            }
+            assert_eq!(run_pool(60, Duration::from_mins(1), process), (60, 0));
             let (longest, whole) = (*longest.lock().unwrap(), begun.elapsed());
-            assert_eq!(done, LOGS);
             assert!(4 * longest < whole, "a log took {longest:?} of {whole:?}");
         }
+    }
+
+    /// Every sound log of a run is finished beside 20 that never end and use their processor: the largest, the
+    /// smallest or some of both, and others of a share that is gone end the run.
+    #[test]
+    fn logs_that_never_end_keep_no_other_log_from_its_turn() {
+        let cases: [fn(usize) -> bool; 3] = [|log| log < 20, |log| log >= 30, |log| !(10..40).contains(&log)];
+        for is_endless in cases {
+            let process = move |log: usize, steps: &StepCount| {
+                let _step = steps.begin();
+                let begun = Instant::now();
+                while is_endless(log) && begun.elapsed() < Duration::from_secs(30) {}
+                std::thread::sleep(Duration::from_millis(5));
+            };
+            assert_eq!(run_pool(50, Duration::from_millis(200), process), (30, 20));
+        }
+        let (finished, late) = run_pool(100, Duration::from_millis(20), |_, _| {
+            loop {
+                std::thread::park();
+            }
+        });
+        assert!(finished == 0 && (16..=32).contains(&late), "{late} late");
     }
 }

@@ -63,7 +63,7 @@ fn assert_whole(records: &[GapRecord]) {
 fn a_writer_killed_at_any_instant_leaves_whole_flights_once_and_no_lock() {
     let dir = tempfile::tempdir().unwrap();
     let mut committed = 0;
-    for kill in 0..KILLS[usize::from(crate::fuzz::engine::is_gate())] {
+    for kill in 0..KILLS[usize::from(crate::gate::is_gate())] {
         let mut child = child(dir.path());
         // Spread over start, commit and compaction: the kill follows the child's next 0 to 40 files.
         let files = files_in(dir.path()) + (kill * 7_919) % 41;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use store::{Query, Store};
 
-use self::engine::{Input, Random, edit_text, fuzz, overwrite};
+use self::edits::{Choices, edit_text, overwrite};
 use crate::fixtures::{result, run, writer};
 
-#[path = "../../../../tests/fuzz/engine.rs"]
-pub(crate) mod engine;
+#[path = "../../../../tests/fuzz/edits.rs"]
+mod edits;
 
 /// A store of several commits, with a compaction behind it.
 fn grown(dir: &Path) -> Store {
@@ -68,49 +68,22 @@ fn fuzz_commit_files() {
         .collect();
     files.sort();
     let corpus: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
-    let name = |file: &PathBuf| file.strip_prefix(&whole).unwrap().to_owned();
-    let names: Vec<PathBuf> = files.iter().map(name).collect();
-    let others = corpus.clone();
-    // The number of the file goes before its bytes.
-    let numbered = corpus.iter().enumerate().map(|(number, bytes)| {
-        let mut numbered = vec![number as u8];
-        numbered.extend(bytes);
-        numbered
-    });
-    let change = |random: &mut Random, input: &mut Input| {
-        let number = input.bytes.remove(0);
-        if random.below(2) == 0 {
-            let length = input.bytes.len();
-            overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length)));
-        } else {
-            edit_text(random, &mut input.bytes, &others);
-        }
-        input.bytes.insert(0, number);
-    };
     let case = folder.path().join("case");
-    fuzz("commit files", numbered.collect(), 120, change, |bytes| {
+    bolero::check!().with_iterations(40).with_max_len(80).for_each(|input| {
+        let choices = &mut Choices(input);
+        let number = choices.below(files.len());
+        let (name, mut bytes) = (files[number].strip_prefix(&whole).unwrap(), corpus[number].clone());
+        if choices.below(2) == 0 {
+            let length = bytes.len();
+            overwrite(choices, &mut bytes, std::slice::from_ref(&(0..length)));
+        } else {
+            edit_text(choices, &mut bytes, &corpus);
+        }
         let _ = std::fs::remove_dir_all(&case);
         copy(&whole, &case);
-        std::fs::write(case.join(&names[usize::from(bytes[0])]), &bytes[1..]).unwrap();
-        let changed = match Store::open(&case) {
-            Ok(changed) => changed,
-            Err(e) => return e.diagnostic().code,
-        };
-        let (found, verified) = (rows(&changed), changed.verify());
-        match found {
-            Ok(found) if found == truth => format!("all rows, {} found by verify", verified.len()),
-            Ok(_) => {
-                assert!(
-                    !verified.is_empty(),
-                    "rows differ, and verify finds nothing in {}",
-                    names[usize::from(bytes[0])].display()
-                );
-                "other rows, found by verify".to_owned()
-            }
-            Err(e) => {
-                assert!(!verified.is_empty(), "{} is not found by verify", e.diagnostic().message);
-                e.diagnostic().code
-            }
-        }
+        std::fs::write(case.join(name), bytes).unwrap();
+        let Ok(changed) = Store::open(&case) else { return };
+        let is_whole = rows(&changed).is_ok_and(|found| found == truth);
+        assert!(is_whole || !changed.verify().is_empty(), "verify finds nothing in {}", name.display());
     });
 }

@@ -7,6 +7,8 @@ mod crash_recovery;
 mod fixtures;
 mod folder;
 mod fuzz;
+#[path = "../../../../tests/gate.rs"]
+mod gate;
 mod maintenance;
 mod queries;
 mod round_trip;

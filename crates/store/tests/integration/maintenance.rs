@@ -218,7 +218,7 @@ fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
     assert!(files.iter().any(|file| file.to_str().unwrap().contains("checkpoint.parquet")), "{files:?}");
     assert_eq!(writer.store().verify(), []);
     // One byte of each file, and four in the gate.
-    let tries = if crate::fuzz::engine::is_gate() { 4 } else { 1 };
+    let tries = if crate::gate::is_gate() { 4 } else { 1 };
     for (number, file) in files.into_iter().enumerate() {
         let whole = fs::read(&file).unwrap();
         let places = [10, whole.len() / 3, whole.len() / 2, whole.len() - 10];

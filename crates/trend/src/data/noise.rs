@@ -61,7 +61,8 @@ impl Noise {
         let typical = median(&mut known).unwrap_or(assumed.unstated);
         let error = |stated: &f64| {
             let error = if is_stated(stated) { stated.max(0.5 * typical) } else { typical };
-            error.clamp(assumed.least, assumed.largest)
+            // No panic where a limit that cannot be makes the least error the larger one.
+            error.min(assumed.largest).max(assumed.least)
         };
         let mut errors: Vec<f64> = stated.iter().map(error).collect();
         let factor = factor(values, &errors, assumed.differences);
