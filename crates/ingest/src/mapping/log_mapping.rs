@@ -26,6 +26,17 @@ pub struct Mapping {
     pub groups: BTreeMap<String, GroupMapping>,
 }
 
+impl Mapping {
+    /// Clock, layout and identity of the files of a group, or of the main logs.
+    pub(crate) fn of_group(&self, group: Option<&str>) -> (&ClockMapping, &Layout, &IdentityMapping) {
+        let main = (&self.clock, &self.layout, &self.identity);
+        group.and_then(|name| self.groups.get(name)).map_or(main, |group| {
+            let (clock, identity) = (group.clock.as_ref(), group.identity.as_ref());
+            (clock.unwrap_or(main.0), &group.layout, identity.unwrap_or(main.2))
+        })
+    }
+}
+
 /// How the rows of a log are laid out; by default a row holds one sample of every channel.
 #[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
