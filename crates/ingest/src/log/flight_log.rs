@@ -155,6 +155,8 @@ impl Log {
             return identity::read(&normalized.facts, &own, None).map_err(|f| self.main().error(f));
         }
         let mapping = &self.mapping.identity;
+        let known =
+            |facts: &IdentityFields, start| known(&identity::registered(facts, mapping, start), start);
         let fail = |fault| self.main().error(fault);
         let mut facts = facts(self.main(), mapping)?;
         let date =

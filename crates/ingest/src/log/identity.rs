@@ -182,6 +182,23 @@ pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, Stri
     folders.iter().filter_map(stated).filter(is_value).collect()
 }
 
+/// The facts, with the registration where a logger calls the aircraft otherwise. `start` is the departure where the facts
+/// hold none.
+pub(crate) fn registered(
+    facts: &IdentityFields,
+    mapping: &IdentityMapping,
+    start: Option<Timestamp>,
+) -> IdentityFields {
+    let mut facts = facts.clone();
+    let stated = facts.get(&IdentityField::DepartureUtc).and_then(|text| instant(text.trim(), mapping).ok());
+    let day = stated.or(start).map(|departure| TimeZone::UTC.to_datetime(departure).date());
+    if let Some(tail) = facts.get_mut(&IdentityField::TailNumber) {
+        let alias = mapping.tail_aliases.iter().find(|alias| alias.is_of(tail.trim(), day));
+        alias.into_iter().for_each(|alias| tail.clone_from(&alias.tail_number));
+    }
+    facts
+}
+
 /// Reads the facts; what the log leaves open comes from its absolute clock.
 ///
 /// # Errors
@@ -192,6 +209,7 @@ pub(crate) fn read(
     mapping: &IdentityMapping,
     clock_start: Option<Timestamp>,
 ) -> Result<Identity, ErrorKind> {
+    let facts = registered(facts, mapping, clock_start);
     let text = |fact: IdentityField| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
     let tail = text(IdentityField::TailNumber).ok_or_else(|| missing(IdentityField::TailNumber, mapping))?;
     let departure_utc = match text(IdentityField::DepartureUtc) {
@@ -318,6 +336,7 @@ pub(crate) fn local_to_utc(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mapping::TailAlias;
 
     fn mapping(format: Option<&str>, zone: Option<&str>) -> IdentityMapping {
         IdentityMapping {
@@ -378,6 +397,31 @@ mod tests {
             assert!(local_to_utc(start, &there).is_err());
         }
         assert_eq!(instant("2026-10-25T03:30:00", &there).unwrap().to_string(), "2026-10-25T02:30:00Z");
+    }
+
+    /// One logger that flew in two aircraft, one after the other.
+    #[test]
+    fn a_loggers_own_name_is_the_registration_of_its_day() {
+        let alias = |tail: &str, from: Option<&str>, until: Option<&str>| TailAlias {
+            logged: "QAR 7".into(),
+            tail_number: tail.into(),
+            from: from.map(|day| day.parse().unwrap()),
+            until: until.map(|day| day.parse().unwrap()),
+        };
+        let first = alias("N1", None, Some("2026-03-31"));
+        let tail_aliases = vec![first, alias("N2", Some("2026-04-01"), None)];
+        let m = IdentityMapping { tail_aliases, ..mapping(None, None) };
+        for (logged, day, tail) in
+            [("QAR 7", "2026-03-31", "N1"), (" QAR 7", "2026-04-01", "N2"), ("N3", "2026-04-01", "N3")]
+        {
+            let departure = format!("{day}T23:59:00Z");
+            let mut facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
+            let by_clock = read(&facts, &m, departure.parse().ok()).unwrap();
+            facts.insert(IdentityField::DepartureUtc, departure);
+            for found in [by_clock, read(&facts, &m, None).unwrap()] {
+                assert_eq!(found.tail_number.as_str(), tail, "{day}");
+            }
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::mapping::{RawValue, SampleFilter};
 use std::collections::BTreeMap;
 
+use jiff::civil::Date;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
@@ -95,11 +96,39 @@ pub struct IdentityMapping {
     /// Values for logs that do not hold them: field → value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
+    /// Registrations of aircraft that loggers call otherwise; the first that fits counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tail_aliases: Vec<TailAlias>,
     /// How departures are written, by `strftime` signs; ISO 8601 when not given.
     pub departure_format: Option<String>,
     /// The zone of departures that do not name one, e.g. `UTC` or `Europe/Istanbul`; without it such
     /// a departure is refused rather than guessed.
     pub time_zone: Option<String>,
+}
+
+/// `[[identity.tail_aliases]]`: the registration of an aircraft that a logger calls otherwise.
+#[skip_serializing_none]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TailAlias {
+    /// What the logs call the aircraft.
+    pub logged: String,
+    /// Its registration.
+    pub tail_number: String,
+    /// First day of departure, UTC, on which this holds, e.g. `"2026-03-01"`; any earlier one when not given.
+    #[schemars(with = "Option<String>")]
+    pub from: Option<Date>,
+    /// Last day of departure on which this holds; any later one when not given.
+    #[schemars(with = "Option<String>")]
+    pub until: Option<Date>,
+}
+
+impl TailAlias {
+    /// Whether this is the aircraft of a log; without a day of departure only where every day is.
+    pub(crate) fn is_of(&self, logged: &str, day: Option<Date>) -> bool {
+        let holds = |day| self.from.is_none_or(|from| from <= day) && self.until.is_none_or(|end| day <= end);
+        self.logged == logged && day.map_or(self.from.is_none() && self.until.is_none(), holds)
+    }
 }
 
 /// A fact about a flight that a log may state.
