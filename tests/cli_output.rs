@@ -493,6 +493,18 @@ fn a_proposal_from_logs_reads_them() {
     assert!(account.contains("120 estimated"), "{account}");
 }
 
+/// Torques in N·m and angles are of a part that turns.
+#[test]
+fn a_proposal_for_torques_has_a_rotary_part() {
+    let fleet = TestFleet::empty();
+    let spec = "tails = [\"N1\"]\nflights_per_tail = 1\n[profile]\nduration_s = 10.0\n[[parts]]\npart_number = \"EMA\"\nreference_radius_m = 0.1\n[[positions]]\nposition = \"rudder\"\npart_number = \"EMA\"\n";
+    std::fs::write(fleet.path("spec.toml"), spec).unwrap();
+    fleet.run_ok(&["simulate", "spec.toml", "--output", "a"]);
+    fleet.run_ok(&["init", "new-fleet", "--from", "a/logs"]);
+    let proposed = std::fs::read_to_string(fleet.path("new-fleet/pipeline.toml")).unwrap();
+    assert!(proposed.contains("kind = \"rotary\"") && proposed.contains("unit = \"N.m\""), "{proposed}");
+}
+
 /// Scripts read the first line; a report of a fault needs the rest.
 #[test]
 fn the_version_has_a_commit_and_features_below_the_line_that_scripts_read() {

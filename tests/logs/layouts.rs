@@ -654,4 +654,7 @@ fn check_summarises_many_logs() {
     assert!(text.contains("10 logs") && text.contains("1 tail") && text.contains(" Hz"), "{text}");
     let few = fleet.run_ok(&["check", "--limit", "2"]);
     assert!(few.contains("aileron_left_motor_deg") && few.contains("motor_position"), "{few}");
+    // Of three tails, one log each.
+    let tails = TestFleet::sample().freeplay(&["check", "--limit", "1"]);
+    assert!(tails.err.contains("checking 3 of 30 logs"), "{tails:?}");
 }

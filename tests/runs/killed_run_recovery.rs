@@ -116,5 +116,8 @@ fn the_logs_of_a_run_are_reported_by_class_and_reason() {
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1), "the broken log is still in error");
     let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
     assert!(page.contains("1 log (known 1)"), "{page}");
+    fleet.freeplay(&["run"]);
+    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
+    assert!(page.ends_with("no log was new or changed\n"), "{page}");
     assert_eq!(fleet.freeplay(&["store", "runs", "--run", "never"]).code, Some(2));
 }

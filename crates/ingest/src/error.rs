@@ -158,6 +158,12 @@ pub enum ErrorKind {
     Table { row: Option<u64>, column: Option<String>, detail: String },
 }
 
+impl From<io::Error> for ErrorKind {
+    fn from(source: io::Error) -> Self {
+        Self::Unreadable { source }
+    }
+}
+
 impl From<Excess> for ErrorKind {
     fn from(excess: Excess) -> Self {
         Self::BeyondLimit(excess)

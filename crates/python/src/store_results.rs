@@ -168,7 +168,7 @@ pub(crate) fn report(
         })
         .map_err(|error| to_run_exception(py, error))?;
     if composed.units.is_empty() {
-        let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
+        let hint = "list all units of the store with `freeplay trend`; fill it with `freeplay run`";
         let what = "no selected unit has flown";
         return Err(config_error(py, Diagnostic::new("nothing_to_report", what).hint(hint)));
     }

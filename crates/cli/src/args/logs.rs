@@ -26,7 +26,7 @@ pub(crate) struct InitArgs {
 pub(crate) struct CheckArgs {
     /// Logs to read; default: those of the configuration.
     pub logs: Vec<PathBuf>,
-    /// Check at most N logs.
+    /// Check N logs, and at least one of each tail.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub limit: usize,
     #[command(flatten)]

@@ -134,7 +134,7 @@ impl KnownNames {
             what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
         let hint = match nearest(name, known.iter().map(String::as_str)) {
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
-            None => "list the contents of the store with `freeplay store info`".to_owned(),
+            None => "list all units of the store with `freeplay trend`".to_owned(),
         };
         Err(Failure::usage(
             "unknown_name",

@@ -77,7 +77,7 @@ impl Rejection {
                 "exchange `column` of `[channel.motor_position]` and `[channel.screw_position]`, or reverse both signs"
             }
             Self::PositionRatio => {
-                "check `lead_m_per_rev` of the part, and unit and sign of the positions: screw against motor must have \
+                "check `lead_m_per_rev` of the part (of a rotary one `gear_ratio` of the channel), and unit and sign of the positions: screw against motor must have \
                  slope 1 (`freeplay check` shows it)"
             }
         }

@@ -23,57 +23,40 @@ fn words(name: &str) -> Vec<(usize, &str)> {
     found
 }
 
-const TIMES: [&str; 14] = [
-    "time",
-    "t",
-    "timestamp",
-    "stamp",
-    "elapsed",
-    "tick",
-    "ticks",
-    "clock",
-    "utc",
-    "epoch",
-    "unix",
-    "gmt",
-    "zulu",
-    "tod",
-];
+/// Where a word stands in a list of words.
+pub(super) fn place_in(list: &str, word: &str) -> Option<usize> {
+    list.split(' ').position(|known| known == word)
+}
+
+fn has_word_of(name: &str, list: &str) -> bool {
+    words(name).iter().any(|(_, word)| place_in(list, &word.to_lowercase()).is_some())
+}
 
 pub(super) fn is_time(name: &str) -> bool {
-    words(name).iter().any(|(_, word)| TIMES.contains(&word.to_lowercase().as_str()))
+    has_word_of(name, "time t timestamp stamp elapsed tick ticks clock utc epoch unix gmt zulu tod")
 }
-
-pub(super) fn time_unit(name: &str) -> Option<&'static str> {
-    let units = [
-        ("s", "s"),
-        ("sec", "s"),
-        ("seconds", "s"),
-        ("ms", "ms"),
-        ("us", "us"),
-        ("ns", "ns"),
-        ("min", "min"),
-        ("h", "h"),
-        ("hours", "h"),
-    ];
-    let word = words(name).last()?.1.to_lowercase();
-    units.iter().find(|(said, _)| *said == word).map(|(_, unit)| *unit)
-}
-
-const ROLES: [(Role, &[&str]); 4] = [
-    (Role::Motor, &["motor", "mot", "mtr", "resolver", "rotor", "input", "drive"]),
-    (Role::Screw, &["screw", "nut", "ram", "lvdt", "output", "stroke", "rod", "joint"]),
-    (Role::Load, &["load", "force", "frc", "torque", "trq", "loadcell"]),
-    (Role::Temperature, &["temp", "temperature"]),
-];
-
-/// Words without information.
-const FILLERS: [&str; 8] = ["position", "pos", "angle", "displacement", "cell", "sensor", "meas", "value"];
 
 /// Whether a time of this name counts from midnight, if its values do not contradict.
 pub(super) fn is_of_day(name: &str) -> bool {
-    words(name).iter().any(|(_, word)| ["gmt", "utc", "zulu", "tod"].contains(&word.to_lowercase().as_str()))
+    has_word_of(name, "gmt utc zulu tod")
 }
+
+/// The unit of a time that ends its name.
+pub(super) fn time_unit(name: &str) -> Option<&'static str> {
+    let word = words(name).last()?.1.to_lowercase();
+    let units = ["s sec seconds", "ms", "us", "ns", "min", "h hours"];
+    units.iter().find(|list| place_in(list, &word).is_some())?.split(' ').next()
+}
+
+const ROLES: [(Role, &str); 4] = [
+    (Role::Motor, "motor mot mtr resolver rotor input drive"),
+    (Role::Screw, "screw nut ram lvdt output stroke rod joint"),
+    (Role::Load, "load force frc torque trq loadcell"),
+    (Role::Temperature, "temp temperature"),
+];
+
+/// Words without information.
+const FILLERS: &str = "position pos angle displacement cell sensor meas value";
 
 /// The unit that a word in small letters is.
 fn unit_of(word: &str) -> Option<Unit> {
@@ -95,14 +78,10 @@ pub(super) fn is_unit(text: &str) -> bool {
 }
 
 /// Words of quantities that are no position, load or temperature.
-const OTHERS: [&str; 16] = [
-    "current", "speed", "velocity", "voltage", "cmd", "command", "demand", "power", "status", "valid", "ssm",
-    "mode", "target", "setpoint", "error", "fault",
-];
+const OTHERS: &str = "current speed velocity voltage cmd command demand power status valid ssm mode target setpoint error fault";
 
 /// Words that distinguish redundant sensors of one quantity, best first.
-const SENSORS: [&str; 12] =
-    ["a", "primary", "main", "1", "cha", "ch1", "b", "secondary", "backup", "2", "chb", "ch2"];
+const SENSORS: &str = "a primary main 1 cha ch1 b secondary backup 2 chb ch2";
 
 /// One column, understood.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,11 +99,11 @@ impl ParsedName {
     pub(super) fn of(name: &str, has_sensors: bool) -> Option<Self> {
         let words: Vec<(usize, &str, String)> =
             words(name).into_iter().map(|(at, word)| (at, word, word.to_lowercase())).collect();
-        let says = |known: &[&str], word: &str| known.contains(&word);
-        if words.iter().any(|(_, _, word)| says(&OTHERS, word)) {
+        let says = |known: &str, word: &str| place_in(known, word).is_some();
+        if words.iter().any(|(_, _, word)| says(OTHERS, word)) {
             return None;
         }
-        let named = |(role, known): &(Role, &[&str])| {
+        let named = |(role, known): &(Role, &str)| {
             Some((words.iter().position(|(_, _, word)| says(known, word))?, *role))
         };
         let named: Vec<(usize, Role)> = ROLES.iter().filter_map(named).collect();
@@ -147,13 +126,13 @@ impl ParsedName {
         };
         // A unit ends a name, or follows the channel.
         let unit_at = |i: usize| Some((i, unit_of(&words[i].2).filter(fits)?));
-        let follower = (at + 1..words.len()).find(|i| !says(&FILLERS, &words[*i].2));
+        let follower = (at + 1..words.len()).find(|i| !says(FILLERS, &words[*i].2));
         let last = Some(words.len() - 1).filter(|last| *last != at);
         let found = last.and_then(unit_at).or_else(|| follower.and_then(unit_at));
         let unit = found.map(|(_, unit)| unit);
         let is_unit = |i: usize| found.is_some_and(|(at, _)| at == i);
-        let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(&SENSORS, &words[*i].2));
-        let sensor = tag.and_then(|i| SENSORS.iter().position(|word| *word == words[i].2));
+        let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(SENSORS, &words[*i].2));
+        let sensor = tag.and_then(|i| place_in(SENSORS, &words[i].2));
         // `RAM_LOAD` and `MTR_RESOLVER`: two words for one channel.
         let is_of_channel = |i: usize| {
             ROLES.iter().any(|(of, known)| {
@@ -161,7 +140,7 @@ impl ParsedName {
             })
         };
         let is_place = |i: &usize| {
-            *i != at && !is_unit(*i) && tag != Some(*i) && !says(&FILLERS, &words[*i].2) && !is_of_channel(*i)
+            *i != at && !is_unit(*i) && tag != Some(*i) && !says(FILLERS, &words[*i].2) && !is_of_channel(*i)
         };
         let place: Vec<usize> = (0..words.len()).filter(is_place).collect();
         let run = place.windows(2).all(|w| w[1] == w[0] + 1);
@@ -179,59 +158,30 @@ impl ParsedName {
 mod tests {
     use super::*;
 
-    fn inferred(name: &str) -> Option<(Role, String, Option<String>, Option<Unit>)> {
-        ParsedName::of(name, true).map(|g| (g.role, g.pattern, g.position, g.unit))
+    /// Role, pattern, position and unit of a name.
+    fn inferred(name: &str) -> Option<String> {
+        let ParsedName { role, pattern, position, unit, .. } = ParsedName::of(name, true)?;
+        let (position, unit) = (position.unwrap_or("-".into()), unit.map_or("-", Unit::as_str));
+        Some([role.as_str(), &pattern, &position, unit].join("; "))
     }
 
     #[test]
     fn names_of_several_houses_are_understood() {
-        let place = |text: &str| Some(text.to_owned());
-        let cases = [
-            (
-                "aileron_left_motor_deg",
-                Role::Motor,
-                "{position}_motor_deg",
-                place("aileron_left"),
-                Some(Unit::Degree),
-            ),
-            (
-                "AIL_L.SCREW_POS.mm",
-                Role::Screw,
-                "{position}.SCREW_POS.mm",
-                place("AIL_L"),
-                Some(Unit::Millimetre),
-            ),
-            ("loadElevatorRight", Role::Load, "load{position}", place("ElevatorRight"), None),
-            ("ELV_L.MOT_POS_RAD", Role::Motor, "{position}.MOT_POS_RAD", place("ELV_L"), Some(Unit::Radian)),
-            ("load_n", Role::Load, "load_n", None, Some(Unit::Newton)),
-            (
-                "motor_pos_deg_rudder",
-                Role::Motor,
-                "motor_pos_deg_{position}",
-                place("rudder"),
-                Some(Unit::Degree),
-            ),
-            ("rudder/screw_position", Role::Screw, "{position}/screw_position", place("rudder"), None),
-            (
-                "AIL_L_MTR_RESOLVER_DEG",
-                Role::Motor,
-                "{position}_MTR_RESOLVER_DEG",
-                place("AIL_L"),
-                Some(Unit::Degree),
-            ),
-            ("ELEV_R_FORCE_LBF", Role::Load, "{position}_FORCE_LBF", place("ELEV_R"), Some(Unit::PoundForce)),
-            ("RAM_LOAD", Role::Load, "RAM_LOAD", None, None),
-            (
-                "rudder_torque_nm",
-                Role::Load,
-                "{position}_torque_nm",
-                place("rudder"),
-                Some(Unit::NewtonMetre),
-            ),
-            ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
-        ];
-        for (name, role, pattern, position, unit) in cases {
-            assert_eq!(inferred(name), Some((role, pattern.to_owned(), position, unit)), "{name}");
+        for (name, wanted) in [
+            ("aileron_left_motor_deg", "motor; {position}_motor_deg; aileron_left; deg"),
+            ("AIL_L.SCREW_POS.mm", "screw; {position}.SCREW_POS.mm; AIL_L; mm"),
+            ("loadElevatorRight", "load; load{position}; ElevatorRight; -"),
+            ("ELV_L.MOT_POS_RAD", "motor; {position}.MOT_POS_RAD; ELV_L; rad"),
+            ("load_n", "load; load_n; -; N"),
+            ("motor_pos_deg_rudder", "motor; motor_pos_deg_{position}; rudder; deg"),
+            ("rudder/screw_position", "screw; {position}/screw_position; rudder; -"),
+            ("AIL_L_MTR_RESOLVER_DEG", "motor; {position}_MTR_RESOLVER_DEG; AIL_L; deg"),
+            ("ELEV_R_FORCE_LBF", "load; {position}_FORCE_LBF; ELEV_R; lbf"),
+            ("RAM_LOAD", "load; RAM_LOAD; -; -"),
+            ("rudder_torque_nm", "load; {position}_torque_nm; rudder; N.m"),
+            ("resolver angle rudder", "motor; resolver angle {position}; rudder; -"),
+        ] {
+            assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");
         }
         assert_eq!((inferred("airspeed_kt"), inferred("aileron_left_motor_torque_nm")), (None, None));
     }
@@ -239,16 +189,14 @@ mod tests {
     #[test]
     fn sensors_and_other_quantities_are_told_from_positions() {
         let a = ParsedName::of("aileron_left_motor_a_deg", true).unwrap();
-        assert_eq!(
-            (a.position.as_deref(), a.pattern.as_str(), a.sensor),
-            (Some("aileron_left"), "{position}_motor_a_deg", Some(0))
-        );
+        assert_eq!((a.position.as_deref(), a.sensor), (Some("aileron_left"), Some(0)));
+        assert_eq!(a.pattern, "{position}_motor_a_deg");
         let second = ParsedName::of("motor_2_deg", false).unwrap();
         assert_eq!(
             (second.position.as_deref(), second.pattern.as_str()),
             (Some("2"), "motor_{position}_deg")
         );
         assert_eq!(ParsedName::of("aileron_left_motor_current", true), None);
-        assert_eq!(inferred("aileron_left_motor_temp_degc").unwrap().0, Role::Temperature);
+        assert!(inferred("aileron_left_motor_temp_degc").unwrap().starts_with("temperature"));
     }
 }

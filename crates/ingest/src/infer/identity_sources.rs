@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::infer::column_names::place_in;
 use crate::log::identity::hive_folders;
 use crate::mapping::IdentityField;
 
@@ -35,7 +36,7 @@ const SOUNDS: [(IdentityField, &str); 6] = [
 /// The fact that a name sounds like, and how far behind the best known name of that fact.
 fn rank_of(name: &str) -> Option<(IdentityField, usize)> {
     let plain = name.trim().to_lowercase().replace(['-', ' ', '.'], "_");
-    SOUNDS.iter().find_map(|(fact, known)| Some((*fact, known.split(' ').position(|word| word == plain)?)))
+    SOUNDS.iter().find_map(|(fact, known)| Some((*fact, place_in(known, &plain)?)))
 }
 
 /// The fact that a name sounds like.
@@ -148,49 +149,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_departure_in_a_name_is_found_with_its_form() {
-        for (path, departure, format) in [
-            ("d/N412FP/FLT_2026-09-10_1307.parquet", "2026-09-10_1307", "%Y-%m-%d_%H%M"),
-            ("d/TC-JRA/20261119T041300Z_0413.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/TC-JRA/QAR20261119_041300.parquet", "20261119_041300", "%Y%m%d_%H%M%S"),
+    fn tails_departures_and_positions_in_paths_are_found_with_their_forms() {
+        for (path, wanted, format) in [
+            ("d/N412FP/FLT_2026-09-10_1307.parquet", "N412FP 2026-09-10_1307", "%Y-%m-%d_%H%M"),
+            ("d/TC-JRA/20261119T041300Z_0413.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/TC-JRA/QAR20261119_041300.parquet", "TC-JRA 20261119_041300", "%Y%m%d_%H%M%S"),
+            ("d/N412FP/2026-11-19/0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%dT%H%M"),
+            ("d/TC-JRA_20261119T041300Z.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            (
+                "d/N412FP/20261119T041300Z/rudder_l.parquet",
+                "N412FP 20261119T041300Z rudder_l",
+                "%Y%m%dT%H%M%SZ",
+            ),
+            (
+                "d/N412FP/20261119T041300Z_rudder_l.parquet",
+                "N412FP 20261119T041300Z rudder_l",
+                "%Y%m%dT%H%M%SZ",
+            ),
         ] {
-            let (expression, found) = path_identity(Path::new(path), false).unwrap();
-            let regex = regex::Regex::new(&expression).unwrap();
-            let facts = regex.captures(path).unwrap();
-            assert_eq!((&facts["departure_utc"], found.as_str()), (departure, format), "{expression}");
-            assert_eq!(&facts["tail_number"], path.split('/').nth(1).unwrap());
+            let position = path_position(Path::new(path));
+            let (expression, found) = path_identity(Path::new(path), position.is_some()).unwrap();
+            let groups = regex::Regex::new(&expression).unwrap().captures(path).unwrap();
+            let facts: Vec<&str> = groups.iter().skip(1).flatten().map(|group| group.as_str()).collect();
+            assert_eq!((facts.join(" ").as_str(), found.as_str()), (wanted, format), "{expression}");
+            assert!(position.is_none_or(|position| wanted.ends_with(&position)));
         }
         assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet"), false), None);
-    }
-
-    #[test]
-    fn a_day_in_a_folder_and_a_tail_in_a_name_are_found() {
-        let (expression, format) =
-            path_identity(Path::new("d/N412FP/2026-11-19/0413.parquet"), false).unwrap();
-        let facts = regex::Regex::new(&expression).unwrap();
-        let facts = facts.captures("d/N412FP/2026-11-19/0413.parquet").unwrap();
-        assert_eq!((&facts["departure_date"], &facts["departure_time"]), ("2026-11-19", "0413"));
-        assert_eq!(format, "%Y-%m-%dT%H%M");
-        let path = "logs/TC-JRA_20261119T041300Z.parquet";
-        let (expression, _) = path_identity(Path::new(path), false).unwrap();
-        assert_eq!(&regex::Regex::new(&expression).unwrap().captures(path).unwrap()["tail_number"], "TC-JRA");
-    }
-
-    #[test]
-    fn a_position_at_the_end_of_a_name_is_found() {
-        for path in [
-            "d/N412FP/20261119T041300Z/aileron_left.parquet",
-            "d/N412FP/20261119T041300Z_aileron_left.parquet",
-        ] {
-            let (expression, format) = path_identity(Path::new(path), true).unwrap();
-            let regex = regex::Regex::new(&expression).unwrap();
-            let facts = regex.captures(path).unwrap();
-            let found = (&facts["tail_number"], &facts["departure_utc"], &facts["position"]);
-            assert_eq!(found, ("N412FP", "20261119T041300Z", "aileron_left"), "{expression}");
-            assert_eq!(format, "%Y%m%dT%H%M%SZ");
-            assert_eq!(path_position(Path::new(path)).as_deref(), Some("aileron_left"));
-        }
-        assert_eq!(path_position(Path::new("d/N412FP/20261119T041300Z.parquet")), None);
     }
 
     #[test]

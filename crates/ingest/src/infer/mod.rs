@@ -15,7 +15,7 @@ use arrow::datatypes::DataType;
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::Error;
-use crate::infer::column_names::{ParsedName, is_of_day, is_time, is_unit, time_unit};
+use crate::infer::column_names::{ParsedName, is_of_day, is_time, is_unit, place_in, time_unit};
 use crate::infer::identity_sources::{fact_of, facts_of, folders};
 use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
@@ -159,8 +159,7 @@ fn identity_columns(
 /// The layout that columns of names, values and positions show.
 fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
     let leaves = table.files[0].leaves();
-    let is_called =
-        |leaf: &LeafColumn, known: &str| known.split(' ').any(|word| word == leaf.name.to_lowercase());
+    let is_called = |leaf: &LeafColumn, known: &str| place_in(known, &leaf.name.to_lowercase()).is_some();
     let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
     let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, NAME_COLUMNS));
     let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, VALUE_COLUMNS));

@@ -58,5 +58,5 @@ fn open_local(path: &Path) -> Result<File, ErrorKind> {
         kind if kind.is_file() || kind.is_dir() => File::open(path),
         _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device")),
     });
-    opened.map_err(|source| ErrorKind::Unreadable { source })
+    Ok(opened?)
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use records::Position;
 
 use crate::channel::quality::{self, Quality};
-use crate::channel::stats::{ChannelStats, MinMax};
+use crate::channel::stats::{ChannelStats, span};
 use crate::channel::turns::{TurnEvidence, restore_turns};
 use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
@@ -102,7 +102,7 @@ fn restored(
 /// travel, m, and how many samples are missing.
 fn relative(motor_m: &[f64], screw_m: &mut [f64], is_relative: bool) -> (f64, usize) {
     const BATCH: usize = 4096;
-    let (mut span, mut missing) = (MinMax::NONE, 0);
+    let (mut low_m, mut high_m, mut missing) = (f64::INFINITY, f64::NEG_INFINITY, 0);
     for (screw_m, motor_m) in screw_m.chunks_mut(BATCH).zip(motor_m.chunks(BATCH)) {
         let pairs = screw_m.iter_mut().zip(motor_m);
         if is_relative {
@@ -110,10 +110,11 @@ fn relative(motor_m: &[f64], screw_m: &mut [f64], is_relative: bool) -> (f64, us
         } else {
             pairs.for_each(|(screw, motor)| *screw -= motor);
         }
-        span.take(screw_m);
+        let (low, high) = span(screw_m);
+        (low_m, high_m) = (low_m.min(low), high_m.max(high));
         missing += screw_m.iter().filter(|dx| dx.is_nan()).count();
     }
-    (span.length(), missing)
+    (high_m - low_m, missing)
 }
 
 /// Mean of the values that are not missing.

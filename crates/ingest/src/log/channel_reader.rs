@@ -294,16 +294,17 @@ impl<'s> ChannelSampling<'s> {
         }
         let read = self.readings(map, geometry, RowSelection::ALL)?;
         let (_, instants) = self.instants(map)?;
-        let (at_s, values) = thinned(&instants, &read.values, self.every);
-        let step_s = self.line.step_s * self.every as f64;
-        let own = TimeSeries { at_s: &at_s, values: &values, step_s };
-        let values = interpolate_at(own, &instants, Interpolation::Line);
+        let values = self.placed(&instants, &read.values, &instants, Interpolation::Line);
         Ok(Channel { values, seen: None, ..read })
     }
-}
 
-fn thinned(instants: &[f64], values: &[f64], every: usize) -> (Vec<f64>, Vec<f64>) {
-    decimated_rows(values, every).into_iter().map(|i| (instants[i as usize], values[i as usize])).unzip()
+    /// Its values, sampled at instants of its own, at others; where it is slower than its rows, its own samples count.
+    fn placed(&self, own_s: &[f64], values: &[f64], at_s: &[f64], between: Interpolation) -> Vec<f64> {
+        let rows = decimated_rows(values, self.every).into_iter();
+        let (own_s, values): (Vec<_>, Vec<_>) = rows.map(|i| (own_s[i as usize], values[i as usize])).unzip();
+        let step_s = self.line.step_s * self.every as f64;
+        interpolate_at(TimeSeries { at_s: &own_s, values: &values, step_s }, at_s, between)
+    }
 }
 
 /// The channel of an actuator that is to be brought to the motor's clock.
@@ -347,17 +348,15 @@ pub(crate) fn follow(
         }
         read => read?,
     };
-    let (stamps, at_s) = own.instants(map)?;
-    let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
-    let (lead, mut instants) = master.instants(motor)?;
+    let (stamps, own_s) = own.instants(map)?;
+    let (lead, mut at_s) = master.instants(motor)?;
     let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
         sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
     })?;
-    instants.iter_mut().for_each(|t| *t += apart_s);
-    let step_s = own.line.step_s * own.every as f64;
-    let is_slow = step_s > BREAK_STEPS * master.line.step_s;
+    at_s.iter_mut().for_each(|t| *t += apart_s);
+    let is_slow = own.line.step_s * own.every as f64 > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
-    let values = interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between);
+    let values = own.placed(&own_s, &values, &at_s, between);
     Ok(Channel { values, seen: None, turn_m })
 }
 

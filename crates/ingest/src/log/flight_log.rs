@@ -13,7 +13,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
-use crate::log::flight_rows::{FlightRow, split_path};
+use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized::Normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
@@ -29,12 +29,10 @@ use crate::time::zero_order_hold::zero_order_hold;
 /// An open log.
 #[derive(Debug)]
 pub struct Log {
-    main: RowTable,
-    groups: BTreeMap<String, RowTable>,
+    /// The main log, and the files of each group that has some.
+    tables: BTreeMap<Option<String>, RowTable>,
     mapping: Arc<Mapping>,
     normalized: Option<Normalized>,
-    /// What channels may be called, in the main log and in each group: asked for every position and channel.
-    names: Mutex<BTreeMap<Option<String>, Arc<BTreeSet<String>>>>,
     /// What the conditions left of the actuator before: most ask the same of every one.
     selected: Mutex<Option<(SelectionKey, SampleSelection)>>,
 }
@@ -54,34 +52,26 @@ impl Log {
     /// # Errors
     /// When a file cannot be read, is empty, or is not whole Parquet.
     pub fn open(files: &LogFiles, mapping: &Arc<Mapping>) -> Result<Self, Error> {
-        let open_one = |(path, flight_rows): (PathBuf, Vec<FlightRow>)| {
-            let mut file = LogFile::open(&path)?;
-            file.flight_rows = flight_rows;
-            Ok(file)
-        };
-        let open = |paths: &[PathBuf], identity: &IdentityMapping| {
-            let paths = paths.iter().map(|path| split_path(path, identity));
-            paths.map(open_one).collect::<Result<Vec<_>, _>>()
-        };
-        let (clock, layout) = (mapping.clock.clone(), mapping.layout.clone());
-        let main = RowTable::new(open(&files.main, &mapping.identity)?, clock, layout);
-        let mut groups = BTreeMap::new();
-        for (name, group) in &mapping.groups {
-            let paths = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
-            if !paths.is_empty() {
-                let clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
-                let files = open(paths, group.identity.as_ref().unwrap_or(&mapping.identity))?;
-                groups.insert(name.clone(), RowTable::new(files, clock, group.layout.clone()));
-            }
+        let main = (None, files.main.as_slice());
+        let groups = mapping.groups.keys().map(|name| {
+            let files = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
+            (Some(name.clone()), files)
+        });
+        let mut tables = BTreeMap::new();
+        for (group, paths) in std::iter::once(main).chain(groups).filter(|(_, paths)| !paths.is_empty()) {
+            let (clock, layout, identity) = mapping.of_group(group.as_deref());
+            let open = |path: &PathBuf| {
+                let (path, flight_rows) = split_path(path, identity);
+                LogFile::open(&path).map(|file| file.of_flight(flight_rows))
+            };
+            let files = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+            tables.insert(group, RowTable::new(files, clock.clone(), layout.clone()));
         }
-        let Some(first) = main.files.first() else {
-            let source = std::io::Error::from(std::io::ErrorKind::NotFound);
-            return Err(Error::new(Path::new(""), ErrorKind::Unreadable { source }));
+        let Some(main) = tables.get(&None) else {
+            return Err(Error::new(Path::new(""), std::io::Error::from(std::io::ErrorKind::NotFound).into()));
         };
-        let normalized = Normalized::of(first)?;
-        let mapping = Arc::clone(mapping);
-        let (names, selected) = (Mutex::default(), Mutex::new(None));
-        let mut log = Self { main, groups, mapping, normalized, names, selected };
+        let normalized = Normalized::of(&main.files[0])?;
+        let mut log = Self { tables, mapping: Arc::clone(mapping), normalized, selected: Mutex::new(None) };
         log.order_pieces()?;
         Ok(log)
     }
@@ -89,20 +79,21 @@ impl Log {
     /// The same open files, read by another mapping of the same kinds of files.
     #[must_use]
     pub fn with_mapping(mut self, mapping: &Arc<Mapping>) -> Self {
-        self.main.remap(&mapping.clock, &mapping.layout);
-        for (name, sheet) in &mut self.groups {
-            if let Some(group) = mapping.groups.get(name) {
-                sheet.remap(group.clock.as_ref().unwrap_or(&mapping.clock), &group.layout);
-            }
+        for (group, table) in &mut self.tables {
+            let (clock, layout, _) = mapping.of_group(group.as_deref());
+            table.remap(clock, layout);
         }
-        self.mapping = Arc::clone(mapping);
-        (self.names, self.selected) = (Mutex::default(), Mutex::new(None));
-        self
+        Self { mapping: Arc::clone(mapping), selected: Mutex::new(None), ..self }
+    }
+
+    /// The table of the main log.
+    fn main(&self) -> &RowTable {
+        &self.tables[&None]
     }
 
     /// Pieces of a flight follow each other in time, whatever their files are called.
     fn order_pieces(&mut self) -> Result<(), Error> {
-        for sheet in std::iter::once(&mut self.main).chain(self.groups.values_mut()) {
+        for sheet in self.tables.values_mut() {
             let Some(column) = sheet.clock.column.clone() else { continue };
             if sheet.files.len() < 2 {
                 continue;
@@ -125,12 +116,12 @@ impl Log {
 
     /// Rows the footers of the main log declare.
     pub fn rows(&self) -> usize {
-        self.main.rows()
+        self.main().rows()
     }
 
     /// Names and types of all columns, for `check`.
     pub fn column_types(&self) -> Vec<(String, String)> {
-        let leaves = self.main.files.iter().flat_map(LogFile::leaves);
+        let leaves = self.main().files.iter().flat_map(LogFile::leaves);
         leaves.map(|leaf| (leaf.name.clone(), leaf.kind.to_string())).collect()
     }
 
@@ -161,11 +152,13 @@ impl Log {
     ) -> Result<Identity, Error> {
         if let Some(normalized) = &self.normalized {
             let own = IdentityMapping::default();
-            return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
+            return identity::read(&normalized.facts, &own, None).map_err(|f| self.main().error(f));
         }
         let mapping = &self.mapping.identity;
-        let fail = |fault| self.main.error(fault);
-        let mut facts = facts(&self.main, mapping)?;
+        let known =
+            |facts: &IdentityFields, start| known(&identity::registered(facts, mapping, start), start);
+        let fail = |fault| self.main().error(fault);
+        let mut facts = facts(self.main(), mapping)?;
         let date =
             facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
         if date.is_some() {
@@ -206,23 +199,15 @@ impl Log {
         identity::read(&facts, mapping, start).map_err(fail)
     }
 
-    /// The first instant of an absolute clock.
-    ///
-    /// # Errors
-    /// When the time column cannot be read.
-    pub fn start_utc(&self) -> Result<Option<Timestamp>, Error> {
-        let start = self.clock_span()?.and_then(|clock| clock.start(&self.mapping.identity));
-        start.transpose().map_err(|fault| self.main.error(fault))
-    }
-
     /// The earliest and the latest stamp of the log, if it has a time column.
     fn clock_span(&self) -> Result<Option<ClockSpan>, Error> {
-        let Some(column) = self.main.clock.column.as_ref().filter(|column| self.main.files[0].has(column))
+        let Some(column) =
+            self.main().clock.column.as_ref().filter(|column| self.main().files[0].has(column))
         else {
             return Ok(None);
         };
         let every_row = SampleSelector { leaf: column.clone(), rows: Vec::new() };
-        let stamps = self.main.stamps(&every_row, None)?;
+        let stamps = self.main().stamps(&every_row, None)?;
         let (mut earliest_s, mut latest_s) = (f64::INFINITY, f64::NEG_INFINITY);
         for s in stamps.seconds.iter().filter(|s| !s.is_nan()) {
             (earliest_s, latest_s) = (earliest_s.min(*s), latest_s.max(*s));
@@ -232,19 +217,12 @@ impl Log {
 
     /// The sheet that holds a channel.
     fn sheet(&self, map: &ChannelMapping) -> Option<&RowTable> {
-        map.group.as_ref().map_or(Some(&self.main), |name| self.groups.get(name))
+        self.tables.get(&map.group)
     }
 
     /// What channels may be called in the sheet of one.
     fn names_for(&self, map: &ChannelMapping) -> Result<Arc<BTreeSet<String>>, Error> {
-        let known = self.names.lock().unwrap_or_else(PoisonError::into_inner).get(&map.group).cloned();
-        if let Some(names) = known {
-            return Ok(names);
-        }
-        let names = Arc::new(self.sheet(map).map_or_else(|| Ok(BTreeSet::new()), RowTable::names)?);
-        let mut all = self.names.lock().unwrap_or_else(PoisonError::into_inner);
-        all.insert(map.group.clone(), Arc::clone(&names));
-        Ok(names)
+        self.sheet(map).map_or_else(|| Ok(Arc::default()), RowTable::names)
     }
 
     /// The actuators whose columns are here, in order of their names.
@@ -290,12 +268,12 @@ impl Log {
         }
         let (pattern, columns) =
             (fewest.1.column.clone(), self.names_for(fewest.1)?.iter().cloned().collect());
-        Ok(self.main.error(ErrorKind::NoPosition { pattern, columns }))
+        Ok(self.main().error(ErrorKind::NoPosition { pattern, columns }))
     }
 
     /// The positions that rows or names speak of; none when neither can.
     fn position_names(&self, channels: &Channels) -> Result<Option<BTreeSet<String>>, Error> {
-        if let Some(found) = self.main.row_positions()? {
+        if let Some(found) = self.main().row_positions()? {
             return Ok(Some(found));
         }
         let (mut is_open, mut found) = (false, BTreeSet::new());
@@ -318,12 +296,12 @@ impl Log {
     ) -> Result<Vec<ActuatorColumns>, Error> {
         let Some(position) = own else {
             let looked = vec!["the names of columns (no `{position}` in them)".into()];
-            return Err(self.main.error(ErrorKind::IdentityMissing { fact: "position", looked }));
+            return Err(self.main().error(ErrorKind::IdentityMissing { fact: "position", looked }));
         };
         let only = self.columns_of(channels, position.clone())?;
         match only.lacking.first() {
             None => Ok(vec![only]),
-            Some(column) => Err(self.main.lacks(column)),
+            Some(column) => Err(self.main().lacks(column)),
         }
     }
 
@@ -367,8 +345,7 @@ impl Log {
 
     /// The leaves that these actuators need, sheet by sheet.
     fn leaves(&self, used: &[(&Channels, &ActuatorColumns)]) -> Vec<(&RowTable, BTreeSet<String>)> {
-        let sheets = std::iter::once(&self.main).chain(self.groups.values());
-        let mut found: Vec<_> = sheets.map(|sheet| (sheet, BTreeSet::new())).collect();
+        let mut found: Vec<_> = self.tables.values().map(|sheet| (sheet, BTreeSet::new())).collect();
         self.each_use(used, |sheet, _, samples| {
             let of_sheet = found.iter_mut().find(|(other, _)| std::ptr::eq(*other, sheet));
             of_sheet.into_iter().for_each(|(_, leaves)| leaves.extend(sheet.leaves_of(samples)));
@@ -382,7 +359,7 @@ impl Log {
     /// # Errors
     /// When channels are named by a column, and it cannot be read.
     pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<(), Error> {
-        for table in std::iter::once(&self.main).chain(self.groups.values()) {
+        for table in self.tables.values() {
             if table.layout.name_column.is_some() {
                 table.names()?;
             }
@@ -453,10 +430,10 @@ impl Log {
         geometry: Geometry,
     ) -> Result<ActuatorChannels, Error> {
         if let Some(normalized) = &self.normalized {
-            return normalized.read_actuator(&self.main.files[0], at.position.clone(), geometry);
+            return normalized.read_actuator(&self.main().files[0], at.position.clone(), geometry);
         }
         let read = self.read_channels(ChannelRequest { at, channels, geometry });
-        for sheet in std::iter::once(&self.main).chain(self.groups.values()) {
+        for sheet in self.tables.values() {
             sheet.release(at.position.as_str());
         }
         read
@@ -543,7 +520,6 @@ impl Log {
     /// The motor position, whose clock all other channels follow.
     fn motor<'c>(&self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'_, 'c>, Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let choices = self.present_or_lacking(Role::Motor, at, channels)?;
         let read = |map: &'c ChannelMapping, name: &str| {
             let master = (ChannelSampling::new(self.sheet_of(map)?, map, name, at.position.as_str())?, map);
             if !channels.when.is_empty() {
@@ -554,12 +530,9 @@ impl Log {
             let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
             Ok((read, selection.apart, (master, selection)))
         };
-        let found = first_alive(choices, read)?;
-        let (channel, (master, selection), k) =
-            found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&channel.values, master.0.column(), &selection)?;
+        let (channel, (master, selection), flags) = self.first_alive(Role::Motor, sought, read)?;
         self.check_one_flight(&master)?;
-        Ok(ReferenceChannel { channel, master, selection, flags: alternative(Role::Motor, k) })
+        Ok(ReferenceChannel { channel, master, selection, flags })
     }
 
     /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
@@ -575,7 +548,7 @@ impl Log {
         sampling.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
     }
 
-    /// A channel on the motor's clock.
+    /// A channel on the motor's clock, and its flags.
     fn follower(
         &self,
         role: Role,
@@ -583,48 +556,55 @@ impl Log {
         master: &ReferenceClock<'_, '_>,
         selection: &SampleSelection,
     ) -> Result<(Channel, Vec<String>), Error> {
-        let ChannelRequest { at, channels, geometry } = sought;
         let read = |map: &ChannelMapping, name: &str| {
             let sheet = self.sheet_of(map)?;
-            let one = FollowerChannel { sheet, map, name, position: at.position.as_str(), role };
-            let read = channel_reader::follow(&master.0, master.1, &one, geometry, selection.wanted())?;
-            Ok((selection.cut(read), selection.apart, name.to_owned()))
+            let one = FollowerChannel { sheet, map, name, position: sought.at.position.as_str(), role };
+            let read =
+                channel_reader::follow(&master.0, master.1, &one, sought.geometry, selection.wanted())?;
+            Ok((selection.cut(read), selection.apart, ()))
         };
-        let found = first_alive(self.present_or_lacking(role, at, channels)?, read)?;
-        let (read, column, k) = found.unwrap_or_else(|| (Vec::new().into(), String::new(), 0));
-        self.not_empty(&read.values, &column, selection)?;
-        Ok((read, alternative(role, k)))
+        self.first_alive(role, sought, read).map(|(channel, (), flags)| (channel, flags))
     }
 
-    fn present_or_lacking<'c>(
+    /// The first of redundant channels that is alive, else the first one, with what `read` gave beside it, and a flag
+    /// where it is not the first. `read` gives a channel, how many of its samples no filter left, and the rest.
+    fn first_alive<'c, T>(
         &self,
         role: Role,
-        at: &ActuatorColumns,
-        channels: &'c Channels,
-    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+        sought: ChannelRequest<'c>,
+        read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, usize, T), Error>,
+    ) -> Result<(Channel, T, Vec<String>), Error> {
+        let ChannelRequest { at, channels, .. } = sought;
         let map = channels.of(role).unwrap_or(&channels.motor_position);
-        let found = self.present(map, &at.position)?;
-        if found.is_empty() {
-            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
-            return Err(self.sheet(map).unwrap_or(&self.main).lacks(&name));
+        let choices = self.present(map, &at.position)?;
+        let mut found = None;
+        for (k, (map, name)) in choices.iter().enumerate() {
+            let (channel, apart, rest) = read(map, name)?;
+            let is_alive = choices.len() == 1 || channel_reader::lives(&channel.values, apart);
+            if is_alive || found.is_none() {
+                found = Some((channel, apart, rest, k));
+            }
+            if is_alive {
+                break;
+            }
         }
-        Ok(found)
+        let Some((channel, apart, rest, k)) = found else {
+            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            return Err(self.sheet(map).unwrap_or(self.main()).lacks(&name));
+        };
+        let counted = channel.values.len() - apart;
+        if (counted > 0 || apart == 0) && !channel.values.iter().any(|v| v.is_finite()) {
+            let (column, rows) = (choices[k].1.clone(), counted as u64);
+            return Err(self.main().error(ErrorKind::AllMissing { column, rows }));
+        }
+        let flags = if k == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] };
+        Ok((channel, rest, flags))
     }
 
     fn sheet_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
         self.sheet(map).ok_or_else(|| {
-            self.main.error(ErrorKind::GroupMissing { group: map.group.clone().unwrap_or_default() })
+            self.main().error(ErrorKind::GroupMissing { group: map.group.clone().unwrap_or_default() })
         })
-    }
-
-    /// Whether a column holds a value where it counts, if it counts anywhere.
-    fn not_empty(&self, values: &[f64], column: &str, selection: &SampleSelection) -> Result<(), Error> {
-        let counted = values.len() - selection.apart;
-        if (counted == 0 && selection.apart > 0) || values.iter().any(|v| v.is_finite()) {
-            return Ok(());
-        }
-        let (column, rows) = (column.to_owned(), counted as u64);
-        Err(self.main.error(ErrorKind::AllMissing { column, rows }))
     }
 }
 
@@ -674,35 +654,8 @@ pub fn companion_identity(
     group: &str,
     known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
 ) -> Result<Identity, Error> {
-    let settings = mapping.groups.get(group);
-    let identity = settings.and_then(|g| g.identity.clone()).unwrap_or_else(|| mapping.identity.clone());
-    let clock = settings.and_then(|g| g.clock.clone()).unwrap_or_else(|| mapping.clock.clone());
-    let layout = settings.map(|g| g.layout.clone()).unwrap_or_default();
+    let (clock, layout, identity) = mapping.of_group(Some(group));
+    let (clock, layout, identity) = (clock.clone(), layout.clone(), identity.clone());
     let alone = Mapping { identity, clock, layout, ..Mapping::default() };
     Log::open(&LogFiles::one(path), &Arc::new(alone))?.identity(known)
-}
-
-/// The first of redundant channels that is alive, or the first one; with what was read beside it, and its number. `read`
-/// gives a channel, how many of its samples no filter left, and the rest.
-fn first_alive<'c, T>(
-    choices: Vec<(&'c ChannelMapping, String)>,
-    read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, usize, T), Error>,
-) -> Result<Option<(Channel, T, usize)>, Error> {
-    let is_only = choices.len() == 1;
-    let mut found = None;
-    for (k, (map, name)) in choices.into_iter().enumerate() {
-        let (channel, apart, rest) = read(map, &name)?;
-        let is_alive = is_only || channel_reader::lives(&channel.values, apart);
-        if is_alive || found.is_none() {
-            found = Some((channel, rest, k));
-        }
-        if is_alive {
-            break;
-        }
-    }
-    Ok(found)
-}
-
-fn alternative(role: Role, choice: usize) -> Vec<String> {
-    if choice == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] }
 }

@@ -67,7 +67,7 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
     }
     let mut distinct = DistinctTexts::default();
     distinct.take_file(&file, &columns)?;
-    let found = distinct.found;
+    let found = distinct.found();
     if found.is_empty() {
         return whole();
     }

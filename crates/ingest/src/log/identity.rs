@@ -81,11 +81,7 @@ pub(crate) fn departure_on(
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
 ) -> Result<Timestamp, ErrorKind> {
-    let invalid = |detail: String| ErrorKind::IdentityInvalid {
-        fact: "departure_utc",
-        found: date.to_string(),
-        detail,
-    };
+    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, date, detail);
     if let Some(start) = absolute {
         // The zone of the date may not be known: 14 h to either side of UTC at most.
         let after_h =
@@ -116,11 +112,7 @@ pub(crate) fn departure_before(
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
 ) -> Result<Timestamp, ErrorKind> {
-    let invalid = |detail: &str| ErrorKind::IdentityInvalid {
-        fact: "landing_utc",
-        found: landing.to_owned(),
-        detail: detail.to_owned(),
-    };
+    let invalid = |detail: &str| invalid(IdentityField::LandingUtc, landing, detail);
     if date_alone(landing, mapping).is_some() {
         return Err(invalid("a date without a time of the day"));
     }
@@ -130,6 +122,11 @@ pub(crate) fn departure_before(
     let length_s = length_s.ok_or_else(|| invalid("the log has neither `flight_hours` nor a clock"))?;
     let landed = instant(landing.trim(), mapping)?;
     landed.checked_sub(duration(length_s)).map_err(|e| invalid(&e.to_string()))
+}
+
+fn invalid(fact: IdentityField, found: impl ToString, detail: impl ToString) -> ErrorKind {
+    let (found, detail) = (found.to_string(), detail.to_string());
+    ErrorKind::IdentityInvalid { fact: fact.as_str(), found, detail }
 }
 
 /// Facts as text, before they are read.
@@ -185,6 +182,23 @@ pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, Stri
     folders.iter().filter_map(stated).filter(is_value).collect()
 }
 
+/// The facts, with the registration where a logger calls the aircraft otherwise. `start` is the departure where the facts
+/// hold none.
+pub(crate) fn registered(
+    facts: &IdentityFields,
+    mapping: &IdentityMapping,
+    start: Option<Timestamp>,
+) -> IdentityFields {
+    let mut facts = facts.clone();
+    let stated = facts.get(&IdentityField::DepartureUtc).and_then(|text| instant(text.trim(), mapping).ok());
+    let day = stated.or(start).map(|departure| TimeZone::UTC.to_datetime(departure).date());
+    if let Some(tail) = facts.get_mut(&IdentityField::TailNumber) {
+        let alias = mapping.tail_aliases.iter().find(|alias| alias.is_of(tail.trim(), day));
+        alias.into_iter().for_each(|alias| tail.clone_from(&alias.tail_number));
+    }
+    facts
+}
+
 /// Reads the facts; what the log leaves open comes from its absolute clock.
 ///
 /// # Errors
@@ -195,6 +209,7 @@ pub(crate) fn read(
     mapping: &IdentityMapping,
     clock_start: Option<Timestamp>,
 ) -> Result<Identity, ErrorKind> {
+    let facts = registered(facts, mapping, clock_start);
     let text = |fact: IdentityField| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
     let tail = text(IdentityField::TailNumber).ok_or_else(|| missing(IdentityField::TailNumber, mapping))?;
     let departure_utc = match text(IdentityField::DepartureUtc) {
@@ -203,21 +218,15 @@ pub(crate) fn read(
     };
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
-    let invalid = |fact: IdentityField| {
-        move |e: records::ids::IdError| ErrorKind::IdentityInvalid {
-            fact: fact.as_str(),
-            found: String::new(),
-            detail: e.to_string(),
-        }
-    };
+    let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, "", e);
     Ok(Identity {
-        tail_number: TailNumber::new(tail).map_err(invalid(IdentityField::TailNumber))?,
-        flight_id: FlightId::new(flight).map_err(invalid(IdentityField::FlightId))?,
+        tail_number: TailNumber::new(tail).map_err(of(IdentityField::TailNumber))?,
+        flight_id: FlightId::new(flight).map_err(of(IdentityField::FlightId))?,
         departure_utc,
         position: text(IdentityField::Position)
             .map(Position::new)
             .transpose()
-            .map_err(invalid(IdentityField::Position))?,
+            .map_err(of(IdentityField::Position))?,
         flight_hours: hours(IdentityField::FlightHours, text(IdentityField::FlightHours))?,
         tail_hours_end: hours(IdentityField::TailHoursEnd, text(IdentityField::TailHoursEnd))?,
     })
@@ -227,7 +236,13 @@ fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
     let looked = [
         mapping.metadata.get(&fact).map(|key| format!("metadata `{key}`")),
         mapping.columns.get(&fact).map(|column| format!("column `{column}`")),
-        mapping.path.as_ref().map(|expression| format!("path by `{expression}`")),
+        mapping.path.as_ref().map(|expression| {
+            // Groups of a date and a time stand for a departure.
+            let stem = fact.as_str().strip_suffix("utc").unwrap_or(fact.as_str());
+            let lacks = format!(", which has no group `{}`", fact.as_str());
+            let has_group = expression.contains(&format!("<{stem}"));
+            format!("path by `{expression}`{}", if has_group { "" } else { &lacks })
+        }),
         mapping.folders.get(&fact).map(|name| format!("folder `{name}=…`")),
     ];
     ErrorKind::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
@@ -242,21 +257,16 @@ fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKi
         Ok(h) if fact == IdentityField::FlightHours && h > LONGEST_FLIGHT_H => {
             let detail =
                 format!("no flight takes more than {LONGEST_FLIGHT_H} h: give hours, not minutes or seconds");
-            Err(ErrorKind::IdentityInvalid { fact: fact.as_str(), found: text.to_owned(), detail })
+            Err(invalid(fact, text, detail))
         }
         Ok(h) if h.is_finite() && h >= 0.0 => Ok(Some(h)),
-        _ => Err(ErrorKind::IdentityInvalid {
-            fact: fact.as_str(),
-            found: text.to_owned(),
-            detail: "hours are a number of at least 0".into(),
-        }),
+        _ => Err(invalid(fact, text, "hours are a number of at least 0")),
     }
 }
 
 /// Reads a departure. A zone or offset in the text wins; else the mapped zone; else it is refused.
 pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, ErrorKind> {
-    let invalid =
-        |detail: String| ErrorKind::IdentityInvalid { fact: "departure_utc", found: text.to_owned(), detail };
+    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, text, detail);
     let local = match &mapping.departure_format {
         Some(format) => {
             let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
@@ -319,14 +329,14 @@ pub(crate) fn local_to_utc(
 ) -> Result<Option<Timestamp>, ErrorKind> {
     let Some(name) = mapping.time_zone.as_deref() else { return Ok(None) };
     let local = TimeZone::UTC.to_datetime(as_utc);
-    let invalid =
-        |detail| ErrorKind::IdentityInvalid { fact: "departure_utc", found: local.to_string(), detail };
-    unambiguous(local, name).map(Some).map_err(invalid)
+    let skipped = |detail: String| invalid(IdentityField::DepartureUtc, local, detail);
+    unambiguous(local, name).map(Some).map_err(skipped)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mapping::TailAlias;
 
     fn mapping(format: Option<&str>, zone: Option<&str>) -> IdentityMapping {
         IdentityMapping {
@@ -336,16 +346,31 @@ mod tests {
         }
     }
 
+    /// In one name, or the date in a folder and the time in the name of the file.
     #[test]
     fn named_groups_of_a_path_become_facts() {
-        let path = Path::new("/logs/N412FP/0413_20261119T120409Z.parquet");
-        let facts =
-            from_path(path, r"(?<tail_number>N\w+)/(?<flight_id>\d+)_(?<departure_utc>\w+)\.parquet$")
-                .unwrap();
-        let identity = read(&facts, &mapping(Some("%Y%m%dT%H%M%SZ"), Some("UTC")), None).unwrap();
-        assert_eq!(identity.tail_number.as_str(), "N412FP");
-        assert_eq!(identity.flight_id.as_str(), "0413");
-        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T12:04:09Z");
+        for (path, expression, format, flight, departure) in [
+            (
+                "/logs/N412FP/0413_20261119T120409Z.parquet",
+                r"(?<tail_number>N\w+)/(?<flight_id>\d+)_(?<departure_utc>\w+)\.parquet$",
+                "%Y%m%dT%H%M%SZ",
+                "0413",
+                "2026-11-19T12:04:09Z",
+            ),
+            (
+                "/logs/N412FP/2026-11-19/0413.parquet",
+                r"(?<tail_number>N\w+)/(?<departure_date>[\d-]+)/(?<departure_time>\d{4})\.parquet$",
+                "%Y-%m-%dT%H%M",
+                "20261119T041300Z",
+                "2026-11-19T04:13:00Z",
+            ),
+        ] {
+            let facts = from_path(Path::new(path), expression).unwrap();
+            let identity = read(&facts, &mapping(Some(format), Some("UTC")), None).unwrap();
+            let found = [identity.tail_number.as_str(), identity.flight_id.as_str()];
+            assert_eq!(found, ["N412FP", flight]);
+            assert_eq!(identity.departure_utc.to_string(), departure);
+        }
     }
 
     /// Istanbul keeps UTC+3 all year since 2016.
@@ -374,24 +399,40 @@ mod tests {
         assert_eq!(instant("2026-10-25T03:30:00", &there).unwrap().to_string(), "2026-10-25T02:30:00Z");
     }
 
-    /// The date in a folder, the time in the name of the file.
+    /// One logger that flew in two aircraft, one after the other.
     #[test]
-    fn a_departure_may_be_in_two_parts_of_a_path() {
-        let path = Path::new("/logs/N412FP/2026-11-19/0413.parquet");
-        let expression = r"(?<tail_number>N\w+)/(?<departure_date>[\d-]+)/(?<departure_time>\d{4})\.parquet$";
-        let facts = from_path(path, expression).unwrap();
-        let identity = read(&facts, &mapping(Some("%Y-%m-%dT%H%M"), Some("UTC")), None).unwrap();
-        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
+    fn a_loggers_own_name_is_the_registration_of_its_day() {
+        let alias = |tail: &str, from: Option<&str>, until: Option<&str>| TailAlias {
+            logged: "QAR 7".into(),
+            tail_number: tail.into(),
+            from: from.map(|day| day.parse().unwrap()),
+            until: until.map(|day| day.parse().unwrap()),
+        };
+        let first = alias("N1", None, Some("2026-03-31"));
+        let tail_aliases = vec![first, alias("N2", Some("2026-04-01"), None)];
+        let m = IdentityMapping { tail_aliases, ..mapping(None, None) };
+        for (logged, day, tail) in
+            [("QAR 7", "2026-03-31", "N1"), (" QAR 7", "2026-04-01", "N2"), ("N3", "2026-04-01", "N3")]
+        {
+            let departure = format!("{day}T23:59:00Z");
+            let mut facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
+            let by_clock = read(&facts, &m, departure.parse().ok()).unwrap();
+            facts.insert(IdentityField::DepartureUtc, departure);
+            for found in [by_clock, read(&facts, &m, None).unwrap()] {
+                assert_eq!(found.tail_number.as_str(), tail, "{day}");
+            }
+        }
     }
 
     #[test]
     fn a_log_without_a_tail_reports_where_it_was_searched() {
         let mut m = mapping(None, None);
         m.metadata.insert(IdentityField::TailNumber, "ac_reg".into());
+        m.path = Some("(?<flight_id>x)".into());
         let fault = read(&IdentityFields::new(), &m, None).unwrap_err();
-        assert!(
-            matches!(&fault, ErrorKind::IdentityMissing { fact: "tail_number", looked } if looked == &["metadata `ac_reg`"])
-        );
+        let ErrorKind::IdentityMissing { fact: "tail_number", looked } = fault else { panic!("{fault}") };
+        let path = "path by `(?<flight_id>x)`, which has no group `tail_number`";
+        assert_eq!(looked, ["metadata `ac_reg`", path]);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
+use std::str::FromStr;
 
 use records::Position;
 
@@ -58,7 +59,8 @@ impl Normalized {
         let text = |key: &str| file.metadata(&format!("freeplay.{key}")).filter(|t| !t.is_empty());
         let number = |key: &str| text(key).and_then(|t| t.parse::<f64>().ok());
         let step_s = number("step_s").ok_or_else(|| fail("`step_s` is missing".into()))?;
-        let segments = text("segments").map_or_else(|| Some(Vec::new()), segments_from);
+        let segments = text("segments").map_or_else(|| Some(Vec::new()), |text| pairs(text, ".."));
+        let segments = segments.ok_or_else(|| fail("its stretches cannot be read".into()))?;
         let facts = IdentityField::ALL
             .iter()
             .filter_map(|fact| Some((*fact, text(fact.as_str())?.to_owned())))
@@ -66,8 +68,8 @@ impl Normalized {
         Ok(Some(Self {
             facts,
             step_s,
-            segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
-            breaks: text("breaks").and_then(breaks_from).unwrap_or_default(),
+            segments: segments.into_iter().map(|(start, end)| start..end).collect(),
+            breaks: text("breaks").and_then(|text| pairs(text, ":")).unwrap_or_default(),
             metres_per_radian: number("metres_per_radian"),
             temperature_c: number("temperature_c"),
             output_locked: text("output_locked") == Some("true"),
@@ -134,19 +136,11 @@ fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error
     Ok((values, seen))
 }
 
-fn segments_from(text: &str) -> Option<Vec<Range<usize>>> {
-    let range = |text: &str| {
-        let (start, end) = text.split_once("..")?;
-        Some(start.parse().ok()?..end.parse().ok()?)
-    };
-    text.split(' ').map(range).collect()
-}
-
-/// `ROW:SECONDS` of each break, separated by blanks.
-fn breaks_from(text: &str) -> Option<Vec<(usize, f64)>> {
+/// Pairs such as `START..END` or `ROW:SECONDS`, separated by blanks.
+fn pairs<A: FromStr, B: FromStr>(text: &str, between: &str) -> Option<Vec<(A, B)>> {
     let one = |text: &str| {
-        let (row, seconds) = text.split_once(':')?;
-        Some((row.parse().ok()?, seconds.parse().ok()?))
+        let (first, second) = text.split_once(between)?;
+        Some((first.parse().ok()?, second.parse().ok()?))
     };
     text.split(' ').map(one).collect()
 }

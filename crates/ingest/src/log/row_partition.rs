@@ -21,7 +21,7 @@ pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 /// Memory limit of gathered samples, bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
-/// No slot: the row belongs to a channel that is not requested.
+/// No combination: the row belongs to a channel that is not requested.
 const NONE: u32 = u32::MAX;
 
 /// The most combinations of texts of the columns that name rows: more are the numbers or times of a wrong column.
@@ -36,32 +36,11 @@ pub(crate) struct SampleSelector {
     pub(crate) rows: Vec<(String, String)>,
 }
 
-/// The texts that mark the rows of a channel or an actuator, by column.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct RowKeys {
-    columns: Vec<String>,
-    texts: Vec<String>,
-}
-
-impl RowKeys {
-    pub(crate) fn of(samples: &SampleSelector) -> Self {
-        let (columns, texts) = samples.rows.iter().cloned().unzip();
-        Self { columns, texts }
-    }
-
-    /// These rows, as far as they are of the flight that a file is opened for.
-    fn of_flight(&self, file: &LogFile) -> Self {
-        let mut rows = self.clone();
-        for (column, text) in &file.flight_rows {
-            rows.columns.push(column.clone());
-            rows.texts.push(text.clone());
-        }
-        rows
-    }
-}
+/// Columns and the texts that mark the rows of a channel or an actuator.
+type Rows = Vec<(String, String)>;
 
 /// Gathered samples are kept by their rows, their leaf, and the leaf whose lists they are aligned to.
-type GatheredKey = (RowKeys, String, Option<String>);
+type GatheredKey = (Rows, String, Option<String>);
 
 /// The rows of a table by channel or actuator.
 #[derive(Debug, Default)]
@@ -72,7 +51,7 @@ pub(crate) struct Partition {
 #[derive(Debug, Default)]
 struct State {
     /// Rows that will be asked for, in this order, and by which positions.
-    announced: Vec<(RowKeys, BTreeSet<String>)>,
+    announced: Vec<(Rows, BTreeSet<String>)>,
     /// Leaves that will be asked for.
     leaves: BTreeSet<String>,
     gathered: HashMap<GatheredKey, Arc<Vec<ArrayRef>>>,
@@ -84,8 +63,13 @@ impl Partition {
     }
 
     /// Remembers rows and leaves that a position will ask for.
-    pub(crate) fn announce(&self, rows: &RowKeys, leaves: impl Iterator<Item = String>, position: &str) {
-        let mut state = self.state();
+    pub(crate) fn announce(
+        &self,
+        samples: &SampleSelector,
+        leaves: impl Iterator<Item = String>,
+        position: &str,
+    ) {
+        let (mut state, rows) = (self.state(), &samples.rows);
         state.leaves.extend(leaves);
         match state.announced.iter_mut().find(|(known, _)| known == rows) {
             Some((_, positions)) => drop(positions.insert(position.to_owned())),
@@ -114,12 +98,11 @@ impl Partition {
         samples: &SampleSelector,
         leaf: &str,
     ) -> Result<Arc<Vec<ArrayRef>>, Error> {
-        let rows = RowKeys::of(samples);
         let is_listed = |name: &str| files.iter().any(|f| f.leaf(name).is_ok_and(|leaf| leaf.is_listed));
         // A list in the channel's own leaf gives a row its samples.
         let aligned = (leaf != samples.leaf && is_listed(&samples.leaf)).then(|| samples.leaf.clone());
         let mut state = self.state();
-        let asked = (rows, leaf.to_owned(), aligned);
+        let asked = (samples.rows.clone(), leaf.to_owned(), aligned);
         if let Some(found) = state.gathered.get(&asked) {
             return Ok(Arc::clone(found));
         }
@@ -127,15 +110,15 @@ impl Partition {
         // Lists of different channels may differ in length: their leaves are gathered one by one.
         let has_lists = state.leaves.iter().chain([&samples.leaf]).any(|name| is_listed(name));
         // Rows of a flight in which each is a sample of every channel: one leaf at a time, as in a file of their own.
-        let is_wide = asked.0.columns.is_empty();
+        let is_wide = asked.0.is_empty();
         if asked.2.is_none() && !has_lists && !is_wide {
             let here = |name: &&String| *name != leaf && files.iter().all(|file| file.has(name));
             leaves.extend(state.leaves.iter().filter(here).cloned());
         }
         let mut keys = vec![asked.0.clone()];
-        let is_new = |rows: &RowKeys| {
+        let is_new = |rows: &Rows| {
             *rows != asked.0
-                && rows.columns == asked.0.columns
+                && rows.iter().map(|row| &row.0).eq(asked.0.iter().map(|row| &row.0))
                 && !state.gathered.contains_key(&(rows.clone(), leaf.to_owned(), asked.2.clone()))
         };
         keys.extend(state.announced.iter().map(|(rows, _)| rows).filter(|rows| is_new(rows)).cloned());
@@ -157,22 +140,23 @@ type Gathered = Vec<Vec<Vec<ArrayRef>>>;
 
 fn gather(
     files: &[LogFile],
-    keys: &[RowKeys],
+    keys: &[Rows],
     leaves: &[String],
     aligned: Option<&str>,
 ) -> Result<Gathered, Error> {
     let leaves: Vec<&str> = leaves.iter().map(String::as_str).collect();
     let mut gathered: Gathered = vec![vec![Vec::new(); leaves.len()]; keys.len()];
-    let mut bytes = vec![0_usize; keys.len()];
+    let (mut bytes, mut by_key) = (vec![0_usize; keys.len()], vec![Vec::new(); keys.len()]);
     for file in files {
-        let keys: Vec<RowKeys> = keys[..gathered.len()].iter().map(|rows| rows.of_flight(file)).collect();
-        let columns: Vec<&str> = keys[0].columns.iter().map(String::as_str).collect();
+        // The rows of the flight that the file is opened for.
+        let of_flight = |rows: &Rows| [rows.as_slice(), &file.flight_rows].concat();
+        let keys: Vec<Rows> = keys[..gathered.len()].iter().map(of_flight).collect();
+        let columns: Vec<&str> = keys[0].iter().map(|(column, _)| column.as_str()).collect();
         let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
-        let mut slots = Slots::of(&keys);
+        let mut combinations = Combinations::of(&keys);
         let may_hold = |group: usize| {
             keys.iter().any(|rows| {
-                let mut pairs = rows.columns.iter().zip(&rows.texts);
-                pairs.all(|(column, text)| {
+                rows.iter().all(|(column, text)| {
                     file.text_bounds(column, group).is_none_or(|bounds| bounds.may_hold(text))
                 })
             })
@@ -180,25 +164,24 @@ fn gather(
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group: &may_hold };
         file.scan(&names, scan, |arrays| {
             let (values, rest) = arrays.split_at(leaves.len());
-            slots.assign(&columns, &rest[..columns.len()])?;
-            for slot in 0..gathered.len() {
-                let rows = slots.rows_of(slot);
-                if rows.is_empty() {
-                    continue;
-                }
-                for (part, array) in gathered[slot].iter_mut().zip(values) {
+            let of_rows = combinations.of_rows(&columns, &rest[..columns.len()], false)?;
+            sort_by_key(of_rows, &mut by_key[..gathered.len()]);
+            for (key, rows) in
+                by_key[..gathered.len()].iter().enumerate().filter(|(_, rows)| !rows.is_empty())
+            {
+                let rows = UInt32Array::from(rows.clone());
+                for (part, array) in gathered[key].iter_mut().zip(values) {
                     let samples = take(array, &rows, None).map_err(|_| ErrorKind::ColumnType {
                         column: leaves[0].to_owned(),
                         found: array.data_type().to_string(),
                         wanted: "numbers",
                     })?;
-                    bytes[slot] += samples.get_array_memory_size();
+                    bytes[key] += samples.get_array_memory_size();
                     part.push(samples);
                 }
             }
             while gathered.len() > 1 && bytes[..gathered.len()].iter().sum::<usize>() > MAX_GATHERED_BYTES {
                 gathered.pop();
-                slots.rows.pop();
             }
             Ok(())
         })?;
@@ -206,55 +189,20 @@ fn gather(
     Ok(gathered)
 }
 
-/// The rows of a batch by slot: slot k holds the rows of key k.
-struct Slots {
-    /// The requested texts of each column.
-    columns: Vec<TextNumbers>,
-    /// The slot of every combination of their numbers.
-    slots: Vec<u32>,
-    /// The rows of each slot.
-    rows: Vec<Vec<u32>>,
-}
-
-impl Slots {
-    fn of(keys: &[RowKeys]) -> Self {
-        let mut columns: Vec<TextNumbers> = keys[0].columns.iter().map(|_| TextNumbers::default()).collect();
-        for rows in keys {
-            for (column, text) in columns.iter_mut().zip(&rows.texts) {
-                column.enter(text);
-            }
-        }
-        let mut slots = vec![NONE; columns.iter().map(|column| column.texts.len()).product()];
-        for (slot, rows) in (0..).zip(keys) {
-            let numbers =
-                columns.iter().zip(&rows.texts).map(|(column, text)| (column, column.numbers[text]));
-            slots[numbers.fold(0, combined) as usize] = slot;
-        }
-        Self { columns, slots, rows: vec![Vec::new(); keys.len()] }
-    }
-
-    /// Sorts the rows of a batch by slot.
-    fn assign(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        let combinations = combine(&mut self.columns, names, arrays, false)?;
-        self.rows.iter_mut().for_each(Vec::clear);
-        for (row, at) in (0..).zip(combinations) {
-            let slot = self.slots.get(at as usize).copied().unwrap_or(NONE);
-            self.rows.get_mut(slot as usize).into_iter().for_each(|rows| rows.push(row));
-        }
-        Ok(())
-    }
-
-    /// The rows of a slot in the batch.
-    fn rows_of(&self, slot: usize) -> UInt32Array {
-        UInt32Array::from(self.rows[slot].clone())
+/// Sorts the rows of a batch by their keys.
+fn sort_by_key(of_rows: &[u32], by_key: &mut [Vec<u32>]) {
+    by_key.iter_mut().for_each(Vec::clear);
+    for (row, key) in (0..).zip(of_rows) {
+        by_key.get_mut(*key as usize).into_iter().for_each(|rows| rows.push(row));
     }
 }
 
 /// The combinations of texts that the rows of some columns hold; a row without one of the texts holds none.
 #[derive(Debug, Default)]
 pub(crate) struct DistinctTexts {
-    columns: Vec<TextNumbers>,
-    pub(crate) found: BTreeSet<Vec<String>>,
+    combinations: Combinations,
+    /// Combinations of row groups that hold but one.
+    stated: BTreeSet<Vec<String>>,
 }
 
 impl DistinctTexts {
@@ -266,7 +214,7 @@ impl DistinctTexts {
         let only = |group: usize| -> Option<Vec<String>> {
             names.iter().map(|name| Some(file.text_bounds(name, group)?.only()?.to_owned())).collect()
         };
-        self.found.extend(file.groups().filter_map(only));
+        self.stated.extend(file.groups().filter_map(only));
         let wants_group = &|group| only(group).is_none();
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group };
         file.scan(names, scan, |arrays| self.take(names, arrays))
@@ -277,35 +225,78 @@ impl DistinctTexts {
     /// # Errors
     /// When a column has no text form, or the combinations are too many.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        self.columns.resize_with(names.len(), TextNumbers::default);
-        let combinations = combine(&mut self.columns, names, arrays, true)?;
-        let all = self.columns.iter().map(|column| column.texts.len()).product();
-        let mut used = vec![false; all];
-        combinations.into_iter().filter(|at| *at != NONE).for_each(|at| used[at as usize] = true);
-        for mut at in (0..used.len()).filter(|at| used[*at]) {
-            let mut texts = Vec::with_capacity(names.len());
-            for column in self.columns.iter().rev() {
-                texts.push(column.texts[at % column.texts.len()].clone());
-                at /= column.texts.len();
-            }
-            texts.reverse();
-            self.found.insert(texts);
-        }
-        Ok(())
+        self.combinations.of_rows(names, arrays, true).map(drop)
+    }
+
+    /// All that were found.
+    pub(crate) fn found(mut self) -> BTreeSet<Vec<String>> {
+        self.stated.extend(self.combinations.texts());
+        self.stated
     }
 }
 
-/// The texts of a column, numbered.
+/// Combinations of the texts of some columns, numbered in the order in which they are entered.
 #[derive(Debug, Default)]
-struct TextNumbers {
+struct Combinations {
+    columns: Vec<TextColumn>,
+    /// Of the rows of the latest batch.
+    rows: Vec<u32>,
+}
+
+impl Combinations {
+    /// The requested rows: combination k is that of key k.
+    fn of(keys: &[Rows]) -> Self {
+        let mut all = Self::default();
+        for rows in keys {
+            all.columns.resize_with(rows.len(), TextColumn::default);
+            let each = all.columns.iter_mut().zip(rows);
+            each.fold(0, |before, (column, (_, text))| {
+                let number = column.number(text);
+                column.enter(before, number)
+            });
+        }
+        all
+    }
+
+    /// The combination of each row. One that is not known becomes known where they are `open`, and is [`NONE`] elsewhere.
+    fn of_rows(&mut self, names: &[&str], arrays: &[ArrayRef], open: bool) -> Result<&[u32], ErrorKind> {
+        self.columns.resize_with(names.len(), TextColumn::default);
+        self.rows.clear();
+        for (column, (name, array)) in self.columns.iter_mut().zip(names.iter().zip(arrays)) {
+            column.append_to(&mut self.rows, name, array, open)?;
+        }
+        Ok(&self.rows)
+    }
+
+    /// The texts of every combination.
+    fn texts(&self) -> Vec<Vec<String>> {
+        let none = vec![Vec::new()];
+        self.columns.iter().fold(none, |before, column| {
+            let texts = |(at, text): &(u32, u32)| {
+                let mut texts = before[*at as usize].clone();
+                texts.push(column.texts[*text as usize].clone());
+                texts
+            };
+            column.parts.iter().map(texts).collect()
+        })
+    }
+}
+
+/// The texts of a column, and their combinations with those of the columns before it.
+#[derive(Debug, Default)]
+struct TextColumn {
     texts: Vec<String>,
     numbers: HashMap<String, u32>,
     /// A dictionary and the number of each of its codes, as batch after batch shares one.
     coded: Option<(ArrayRef, Vec<u32>)>,
+    /// The combination of a combination of the columns before and the number of a text.
+    combinations: Vec<Vec<u32>>,
+    /// Both parts of each combination.
+    parts: Vec<(u32, u32)>,
 }
 
-impl TextNumbers {
-    fn enter(&mut self, text: &str) -> u32 {
+impl TextColumn {
+    fn number(&mut self, text: &str) -> u32 {
         if let Some(number) = self.numbers.get(text) {
             return *number;
         }
@@ -315,55 +306,69 @@ impl TextNumbers {
         number
     }
 
-    /// The number of a text; a new text gets one where the column `is_open`.
-    fn number(&mut self, text: Option<&str>, is_open: bool) -> u32 {
-        match text {
-            Some(text) if is_open => self.enter(text),
-            Some(text) => self.numbers.get(text).copied().unwrap_or(NONE),
-            None => NONE,
+    /// The combination of two parts, which becomes known.
+    fn enter(&mut self, before: u32, number: u32) -> u32 {
+        let (row, column) = (before as usize, number as usize);
+        self.combinations.resize_with(self.combinations.len().max(row + 1), Vec::new);
+        let of_before = &mut self.combinations[row];
+        of_before.resize(of_before.len().max(column + 1), NONE);
+        if of_before[column] == NONE {
+            of_before[column] = self.parts.len() as u32;
+            self.parts.push((before, number));
         }
+        of_before[column]
     }
 
-    /// The number of each row.
-    fn rows(&mut self, name: &str, array: &ArrayRef, is_open: bool) -> Result<Vec<u32>, ErrorKind> {
-        let Some(codes) = array.as_dictionary_opt::<Int32Type>() else {
-            let texts = as_text(name, array)?;
-            return Ok(texts.as_string::<i32>().iter().map(|text| self.number(text, is_open)).collect());
-        };
-        let known = self.coded.take().filter(|(known, _)| Arc::ptr_eq(known, codes.values()));
+    /// Combines the texts of this column with what the columns before gave for each row.
+    fn append_to(
+        &mut self,
+        rows: &mut Vec<u32>,
+        name: &str,
+        array: &ArrayRef,
+        open: bool,
+    ) -> Result<(), ErrorKind> {
+        let codes = array.as_dictionary_opt::<Int32Type>();
+        let dictionary =
+            codes.map_or_else(|| as_text(name, array), |codes| Ok(Arc::clone(codes.values())))?;
+        let known = self.coded.take().filter(|(known, _)| Arc::ptr_eq(known, &dictionary));
         let (dictionary, numbers) = known.unwrap_or_else(|| {
-            let texts = codes.values().as_string::<i32>().iter();
-            (Arc::clone(codes.values()), texts.map(|text| self.number(text, is_open)).collect())
+            let number = |text: Option<&str>| match text {
+                Some(text) if open => self.number(text),
+                text => text.and_then(|text| self.numbers.get(text)).map_or(NONE, |number| *number),
+            };
+            let numbers = dictionary.as_string::<i32>().iter().map(number).collect();
+            (dictionary, numbers)
         });
-        let rows = codes.keys().iter().map(|code| code.map_or(NONE, |code| numbers[code as usize])).collect();
-        self.coded = Some((dictionary, numbers));
-        Ok(rows)
+        let most = (self.texts.len() as u64).saturating_mul(self.combinations.len() as u64);
+        bounds::check("texts of columns that name rows", most, MAX_COMBINATIONS)?;
+        let number = |code: Option<i32>| code.map_or(NONE, |code| numbers[code as usize]);
+        if rows.is_empty() && !open {
+            // Those of the first column are its texts.
+            match codes {
+                None => rows.extend_from_slice(&numbers),
+                Some(codes) => rows.extend(codes.keys().iter().map(number)),
+            }
+            self.coded = codes.map(|_| (dictionary, numbers));
+            return Ok(());
+        }
+        if rows.is_empty() {
+            rows.resize(array.len(), 0);
+        }
+        let mut append = |row: &mut u32, number: u32| {
+            let known = self.combinations.get(*row as usize).and_then(|of_row| of_row.get(number as usize));
+            let known = known.copied().unwrap_or(NONE);
+            let is_new = known == NONE && open && *row != NONE && number != NONE;
+            *row = if is_new { self.enter(*row, number) } else { known };
+        };
+        match codes {
+            None => rows.iter_mut().zip(&numbers).for_each(|(row, number)| append(row, *number)),
+            Some(codes) => {
+                rows.iter_mut().zip(codes.keys()).for_each(|(row, code)| append(row, number(code)));
+                self.coded = Some((dictionary, numbers));
+            }
+        }
+        Ok(())
     }
-}
-
-/// A combination with the number of one more column, the last column's counting fastest.
-fn combined(at: u32, (column, number): (&TextNumbers, u32)) -> u32 {
-    if at == NONE || number == NONE { NONE } else { at * column.texts.len() as u32 + number }
-}
-
-/// The combination of the numbers of each row.
-fn combine(
-    columns: &mut [TextNumbers],
-    names: &[&str],
-    arrays: &[ArrayRef],
-    is_open: bool,
-) -> Result<Vec<u32>, ErrorKind> {
-    let rows = arrays.first().map_or(0, Array::len);
-    let each = columns.iter_mut().zip(names.iter().zip(arrays));
-    let numbers = each.map(|(column, (name, array))| column.rows(name, array, is_open));
-    let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
-    let all = columns.iter().fold(1_u64, |all, column| all.saturating_mul(column.texts.len() as u64));
-    bounds::check("texts of columns that name rows", all, MAX_COMBINATIONS)?;
-    let mut combinations = vec![0; rows];
-    for (column, numbers) in columns.iter().zip(numbers) {
-        combinations.iter_mut().zip(numbers).for_each(|(at, number)| *at = combined(*at, (column, number)));
-    }
-    Ok(combinations)
 }
 
 #[cfg(test)]
@@ -407,7 +412,7 @@ mod tests {
             let files = [file(folder.path(), is_sorted)];
             let partition = Partition::default();
             for name in ["p3", "p7", "p9"] {
-                partition.announce(&RowKeys::of(&samples(name)), std::iter::empty(), name);
+                partition.announce(&samples(name), std::iter::empty(), name);
             }
             let wanted = |k: u32| -> Vec<f64> {
                 let rows = (0..100).map(|i| if is_sorted { k * 100 + i } else { i * 10 + k });
@@ -436,11 +441,9 @@ mod tests {
     /// Two columns mark the rows of a slot; the texts of one are codes of a dictionary, of the other plain.
     #[test]
     fn rows_are_sorted_by_both_of_their_columns() {
-        let key = |name: &str, place: &str| RowKeys {
-            columns: vec!["name".into(), "place".into()],
-            texts: vec![name.into(), place.into()],
-        };
-        let mut slots = Slots::of(&[key("motor", "left"), key("load", "right"), key("motor", "right")]);
+        let key =
+            |name: &str, place: &str| vec![("name".into(), name.into()), ("place".into(), place.into())];
+        let mut keys = Combinations::of(&[key("motor", "left"), key("load", "right"), key("motor", "right")]);
         let names: DictionaryArray<Int32Type> =
             ["motor", "load", "flap", "motor", "motor", "load"].into_iter().collect();
         let places = StringArray::from(vec![
@@ -451,8 +454,10 @@ mod tests {
             None,
             Some("left"),
         ]);
-        slots.assign(&["name", "place"], &[Arc::new(names), Arc::new(places)]).unwrap();
-        let found: Vec<Vec<u32>> = (0..3).map(|slot| slots.rows_of(slot).values().to_vec()).collect();
-        assert_eq!(found, [vec![3], vec![1], vec![0]]);
+        let rows = keys.of_rows(&["name", "place"], &[Arc::new(names), Arc::new(places)], false).unwrap();
+        assert_eq!(rows, [2, 1, NONE, 0, NONE, NONE]);
+        let mut by_key = [Vec::new(), Vec::new()];
+        sort_by_key(rows, &mut by_key);
+        assert_eq!(by_key, [[3], [1]]);
     }
 }

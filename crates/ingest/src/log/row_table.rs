@@ -17,7 +17,7 @@ use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
-use crate::log::row_partition::{DistinctTexts, Partition, RowKeys};
+use crate::log::row_partition::{DistinctTexts, Partition};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::units::TimeUnit;
@@ -39,6 +39,8 @@ pub(crate) struct RowTable {
     pub(crate) layout: Layout,
     /// The clock of its rows, once it was read.
     pub(crate) line: OnceLock<TimeBase>,
+    /// The names of all leaves, once they were asked for.
+    leaf_names: OnceLock<Arc<BTreeSet<String>>>,
     /// The texts of columns that name channels or positions, once they were read.
     texts: Mutex<BTreeMap<String, Arc<BTreeSet<String>>>>,
     /// The rows of each channel or actuator, where rows belong to one.
@@ -48,8 +50,16 @@ pub(crate) struct RowTable {
 impl RowTable {
     /// Some files read as one table.
     pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
-        let (line, texts, partition) = (OnceLock::new(), Mutex::default(), Partition::default());
-        Self { files, clock, layout, line, texts, partition }
+        let (line, leaf_names) = (OnceLock::new(), OnceLock::new());
+        Self {
+            files,
+            clock,
+            layout,
+            line,
+            leaf_names,
+            texts: Mutex::default(),
+            partition: Partition::default(),
+        }
     }
 
     /// The same files by another clock and layout.
@@ -77,11 +87,12 @@ impl RowTable {
     ///
     /// # Errors
     /// When channels are named by a column, and it cannot be read.
-    pub(crate) fn names(&self) -> Result<BTreeSet<String>, Error> {
-        match &self.layout.name_column {
-            Some(column) => self.texts(column).map(|texts| texts.as_ref().clone()),
-            None => Ok(self.files.iter().flat_map(|f| f.leaves().iter().map(|l| l.name.clone())).collect()),
+    pub(crate) fn names(&self) -> Result<Arc<BTreeSet<String>>, Error> {
+        if let Some(column) = &self.layout.name_column {
+            return self.texts(column);
         }
+        let leaves = || self.files.iter().flat_map(LogFile::leaves).map(|leaf| leaf.name.clone());
+        Ok(Arc::clone(self.leaf_names.get_or_init(|| Arc::new(leaves().collect()))))
     }
 
     /// The positions in the position column, if the layout has one.
@@ -221,7 +232,7 @@ impl RowTable {
     pub(crate) fn announce(&self, samples: &SampleSelector, position: &str) {
         if !samples.rows.is_empty() {
             let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
-            self.partition.announce(&RowKeys::of(samples), leaves.cloned(), position);
+            self.partition.announce(samples, leaves.cloned(), position);
         }
     }
 
@@ -256,7 +267,7 @@ impl RowTable {
             let is_listed = file.leaf(&samples.leaf).is_ok_and(|leaf| leaf.is_listed);
             let own = (leaf != samples.leaf && is_listed).then_some(samples.leaf.as_str());
             let names: Vec<&str> = std::iter::once(leaf).chain(own).collect();
-            file.each_batch(&names, |arrays| take(&arrays[0]))?;
+            file.scan(&names, Scan::PLAIN, |arrays| take(&arrays[0]))?;
         }
         Ok(())
     }
@@ -274,7 +285,7 @@ impl RowTable {
         } else {
             self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
         }
-        let found: BTreeSet<String> = distinct.found.into_iter().flatten().collect();
+        let found: BTreeSet<String> = distinct.found().into_iter().flatten().collect();
         let found = Arc::new(found);
         let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         texts.insert(column.to_owned(), Arc::clone(&found));
@@ -344,7 +355,7 @@ impl RowTable {
                 .iter()
                 .try_for_each(|file| file.append_numbers(column, RowSelection::ALL, &mut reals))?;
             let mut reader = TimestampParser::new(column, ticks, 0);
-            reader.take_reals(reals.finish().0);
+            reader.seconds = reals.finish().0;
             return Ok(reader.stamps());
         }
         let room = if is_every_row { self.rows() } else { 0 };
@@ -363,7 +374,7 @@ impl RowTable {
     ) -> Result<Timestamps, Error> {
         let (mut reader, mut bursts) = (TimestampParser::new(column, ticks, self.rows()), Vec::new());
         for file in &self.files {
-            file.each_flat(&[column, &samples.leaf], |_, flats| {
+            file.scan_flat(&[column, &samples.leaf], Scan::PLAIN, |_, flats| {
                 reader.append(&flats[0].values)?;
                 bursts.extend(flats[1].lengths.clone().unwrap_or_default());
                 Ok(())

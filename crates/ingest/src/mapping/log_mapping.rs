@@ -3,6 +3,7 @@
 use crate::mapping::{RawValue, SampleFilter};
 use std::collections::BTreeMap;
 
+use jiff::civil::Date;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
@@ -24,6 +25,17 @@ pub struct Mapping {
     /// Files of other kinds that belong to the same flight, by the name that channels call them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub groups: BTreeMap<String, GroupMapping>,
+}
+
+impl Mapping {
+    /// Clock, layout and identity of the files of a group, or of the main logs.
+    pub(crate) fn of_group(&self, group: Option<&str>) -> (&ClockMapping, &Layout, &IdentityMapping) {
+        let main = (&self.clock, &self.layout, &self.identity);
+        group.and_then(|name| self.groups.get(name)).map_or(main, |group| {
+            let (clock, identity) = (group.clock.as_ref(), group.identity.as_ref());
+            (clock.unwrap_or(main.0), &group.layout, identity.unwrap_or(main.2))
+        })
+    }
 }
 
 /// How the rows of a log are laid out; by default a row holds one sample of every channel.
@@ -84,11 +96,39 @@ pub struct IdentityMapping {
     /// Values for logs that do not hold them: field → value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
+    /// Registrations of aircraft that loggers call otherwise; the first that fits counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tail_aliases: Vec<TailAlias>,
     /// How departures are written, by `strftime` signs; ISO 8601 when not given.
     pub departure_format: Option<String>,
     /// The zone of departures that do not name one, e.g. `UTC` or `Europe/Istanbul`; without it such
     /// a departure is refused rather than guessed.
     pub time_zone: Option<String>,
+}
+
+/// `[[identity.tail_aliases]]`: the registration of an aircraft that a logger calls otherwise.
+#[skip_serializing_none]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TailAlias {
+    /// What the logs call the aircraft.
+    pub logged: String,
+    /// Its registration.
+    pub tail_number: String,
+    /// First day of departure, UTC, on which this holds, e.g. `"2026-03-01"`; any earlier one when not given.
+    #[schemars(with = "Option<String>")]
+    pub from: Option<Date>,
+    /// Last day of departure on which this holds; any later one when not given.
+    #[schemars(with = "Option<String>")]
+    pub until: Option<Date>,
+}
+
+impl TailAlias {
+    /// Whether this is the aircraft of a log; without a day of departure only where every day is.
+    pub(crate) fn is_of(&self, logged: &str, day: Option<Date>) -> bool {
+        let holds = |day| self.from.is_none_or(|from| from <= day) && self.until.is_none_or(|end| day <= end);
+        self.logged == logged && day.map_or(self.from.is_none() && self.until.is_none(), holds)
+    }
 }
 
 /// A fact about a flight that a log may state.

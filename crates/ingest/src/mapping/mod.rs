@@ -8,6 +8,6 @@ pub mod units;
 
 pub use log_mapping::{
     ChannelMapping, Channels, ClockMapping, Epoch, GroupMapping, IdentityField, IdentityMapping, Layout,
-    Mapping, Output, Role,
+    Mapping, Output, Role, TailAlias,
 };
 pub use sample_filter::{RawValue, SampleFilter};

@@ -43,60 +43,44 @@ impl Dimension {
     }
 }
 
-/// The unit of a logged channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum Unit {
-    /// Metre.
-    #[serde(rename = "m")]
-    Metre,
-    /// Millimetre.
-    #[serde(rename = "mm")]
-    Millimetre,
-    /// Micrometre.
-    #[serde(rename = "um", alias = "µm", alias = "μm")]
-    Micrometre,
-    /// Inch.
-    #[serde(rename = "in", alias = "inch")]
-    Inch,
-    /// Degree of arc.
-    #[serde(rename = "deg", alias = "°")]
-    Degree,
-    /// Radian.
-    #[serde(rename = "rad")]
-    Radian,
-    /// Turn.
-    #[serde(rename = "rev", alias = "turn")]
-    Revolution,
-    /// Newton.
-    #[serde(rename = "N")]
-    Newton,
-    /// Kilonewton.
-    #[serde(rename = "kN")]
-    Kilonewton,
-    /// Decanewton.
-    #[serde(rename = "daN")]
-    Decanewton,
-    /// Pound-force.
-    #[serde(rename = "lbf")]
-    PoundForce,
-    /// Newton metre.
-    #[serde(rename = "N.m", alias = "N·m", alias = "Nm", alias = "N m")]
-    NewtonMetre,
-    /// Pound-force inch.
-    #[serde(rename = "lbf.in", alias = "lbf·in", alias = "in.lbf", alias = "lbf in")]
-    PoundForceInch,
-    /// Pound-force foot.
-    #[serde(rename = "lbf.ft", alias = "lbf·ft", alias = "ft.lbf", alias = "lbf ft")]
-    PoundForceFoot,
-    /// Degree Celsius.
-    #[serde(rename = "degC", alias = "°C", alias = "C")]
-    Celsius,
-    /// Degree Fahrenheit.
-    #[serde(rename = "degF", alias = "°F", alias = "F")]
-    Fahrenheit,
-    /// Kelvin.
-    #[serde(rename = "K")]
-    Kelvin,
+/// The units: what each is, its name in the configuration, other spellings, what it measures, and factor and offset of
+/// `SI = value · factor + offset`.
+macro_rules! units {
+    ($($doc:literal $unit:ident = $name:literal [$($other:literal)*] $dimension:ident, $factor:expr, $offset:expr;)*) => {
+        /// The unit of a logged channel.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+        pub enum Unit {
+            $(#[doc = $doc] #[serde(rename = $name $(, alias = $other)*)] $unit,)*
+        }
+
+        impl Unit {
+            const fn entry(self) -> (&'static str, Dimension, f64, f64) {
+                match self {
+                    $(Self::$unit => ($name, Dimension::$dimension, $factor, $offset),)*
+                }
+            }
+        }
+    };
+}
+
+units! {
+    "Metre." Metre = "m" [] Length, 1.0, 0.0;
+    "Millimetre." Millimetre = "mm" [] Length, 1e-3, 0.0;
+    "Micrometre." Micrometre = "um" ["µm" "μm"] Length, 1e-6, 0.0;
+    "Inch." Inch = "in" ["inch"] Length, INCH_M, 0.0;
+    "Degree of arc." Degree = "deg" ["°"] Angle, PI / 180.0, 0.0;
+    "Radian." Radian = "rad" [] Angle, 1.0, 0.0;
+    "Turn." Revolution = "rev" ["turn"] Angle, TAU, 0.0;
+    "Newton." Newton = "N" [] Force, 1.0, 0.0;
+    "Kilonewton." Kilonewton = "kN" [] Force, 1e3, 0.0;
+    "Decanewton." Decanewton = "daN" [] Force, 10.0, 0.0;
+    "Pound-force." PoundForce = "lbf" [] Force, LBF_N, 0.0;
+    "Newton metre." NewtonMetre = "N.m" ["N·m" "Nm" "N m"] Torque, 1.0, 0.0;
+    "Pound-force inch." PoundForceInch = "lbf.in" ["lbf·in" "in.lbf" "lbf in"] Torque, LBF_N * INCH_M, 0.0;
+    "Pound-force foot." PoundForceFoot = "lbf.ft" ["lbf·ft" "ft.lbf" "lbf ft"] Torque, LBF_N * INCH_M * 12.0, 0.0;
+    "Degree Celsius." Celsius = "degC" ["°C" "C"] Temperature, 1.0, 0.0;
+    "Degree Fahrenheit." Fahrenheit = "degF" ["°F" "F"] Temperature, 5.0 / 9.0, -160.0 / 9.0;
+    "Kelvin." Kelvin = "K" [] Temperature, 1.0, -273.15;
 }
 
 impl Unit {
@@ -104,30 +88,6 @@ impl Unit {
     pub(crate) fn from_symbol(symbol: &str) -> Option<Self> {
         let symbol: StrDeserializer<'_, Error> = symbol.into_deserializer();
         Self::deserialize(symbol).ok()
-    }
-
-    /// Name in the configuration, what it measures, and factor and offset of `SI = value · factor + offset`.
-    const fn entry(self) -> (&'static str, Dimension, f64, f64) {
-        use Dimension::{Angle, Force, Length, Temperature, Torque};
-        match self {
-            Self::Metre => ("m", Length, 1.0, 0.0),
-            Self::Millimetre => ("mm", Length, 1e-3, 0.0),
-            Self::Micrometre => ("um", Length, 1e-6, 0.0),
-            Self::Inch => ("in", Length, INCH_M, 0.0),
-            Self::Degree => ("deg", Angle, PI / 180.0, 0.0),
-            Self::Radian => ("rad", Angle, 1.0, 0.0),
-            Self::Revolution => ("rev", Angle, TAU, 0.0),
-            Self::Newton => ("N", Force, 1.0, 0.0),
-            Self::Kilonewton => ("kN", Force, 1e3, 0.0),
-            Self::Decanewton => ("daN", Force, 10.0, 0.0),
-            Self::PoundForce => ("lbf", Force, LBF_N, 0.0),
-            Self::NewtonMetre => ("N.m", Torque, 1.0, 0.0),
-            Self::PoundForceInch => ("lbf.in", Torque, LBF_N * INCH_M, 0.0),
-            Self::PoundForceFoot => ("lbf.ft", Torque, LBF_N * INCH_M * 12.0, 0.0),
-            Self::Celsius => ("degC", Temperature, 1.0, 0.0),
-            Self::Fahrenheit => ("degF", Temperature, 5.0 / 9.0, -160.0 / 9.0),
-            Self::Kelvin => ("K", Temperature, 1.0, -273.15),
-        }
     }
 
     /// What it measures.

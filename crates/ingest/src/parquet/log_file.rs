@@ -23,7 +23,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
 use crate::io::foreign_format;
-use crate::io::read_at::{self, PreadFile};
+use crate::io::read_at;
 use crate::io::transient;
 use crate::mapping::column_pattern::{composed, nearest};
 use crate::mapping::field_metadata::FieldMetadata;
@@ -32,17 +32,15 @@ use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
-use crate::parquet::raw_footer;
+use crate::parquet::raw_footer::{self, Footer};
 use crate::parquet::row_selection::RowSelection;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
 
-/// So much of an object's end is fetched at first: most footers are shorter.
-const USUAL_FOOTER: u64 = 64 << 10;
-
 /// Why a footer could not be read, from the first bytes of the file where those identify another format.
-fn footer_error(source: &ByteSource, error: &ParquetError) -> ErrorKind {
+fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
+    let ErrorKind::NotParquet { detail } = error else { return error };
     let mut head = [0; foreign_format::HEAD_BYTES];
     let length =
         source.want(once(0..head.len() as u64)).map(|()| read_at::read_at(source.file(), &mut head, 0));
@@ -57,7 +55,6 @@ fn footer_error(source: &ByteSource, error: &ParquetError) -> ErrorKind {
         if let Some(encoding) = raw_footer::unknown_encoding(source.file()) {
             return ErrorKind::EncodingUnsupported { encoding };
         }
-        let detail = error.to_string();
         let detail = format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "));
         return ErrorKind::NotParquet { detail };
     }
@@ -75,6 +72,7 @@ pub(crate) struct LogFile {
     pub(crate) flight_rows: Vec<(String, String)>,
     source: ByteSource,
     footer: ArrowReaderMetadata,
+    footer_start: u64,
     /// The same footer, by which text columns are read as the codes of their dictionary.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
     /// The schema of Arrow's writers, once it was asked for.
@@ -105,27 +103,19 @@ impl LogFile {
         let fail = |fault| Error::new(path, fault);
         let source = ByteSource::open(path).map_err(fail)?;
         let file = source.file();
-        let length = transient::with_retry(|| file.metadata())
-            .map_err(|source| fail(ErrorKind::Unreadable { source }))?;
+        let length = transient::with_retry(|| file.metadata()).map_err(|source| fail(source.into()))?;
         if length.is_dir() {
-            let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-            return Err(fail(ErrorKind::Unreadable { source }));
+            return Err(fail(std::io::Error::from(std::io::ErrorKind::IsADirectory).into()));
         }
         if length.len() == 0 {
             return Err(fail(ErrorKind::Empty));
         }
-        want_footer(&source, length.len()).map_err(fail)?;
-        raw_footer::check(file).map_err(fail)?;
+        let read = raw_footer::read(file, |range| source.want(once(range)));
+        let Footer { metadata, start } = read.map_err(|error| fail(footer_error(&source, error)))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        // Parquet's own reader of files neither reads at a position nor repeats a read.
-        let input = PreadFile::new(file).map_err(|source| fail(ErrorKind::Unreadable { source }))?;
-        let footer = ArrowReaderMetadata::load(&input, options).map_err(|e| {
-            fail(match transient::take_failed_read() {
-                Some(source) => ErrorKind::Unreadable { source },
-                None => footer_error(&source, &e),
-            })
-        })?;
+        let footer = ArrowReaderMetadata::try_new(metadata, options)
+            .map_err(|e| fail(ErrorKind::NotParquet { detail: e.to_string() }))?;
         if footer.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns).any(is_before_start) {
             return Err(fail(ErrorKind::NotParquet { detail: "its footer has an offset below zero".into() }));
         }
@@ -136,11 +126,17 @@ impl LogFile {
         }
         let (coded, noted) = (OnceLock::new(), OnceLock::new());
         let (path, flight_rows) = (path.to_owned(), Vec::new());
-        let opened = Self { path, flight_rows, source, footer, coded, noted, leaves, by_name };
+        let opened =
+            Self { path, flight_rows, source, footer, footer_start: start, coded, noted, leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
         Ok(opened)
+    }
+
+    /// The same file, of which the rows of one flight are meant.
+    pub(crate) fn of_flight(self, flight_rows: Vec<(String, String)>) -> Self {
+        Self { flight_rows, ..self }
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -248,15 +244,6 @@ impl LogFile {
     /// # Errors
     /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, the number of rows
     /// differs from the declared one, or `take` fails.
-    pub(crate) fn each_batch(
-        &self,
-        names: &[&str],
-        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
-    ) -> Result<(), Error> {
-        self.scan(names, Scan::PLAIN, |arrays| take(arrays))
-    }
-
-    /// As [`LogFile::each_batch`], of some row groups, in batches of another size, or as codes.
     pub(crate) fn scan(
         &self,
         names: &[&str],
@@ -266,16 +253,8 @@ impl LogFile {
         self.scan_flat(names, scan, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
     }
 
-    /// As [`LogFile::each_batch`], before lists and single values are brought together.
-    pub(crate) fn each_flat(
-        &self,
-        names: &[&str],
-        take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
-    ) -> Result<(), Error> {
-        self.scan_flat(names, Scan::PLAIN, take)
-    }
-
-    fn scan_flat(
+    /// As [`LogFile::scan`], before lists and single values are brought together.
+    pub(crate) fn scan_flat(
         &self,
         names: &[&str],
         scan: Scan<'_>,
@@ -323,7 +302,7 @@ impl LogFile {
     /// of which nothing is wanted are not unpacked. Of a leaf whose rows hold lists all must be wanted.
     ///
     /// # Errors
-    /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
+    /// As [`LogFile::scan`], and when the leaf holds no numbers.
     pub(crate) fn append_numbers(
         &self,
         name: &str,
@@ -345,9 +324,7 @@ impl LogFile {
             }
             let (pages, before, chunk) = (self.pages(group, leaf)?, into.len(), self.chunk(group, leaf));
             if column_numbers::is_plain(chunk) {
-                let input = PreadFile::new(self.source.file())
-                    .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
-                let pages = Pages::new(Arc::new(input), chunk, pages, BATCH_ROWS);
+                let pages = Pages::new(self.handle()?, chunk, pages, BATCH_ROWS);
                 column_numbers::append(pages, chunk, wanted, into)
                     .map_err(|detail| self.decode(leaf, group, detail))?;
                 rows += into.len() - before;
@@ -404,17 +381,19 @@ impl LogFile {
     }
 
     fn column(&self, group: usize, leaf: &LeafColumn, scan: Scan<'_>) -> Result<BatchIter, Error> {
-        let input = PreadFile::new(self.source.file())
-            .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
         let schema = footer.parquet_schema();
         let mask = ProjectionMask::leaves(schema, [leaf.index]);
         let hint = is_coded.then(|| footer.schema().fields());
-        let groups = BoundedGroups::new(input, footer.metadata(), vec![group], scan.batch_rows);
+        let groups = BoundedGroups::new(self.handle()?, footer.metadata(), vec![group], scan.batch_rows);
         parquet_to_arrow_field_levels(schema, mask, hint)
             .and_then(|levels| BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None))
             .map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    fn handle(&self) -> Result<Arc<File>, Error> {
+        read_at::handle(self.source.file()).map_err(|source| self.error(source.into()))
     }
 
     /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
@@ -488,7 +467,7 @@ impl LogFile {
     fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
         // Before the footer is read again, which would succeed.
         if let Some(source) = transient::take_failed_read() {
-            return self.error(ErrorKind::Unreadable { source });
+            return self.error(source.into());
         }
         if let Some(column) = raw_footer::encrypted(self.source.file(), leaf.index) {
             let column = column.then(|| leaf.name.clone());
@@ -506,7 +485,7 @@ impl LogFile {
     /// Equal digests mean equal data read, whatever the name of the file and
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
-        let unreadable = |source| self.error(ErrorKind::Unreadable { source });
+        let unreadable = |source: std::io::Error| self.error(source.into());
         let file = self.source.file();
         let length = read_at::file_length(file).map_err(unreadable)?;
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
@@ -520,8 +499,7 @@ impl LogFile {
                 digest.take(file, start..end).map_err(unreadable)?;
             }
         }
-        let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
-        digest.take(file, start..length).map_err(unreadable)?;
+        digest.take(file, self.footer_start..length).map_err(unreadable)?;
         self.flight_rows.iter().for_each(|(_, text)| digest.take_text(text));
         Ok(())
     }
@@ -581,21 +559,4 @@ fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {
 fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
     let (start, bytes) = chunk.byte_range();
     start..start.saturating_add(bytes)
-}
-
-/// Fetches the whole footer.
-fn want_footer(source: &ByteSource, length: u64) -> Result<(), ErrorKind> {
-    source.want(once(length.saturating_sub(USUAL_FOOTER)..length))?;
-    match footer_bytes(source.file(), length) {
-        Ok(footer) => source.want(once(length - footer..length)),
-        // Shorter than a trailer: the reader of the footer returns the error.
-        Err(_) => Ok(()),
-    }
-}
-
-/// Metadata length, which its own trailer states, plus the eight bytes of that trailer.
-fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {
-    let mut trailer = [0; 4];
-    read_at::read_exact(file, &mut trailer, length.saturating_sub(8))?;
-    Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
 }

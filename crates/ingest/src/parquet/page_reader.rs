@@ -2,6 +2,7 @@
 //! that the page's header claims, and texts past any.
 
 use std::cell::RefCell;
+use std::fs::File;
 use std::io::Read;
 use std::sync::Arc;
 use std::vec;
@@ -18,7 +19,7 @@ use polars_parquet_format::{Encoding as RawEncoding, PageType};
 use zstd::bulk::Decompressor;
 
 use crate::bounds::BATCH_TEXT_BYTES;
-use crate::io::read_at::{PreadFile, read_exact};
+use crate::io::read_at::read_exact;
 use crate::parquet::page_header::{self, Page as RawPage};
 
 /// Fewest rows of a batch, however long its texts may be.
@@ -36,7 +37,7 @@ fn fail<T>(detail: impl Into<String>) -> Result<T> {
 /// Some row groups of a file, whose pages keep to their claims.
 #[derive(Debug)]
 pub(crate) struct BoundedGroups<'m> {
-    file: Arc<PreadFile>,
+    file: Arc<File>,
     metadata: &'m ParquetMetaData,
     groups: Vec<usize>,
     batch_rows: usize,
@@ -44,12 +45,12 @@ pub(crate) struct BoundedGroups<'m> {
 
 impl<'m> BoundedGroups<'m> {
     pub(crate) fn new(
-        file: PreadFile,
+        file: Arc<File>,
         metadata: &'m ParquetMetaData,
         groups: Vec<usize>,
         batch_rows: usize,
     ) -> Self {
-        let groups = Self { file: Arc::new(file), metadata, groups, batch_rows };
+        let groups = Self { file, metadata, groups, batch_rows };
         // A table of few rows may hold long texts.
         Self { batch_rows: batch_rows.min(groups.num_rows()), ..groups }
     }
@@ -82,7 +83,7 @@ impl RowGroups for BoundedGroups<'_> {
 
 /// The chunks of one column, each with the rows of its group.
 struct Chunks {
-    file: Arc<PreadFile>,
+    file: Arc<File>,
     chunks: vec::IntoIter<(ColumnChunkMetaData, i64)>,
     batch_rows: usize,
 }
@@ -94,7 +95,7 @@ impl Iterator for Chunks {
 
     fn next(&mut self) -> Option<Self::Item> {
         let (chunk, rows) = self.chunks.next()?;
-        let pages = page_header::bounded(self.file.file(), &chunk, rows).map_err(ParquetError::General);
+        let pages = page_header::bounded(&self.file, &chunk, rows).map_err(ParquetError::General);
         Some(pages.map(|pages| {
             Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows))
                 as Box<dyn PageReader>
@@ -104,7 +105,7 @@ impl Iterator for Chunks {
 
 /// The pages of one chunk.
 pub(crate) struct Pages {
-    file: Arc<PreadFile>,
+    file: Arc<File>,
     chunk: ColumnChunkMetaData,
     pages: vec::IntoIter<RawPage>,
     batch_rows: usize,
@@ -143,7 +144,7 @@ impl Iterator for Pages {
 impl Pages {
     /// The checked pages of a chunk, read in batches of at most `batch_rows` rows.
     pub(crate) fn new(
-        file: Arc<PreadFile>,
+        file: Arc<File>,
         chunk: &ColumnChunkMetaData,
         mut pages: Vec<RawPage>,
         batch_rows: usize,
@@ -164,7 +165,7 @@ impl Pages {
         // Each page is read into the memory of the one before.
         let mut stored = std::mem::take(&mut self.stored);
         stored.resize(usize::try_from(header.compressed_page_size)?, 0);
-        read_exact(self.file.file(), &mut stored, page.body_start)?;
+        read_exact(&self.file, &mut stored, page.body_start)?;
         if header.crc.is_some_and(|crc| crc32fast::hash(&stored) != crc as u32) {
             return fail("Page CRC checksum mismatch");
         }

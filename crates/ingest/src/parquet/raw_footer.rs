@@ -2,7 +2,11 @@
 //! found that the parquet crate does not name: encryption, and encodings of later versions of the format.
 
 use std::fs::File;
+use std::ops::Range;
+use std::panic::catch_unwind;
+use std::sync::Arc;
 
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use polars_parquet_format::FileMetaData;
 use polars_parquet_format::thrift::protocol::TCompactInputProtocol;
 
@@ -24,36 +28,53 @@ const I64: u8 = 6;
 const LIST: u8 = 9;
 const STRUCT: u8 = 12;
 
-/// Bytes of the footer of a file of this length, if it ends as Parquet with a readable footer does.
-fn footer(file: &File) -> Result<Option<Vec<u8>>, ErrorKind> {
-    let unreadable = |source| ErrorKind::Unreadable { source };
-    let length = read_at::file_length(file).map_err(unreadable)?;
-    let mut trailer = [0; 8];
-    let Some(end) = length.checked_sub(8) else { return Ok(None) };
-    read_at::read_exact(file, &mut trailer, end).map_err(unreadable)?;
-    let [a, b, c, d, magic @ ..] = trailer;
-    let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
-    let Some(start) = end.checked_sub(bytes).filter(|_| magic == *b"PAR1") else { return Ok(None) };
-    bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
-    let mut footer = vec![0; bytes as usize];
-    read_at::read_exact(file, &mut footer, start).map_err(unreadable)?;
-    Ok(Some(footer))
+/// Bytes of an object's end that are fetched at first: most footers are shorter.
+const USUAL_FOOTER: u64 = 64 << 10;
+
+/// A footer, and where in its file it begins.
+pub(crate) struct Footer {
+    pub(crate) metadata: Arc<ParquetMetaData>,
+    pub(crate) start: u64,
 }
 
-/// Compares what a footer claims with what it holds, and its rows with the bytes of the file.
+/// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
+/// `want` fetches bytes before they are read.
 ///
 /// # Errors
-/// A list that is longer than the footer, a schema that is too deep, too many columns or rows.
-pub(crate) fn check(file: &File) -> Result<(), ErrorKind> {
-    let Some(bytes) = footer(file)? else { return Ok(()) };
-    let length = read_at::file_length(file).map_err(|source| ErrorKind::Unreadable { source })?;
-    let mut thrift = Thrift { rest: &bytes };
-    let claims = thrift.file_claims().ok_or_else(|| ErrorKind::NotParquet {
+/// [`ErrorKind::NotParquet`] without a whole footer; [`ErrorKind::BeyondLimit`] where it claims too much.
+pub(crate) fn read(
+    file: &File,
+    want: impl Fn(Range<u64>) -> Result<(), ErrorKind>,
+) -> Result<Footer, ErrorKind> {
+    let (start, bytes) = raw(file, want)?;
+    let damaged = || ErrorKind::NotParquet { detail: "its pages are inconsistent".into() };
+    let decoded = catch_unwind(|| ParquetMetaDataReader::decode_metadata(&bytes)).map_err(|_| damaged())?;
+    let metadata = decoded.map_err(|e| ErrorKind::NotParquet { detail: e.to_string() })?;
+    Ok(Footer { metadata: Arc::new(metadata), start })
+}
+
+/// Start and bytes of a footer whose claims can be.
+fn raw(file: &File, want: impl Fn(Range<u64>) -> Result<(), ErrorKind>) -> Result<(u64, Vec<u8>), ErrorKind> {
+    let corrupt = || ErrorKind::NotParquet { detail: "Invalid Parquet file. Corrupt footer".into() };
+    let length = read_at::file_length(file)?;
+    want(length.saturating_sub(USUAL_FOOTER)..length)?;
+    let end = length.checked_sub(8).ok_or_else(corrupt)?;
+    let mut trailer = [0; 8];
+    read_at::read_exact(file, &mut trailer, end)?;
+    let [a, b, c, d, magic @ ..] = trailer;
+    let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
+    let start = end.checked_sub(bytes).filter(|_| magic == *b"PAR1").ok_or_else(corrupt)?;
+    bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
+    want(start..length)?;
+    let mut footer = vec![0; bytes as usize];
+    read_at::read_exact(file, &mut footer, start)?;
+    let claims = Thrift { rest: &footer }.file_claims().ok_or_else(|| ErrorKind::NotParquet {
         detail: "its footer is damaged: it claims more than it holds".into(),
     })?;
     bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
     bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
-    Ok(bounds::check_rows("rows", claims.rows, length)?)
+    bounds::check_rows("rows", claims.rows, length)?;
+    Ok((start, footer))
 }
 
 /// What a footer claims.
@@ -198,12 +219,10 @@ impl Thrift<'_> {
     }
 }
 
-/// The footer as the format's own types, for messages; its claims must have been [checked](check).
+/// The footer as the format's own types, for messages.
 fn parsed(file: &File) -> Option<FileMetaData> {
-    check(file).ok()?;
-    let footer = footer(file).ok()??;
-    let mut rest = footer.as_slice();
-    let mut protocol = TCompactInputProtocol::new(&mut rest, FOOTER_BYTES as usize);
+    let (_, footer) = raw(file, |_| Ok(())).ok()?;
+    let mut protocol = TCompactInputProtocol::new(footer.as_slice(), FOOTER_BYTES as usize);
     FileMetaData::read_from_in_protocol(&mut protocol).ok()
 }
 

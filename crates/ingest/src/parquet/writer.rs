@@ -91,7 +91,7 @@ pub fn write_encoded(
     encoding: Encoding,
 ) -> Result<(), Error> {
     let fail = |fault| Error::new(file, fault);
-    let io = |source| fail(ErrorKind::Unreadable { source });
+    let io = |source: std::io::Error| fail(source.into());
     let bad = |e: String| fail(ErrorKind::Table { row: None, column: None, detail: e });
     let batch = batch(columns).map_err(|e| bad(e.to_string()))?;
     let schema = batch.schema();

@@ -23,7 +23,7 @@ use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
 use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::whole;
-use crate::io::read_at::PreadFile;
+use crate::io::read_at;
 use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
@@ -66,6 +66,10 @@ impl TableBatch {
     pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
         let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
         Self { file: name.to_owned(), header, batch, before }
+    }
+
+    pub(super) fn into_rows(self) -> RecordBatch {
+        self.batch
     }
 
     /// Rows in it.
@@ -114,21 +118,17 @@ impl TableBatch {
     /// # Errors
     /// The first cell that is no number.
     pub fn numbers(&self, column: Option<usize>) -> Result<Float64Array, Error> {
-        let wanted = DataType::Float64;
-        let Some(index) = column.filter(|c| !is_numeric(self.batch.column(*c))) else {
-            let numbers: Float64Array = self.cast(column, &wanted)?.as_primitive::<Float64Type>().clone();
-            // The value under a null is undefined.
-            if numbers.values().iter().all(|value| value.is_finite()) {
-                return Ok(numbers);
-            }
-            return match numbers.iter().position(|value| value.is_some_and(|value| !value.is_finite())) {
-                Some(row) => {
-                    Err(self.error(row, column, format!("`{}` is not a number", numbers.value(row))))
-                }
-                None => Ok(numbers),
-            };
-        };
-        self.parsed::<Float64Type>(index, number)
+        if let Some(index) = column.filter(|c| !self.batch.column(*c).data_type().is_numeric()) {
+            // Booleans and texts are parsed, or refused.
+            return self.parsed::<Float64Type>(index, number);
+        }
+        let numbers: Float64Array = self.cast(column, &DataType::Float64)?.as_primitive().clone();
+        // The value under a null is undefined.
+        let is_number = |value: Option<f64>| value.is_none_or(f64::is_finite);
+        match numbers.iter().position(|value| !is_number(value)) {
+            Some(row) => Err(self.error(row, column, format!("`{}` is not a number", numbers.value(row)))),
+            None => Ok(numbers),
+        }
     }
 
     /// A column as instants, µs since 1970 UTC; without one, all none.
@@ -170,11 +170,6 @@ impl TableBatch {
             Error::new(&self.file, ErrorKind::ColumnType { column, found, wanted: "text, numbers or times" })
         })
     }
-}
-
-/// Whether a column's cells need no parsing to be numbers: booleans and texts do, or are refused there.
-fn is_numeric(array: &ArrayRef) -> bool {
-    array.data_type().is_numeric()
 }
 
 /// The rows of a table, in order, as [`TableSplits`] knows it.
@@ -244,9 +239,8 @@ fn parquet(
     coded: &[&str],
 ) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
     let opened = whole(file)?;
-    raw_footer::check(&opened)?;
-    let input = PreadFile::new(&opened).map_err(|source| ErrorKind::Unreadable { source })?;
-    let found = caught(|| ArrowReaderMetadata::load(&input, ArrowReaderOptions::new()))?;
+    let metadata = raw_footer::read(&opened, |_| Ok(()))?.metadata;
+    let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()))?;
     let with_coded = || with_codes(&found, |name| coded.contains(&name.trim()));
     let footer = if coded.is_empty() { found } else { with_coded().unwrap_or(found) };
     let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
@@ -263,7 +257,7 @@ fn groups(
     mask: ProjectionMask,
     groups: Range<usize>,
 ) -> Result<(Rows, Arc<Schema>, usize), ErrorKind> {
-    let input = PreadFile::new(file).map_err(|source| ErrorKind::Unreadable { source })?;
+    let input = read_at::handle(file)?;
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
@@ -319,8 +313,7 @@ impl Rows {
             text.clear();
             opened.rewind()?;
             opened.read_to_end(&mut text)
-        })
-        .map_err(|source| ErrorKind::Unreadable { source })?;
+        })?;
         if let Some(format) = foreign(&text) {
             let detail = format!("this is {format}: save it as CSV in UTF-8");
             return Err(ErrorKind::Table { row: None, column: None, detail });
@@ -392,6 +385,7 @@ mod tests {
 
     use arrow::array::{Int64Array, TimestampSecondArray};
     use parquet::arrow::ArrowWriter;
+    use parquet::file::properties::WriterProperties;
     use proptest::prelude::*;
 
     use super::*;
@@ -403,7 +397,9 @@ mod tests {
     fn parquet(batch: &RecordBatch) -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("table.parquet");
-        let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
+        let groups = WriterProperties::builder().set_max_row_group_row_count(Some(3)).build();
+        let sink = File::create(&file).unwrap();
+        let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(groups)).unwrap();
         writer.write(batch).unwrap();
         writer.close().unwrap();
         (dir, file)
@@ -465,15 +461,7 @@ mod tests {
         for serials in texts {
             let kind = serials.data_type().clone();
             let table = batch(vec![("serial", serials), ("gap_m", Arc::new(gaps.clone()))]);
-            let dir = tempfile::tempdir().unwrap();
-            let file = dir.path().join("table.parquet");
-            let small = parquet::file::properties::WriterProperties::builder()
-                .set_max_row_group_row_count(Some(3))
-                .build();
-            let mut writer =
-                ArrowWriter::try_new(File::create(&file).unwrap(), table.schema(), Some(small)).unwrap();
-            writer.write(&table).unwrap();
-            writer.close().unwrap();
+            let (_dir, file) = parquet(&table);
             let parted = TableSplits::open(&file, None, &["serial"]).unwrap();
             assert_eq!(parted.len(), 3);
             let rows = |parts: Range<usize>| parted.batches(parts).unwrap().map(Result::unwrap);

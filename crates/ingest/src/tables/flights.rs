@@ -33,10 +33,8 @@ pub struct Flights {
 /// The rows of one aircraft.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct TailRows {
-    /// Rows whose departure has a time of the day.
-    by_departure: BTreeMap<Timestamp, usize>,
-    /// Rows whose departure is a date alone.
-    by_date: BTreeMap<civil::Date, Vec<usize>>,
+    /// By departure, which is noon where it is a date alone.
+    by_departure: HashMap<(Timestamp, bool), Vec<usize>>,
     by_id: HashMap<String, Vec<usize>>,
 }
 
@@ -45,7 +43,24 @@ struct Row {
     /// Departs at noon where the table has a date alone.
     flight: Flight,
     is_date: bool,
-    facts: IdentityFields,
+    position: Option<String>,
+}
+
+impl Row {
+    fn facts(&self) -> IdentityFields {
+        let Flight { tail_number, flight_id, departure_utc, flight_hours, tail_hours_end } = &self.flight;
+        let date = TimeZone::UTC.to_datetime(*departure_utc).date();
+        let departure = if self.is_date { date.to_string() } else { departure_utc.to_string() };
+        let known = [
+            (IdentityField::TailNumber, Some(tail_number.to_string())),
+            (IdentityField::FlightId, Some(flight_id.to_string())),
+            (IdentityField::DepartureUtc, Some(departure)),
+            (IdentityField::FlightHours, flight_hours.map(|h| h.to_string())),
+            (IdentityField::TailHoursEnd, tail_hours_end.map(|h| h.to_string())),
+            (IdentityField::Position, self.position.clone()),
+        ];
+        known.into_iter().filter_map(|(fact, text)| Some((fact, text?))).collect()
+    }
 }
 
 impl Flights {
@@ -67,10 +82,7 @@ impl Flights {
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
         let (mut flights, mut errors) = (Self::default(), Vec::new());
         for row in 0..table.len() {
-            match flights.enter(&table, row, needed, optional, identity) {
-                Ok(()) => {}
-                Err(error) => errors.push(error),
-            }
+            errors.extend(flights.enter(&table, row, needed, optional, identity).err());
         }
         if let (true, Some(hours)) = (errors.is_empty(), optional[0]) {
             errors = flights.overlapping(&table, hours);
@@ -142,18 +154,6 @@ impl Flights {
             flight_hours: table.optional(row, hours, not_negative)?,
             tail_hours_end: table.optional(row, tail_hours, not_negative)?,
         };
-        let known = [
-            (IdentityField::TailNumber, Some(flown.tail_number.to_string())),
-            (IdentityField::FlightId, Some(flown.flight_id.to_string())),
-            (
-                IdentityField::DepartureUtc,
-                Some(date.map_or(departure_utc.to_string(), |date| date.to_string())),
-            ),
-            (IdentityField::FlightHours, flown.flight_hours.map(|h| h.to_string())),
-            (IdentityField::TailHoursEnd, flown.tail_hours_end.map(|h| h.to_string())),
-            (IdentityField::Position, position.and_then(|column| table.text(row, column)).map(str::to_owned)),
-        ];
-        let facts = known.into_iter().filter_map(|(fact, text)| Some((fact, text?))).collect();
         let index = self.rows.len();
         if let Some(path) = path.and_then(|column| table.text(row, column)) {
             self.by_path.insert(path.replace('\\', "/"), index);
@@ -169,12 +169,11 @@ impl Flights {
                     format!("a second flight {id} of {tail} on {date}: give both departures with their time");
                 return Err(table.error(row, departure, what));
             }
-            of_tail.by_date.entry(date).or_default().push(index);
-        } else {
-            of_tail.by_departure.insert(departure_utc, index);
         }
+        of_tail.by_departure.entry((departure_utc, date.is_some())).or_default().push(index);
         same_id.push(index);
-        self.rows.push(Row { flight: flown, is_date: date.is_some(), facts });
+        let position = position.and_then(|column| table.text(row, column)).map(str::to_owned);
+        self.rows.push(Row { flight: flown, is_date: date.is_some(), position });
         Ok(())
     }
 
@@ -201,13 +200,13 @@ impl Flights {
 
     fn row_of(&self, tail_number: &str, flight_id: Option<&str>, departure_utc: Timestamp) -> Option<usize> {
         let of_tail = self.by_tail.get(tail_number)?;
-        if let Some(row) = of_tail.by_departure.get(&departure_utc) {
+        if let Some(row) = of_tail.by_departure.get(&(departure_utc, false)).and_then(|rows| rows.last()) {
             return Some(*row);
         }
         let away = |row: &usize| self.rows[*row].flight.departure_utc.duration_since(departure_utc).abs();
         let Some(id) = flight_id else {
-            let of_date = of_tail.by_date.get(&TimeZone::UTC.to_datetime(departure_utc).date());
-            return of_date.and_then(|rows| if let [row] = rows[..] { Some(row) } else { None });
+            let noon = noon(TimeZone::UTC.to_datetime(departure_utc).date()).ok()?;
+            return of_tail.by_departure.get(&(noon, true)).and_then(|rows| only(rows));
         };
         let same_id = of_tail.by_id.get(id)?.iter().copied();
         same_id.filter(|row| away(row) <= SAME_FLIGHT).min_by_key(away)
@@ -234,14 +233,11 @@ impl Flights {
             };
             match departure {
                 Some(at) => self.row_of(tail, id, at),
-                None => match self.by_tail.get(tail)?.by_id.get(id?)?[..] {
-                    [row] => Some(row),
-                    _ => None,
-                },
+                None => only(self.by_tail.get(tail)?.by_id.get(id?)?),
             }
         };
         let found = self.of_path(path).or_else(by_identity);
-        found.map(|row| self.rows[row].facts.clone()).unwrap_or_default()
+        found.map(|row| self.rows[row].facts()).unwrap_or_default()
     }
 
     /// The row whose path the log's own path ends in, folder by folder.
@@ -255,6 +251,10 @@ impl Flights {
             rest = rest.split_once('/')?.1;
         }
     }
+}
+
+fn only(rows: &[usize]) -> Option<usize> {
+    if let [row] = rows { Some(*row) } else { None }
 }
 
 /// Noon of a date, UTC.

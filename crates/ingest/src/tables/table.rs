@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use arrow::array::RecordBatch;
+use arrow::compute::concat_batches;
+use arrow::datatypes::Schema;
 
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::tables::cell::{bad_cell, missing, position};
 use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 
@@ -14,9 +17,8 @@ use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 pub struct Table {
     file: std::path::PathBuf,
     header: Vec<String>,
-    batches: Vec<Vec<StringColumn>>,
-    /// Rows up to the end of each batch.
-    ends: Vec<usize>,
+    columns: Vec<StringColumn>,
+    rows: usize,
     names: ColumnAliases,
 }
 
@@ -29,11 +31,8 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        let mut table = Self::empty(file);
-        for batch in batches(file, None)? {
-            table.extend(&batch?)?;
-        }
-        Ok(table)
+        let parts = batches(file, None)?.map(|part| part.map(TableBatch::into_rows));
+        Self::of_batches(file, &parts.collect::<Result<Vec<_>, _>>()?)
     }
 
     /// The same table from memory; `name` stands for its file in diagnostics.
@@ -41,27 +40,14 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let mut table = Self::empty(name);
-        batches.iter().try_for_each(|batch| table.extend(&TableBatch::new(name, batch.clone(), 0)))?;
-        Ok(table)
-    }
-
-    fn empty(file: &Path) -> Self {
-        Self {
-            file: file.to_owned(),
-            header: Vec::new(),
-            batches: Vec::new(),
-            ends: Vec::new(),
-            names: ColumnAliases::new(),
-        }
-    }
-
-    fn extend(&mut self, batch: &TableBatch) -> Result<(), Error> {
-        self.header = batch.header().to_vec();
-        let columns = (0..self.header.len()).map(|column| batch.texts(Some(column)));
-        self.batches.push(columns.collect::<Result<_, _>>()?);
-        self.ends.push(self.len() + batch.len());
-        Ok(())
+        let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
+        let all = concat_batches(&schema, batches).map_err(|e| {
+            Error::new(name, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
+        })?;
+        let all = TableBatch::new(name, all, 0);
+        let (header, rows) = (all.header().to_vec(), all.len());
+        let columns = (0..header.len()).map(|column| all.texts(Some(column))).collect::<Result<_, _>>()?;
+        Ok(Self { file: name.to_owned(), header, columns, rows, names: ColumnAliases::new() })
     }
 
     /// The same table, whose columns go by a user's own names.
@@ -73,7 +59,7 @@ impl Table {
 
     /// Rows without the header.
     pub fn len(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.rows
     }
 
     /// Whether there is no row.
@@ -98,9 +84,7 @@ impl Table {
 
     /// The text of a cell.
     pub fn text(&self, row: usize, column: usize) -> Option<&str> {
-        let batch = self.ends.partition_point(|end| *end <= row);
-        let before = if batch == 0 { 0 } else { self.ends[batch - 1] };
-        self.batches[batch].get(column)?.get(row - before)
+        self.columns.get(column)?.get(row)
     }
 
     /// A cell that must hold something, read as `T`.

@@ -69,13 +69,6 @@ pub struct TimestampRepairs {
     pub repeated: usize,
 }
 
-impl TimestampRepairs {
-    /// Whether no repair was needed.
-    pub fn none(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 impl TimeBase {
     /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
     ///
@@ -181,16 +174,16 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
     if let TimeOrigin::Counted(first_s) = stamps.origin {
         plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
     }
-    if clock.tick_s.is_none()
-        && let Some((usual_s, longest_s)) = even_steps(&stamps.seconds)
-    {
-        let step_s = checked_step(usual_s, clock, &stamps.column)?;
+    if clock.tick_s.is_none() && stamps.seconds.len() > 1 && strictly_rising(&stamps.seconds) {
+        let steps: Vec<f64> = stamps.seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let longest_s = steps.iter().copied().fold(0.0, f64::max);
+        let step_s = checked_step(usual_step(steps), clock, &stamps.column)?;
         if longest_s <= BREAK_STEPS * step_s {
             return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
         }
     }
     // A log whose every stamp falls was written backwards: sorting it loses nothing.
-    let is_backwards = strictly_falling(&stamps.seconds);
+    let is_backwards = stamps.seconds.len() > 2 && stamps.seconds.windows(2).all(|w| w[1] < w[0]);
     let max_back_s = if is_backwards { f64::INFINITY } else { clock.max_back_s.unwrap_or(MAX_BACK_S) };
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
     let pieces = split_at_resets(stamps, max_back_s, clock.split_at_jumps)?;
@@ -242,18 +235,6 @@ fn plausible(
         return Ok(value_s);
     }
     Err(ErrorKind::TimeImplausible { column: column.to_owned(), what, value_s, least_s, most_s })
-}
-
-/// A clock with equal steps, which most logs have: its usual step, as [`usual_step`] has it, and its longest one, s. `None`
-/// where a stamp is missing or does not rise, or where steps differ.
-fn even_steps(seconds: &[f64]) -> Option<(f64, f64)> {
-    let mut steps: Vec<f64> = seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let (least_s, longest_s) =
-        (steps.iter().copied().fold(f64::INFINITY, f64::min), steps.iter().copied().fold(0.0, f64::max));
-    let middle = steps.len().checked_sub(1)? / 2;
-    let is_even =
-        steps.iter().all(|step_s| *step_s > 0.0) && longest_s - least_s <= COARSE_TICK_SHARE * least_s;
-    is_even.then(|| (*steps.select_nth_unstable_by(middle, f64::total_cmp).1, longest_s))
 }
 
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
@@ -341,11 +322,6 @@ fn strictly_rising(t: &[f64]) -> bool {
     t.first().is_some_and(|s| !s.is_nan()) && t.windows(2).all(|w| w[0] < w[1])
 }
 
-/// Whether every stamp of at least three is less than the one before.
-fn strictly_falling(t: &[f64]) -> bool {
-    t.len() > 2 && t.windows(2).all(|w| w[1] < w[0])
-}
-
 /// Rows with a stamp, piece by piece in order of time, the first of each repeated stamp.
 #[expect(clippy::float_cmp, reason = "a repeated stamp repeats its bits")]
 fn sort_dedup(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
@@ -419,7 +395,7 @@ mod tests {
         assert_eq!(line.kept, None);
         assert_eq!(line.segments, split_at(100, &[]));
         assert!((line.step_s - 0.01).abs() < 1e-15);
-        assert!(line.repairs.none());
+        assert_eq!(line.repairs, TimestampRepairs::default());
     }
 
     #[test]
@@ -503,29 +479,6 @@ mod tests {
         assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
         assert_eq!(line.segments, [0..4, 4..6]);
         assert_eq!(line.breaks, [(4, 9.0)]);
-    }
-
-    /// Clocks of many kinds: where the quick way gives a step, it is that of the slow one, to the bit.
-    #[test]
-    fn the_quick_way_sees_the_step_that_the_slow_one_does() {
-        let jitter = |k: u32| f64::from(k.wrapping_mul(40503) % 1024) / 1024.0;
-        for rows in [3, 4, 1000, 5001] {
-            let clocks = [
-                (0..rows).map(|k| f64::from(k) * 0.002).collect::<Vec<_>>(),
-                (0..rows).map(|k| f64::from(k) * 0.1 + 1e-4 * jitter(k)).collect(),
-                (0..rows).map(|k| (f64::from(k) * 0.004 * 1e6).round() / 1e6).collect(),
-                (0..rows).map(|k| f64::from(k) * 0.5).collect(),
-            ];
-            for t in clocks {
-                let (usual_s, longest_s) = even_steps(&t).unwrap();
-                let steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-                assert_eq!(longest_s.to_bits(), steps.iter().copied().fold(0.0, f64::max).to_bits());
-                assert_eq!(usual_s.to_bits(), usual_step(steps).to_bits(), "{rows} rows");
-            }
-        }
-        for t in [&[0.0, 1.0, 1.0, 2.0][..], &[0.0, 1.0, f64::NAN, 2.0], &[0.0, 1.0, 2.5], &[0.0], &[]] {
-            assert_eq!(even_steps(t), None);
-        }
     }
 
     proptest! {

@@ -5,7 +5,6 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::Timestamp;
 
-use crate::channel::buffer_pool;
 use crate::error::ErrorKind;
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::time::clock::{DAY_S, TimeOrigin, Timestamps};
@@ -75,7 +74,8 @@ pub(crate) struct TimestampParser<'a> {
     first_real: Option<f64>,
     turns: f64,
     before: f64,
-    seconds: Vec<f64>,
+    /// Seconds since the first stamp; of real ticks the ticks themselves, until all are there.
+    pub(crate) seconds: Vec<f64>,
     is_zoned: bool,
 }
 
@@ -113,25 +113,9 @@ impl<'a> TimestampParser<'a> {
             let whole: &PrimitiveArray<Int64Type> = whole.as_primitive();
             whole.iter().for_each(|tick| self.push_whole(tick));
         } else {
-            let mut reals = Vec::with_capacity(array.len());
-            append(self.column, array, &mut reals)?;
-            reals.iter().for_each(|&tick| self.push_real(tick));
+            append(self.column, array, &mut self.seconds)?;
         }
         Ok(())
-    }
-
-    /// As [`TimestampParser::append`], for all there is, in its place.
-    pub(crate) fn take_reals(&mut self, mut reals: Vec<f64>) {
-        if self.ticks.wraps_at.is_some() {
-            reals.iter().for_each(|&tick| self.push_real(tick));
-            return buffer_pool::release(reals);
-        }
-        self.first_real = reals.iter().copied().find(|tick| tick.is_finite());
-        let (first, per_second) = (self.first_real.unwrap_or(f64::NAN), self.ticks.per_second);
-        for tick in &mut reals {
-            *tick = if tick.is_finite() { (*tick - first) / per_second } else { f64::NAN };
-        }
-        self.seconds = reals;
     }
 
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
@@ -149,31 +133,38 @@ impl<'a> TimestampParser<'a> {
     fn push_whole(&mut self, tick: Option<i64>) {
         let Some(tick) = tick else { return self.seconds.push(f64::NAN) };
         let first = *self.first_whole.get_or_insert(tick);
-        self.push(tick.wrapping_sub(first) as f64);
+        let second = self.second_of(tick.wrapping_sub(first) as f64);
+        self.seconds.push(second);
     }
 
-    fn push_real(&mut self, tick: f64) {
-        if !tick.is_finite() {
-            return self.seconds.push(f64::NAN);
-        }
-        let first = *self.first_real.get_or_insert(tick);
-        self.push(tick - first);
-    }
-
-    /// A counter that starts again only ever goes on: a fall by more than half its range is a turn.
-    fn push(&mut self, ticks: f64) {
+    /// Ticks since the first one in seconds. A counter that starts again only ever goes on: a fall by more than half its
+    /// range is a turn.
+    fn second_of(&mut self, mut ticks: f64) -> f64 {
         if let Some(range) = self.ticks.wraps_at {
             if ticks - self.before < -0.5 * range {
                 self.turns += 1.0;
             }
             self.before = ticks;
-            self.seconds.push((ticks + self.turns * range) / self.ticks.per_second);
-        } else {
-            self.seconds.push(ticks / self.ticks.per_second);
+            ticks += self.turns * range;
         }
+        ticks / self.ticks.per_second
     }
 
-    pub(crate) fn stamps(self) -> Timestamps {
+    /// Real ticks become seconds in their place.
+    fn convert_reals(&mut self) {
+        let mut ticks = std::mem::take(&mut self.seconds);
+        self.first_real = ticks.iter().copied().find(|tick| tick.is_finite());
+        let first = self.first_real.unwrap_or(f64::NAN);
+        for tick in &mut ticks {
+            *tick = if tick.is_finite() { self.second_of(*tick - first) } else { f64::NAN };
+        }
+        self.seconds = ticks;
+    }
+
+    pub(crate) fn stamps(mut self) -> Timestamps {
+        if self.ticks.is_real() {
+            self.convert_reals();
+        }
         let per_second = self.ticks.per_second;
         let whole = self
             .first_whole

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int16Array, Int64Array, StringArray,
-    Time32MillisecondArray, UInt16Array, UInt64Array,
+    ArrayRef, BooleanArray, Float64Array, Int16Array, Int64Array, StringArray, Time32MillisecondArray,
+    UInt16Array, UInt64Array,
 };
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, TimeUnit as ArrowUnit};
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
 use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Mapping, RawValue};
 
-use crate::layouts::{self, channel, opened, place, plain, write};
+use crate::layouts::{self, channel, identity, place, plain, write};
 
 const STEP_S: f64 = 0.01;
 const ROWS: usize = 1000;
@@ -196,54 +198,70 @@ fn bits_of_a_status_word_mark_valid_samples() {
     assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
 }
 
+/// Each kind of clock of 10 ms from 2025-11-19T04:13:00.25Z on, which is 1,763,525,580.25 s after 1970: the step is the
+/// same, and an absolute clock gives its first instant. Istanbul is three hours ahead of UTC; 2026-11-19 is day 46345 of
+/// spreadsheets (as LibreOffice has it).
 #[test]
-fn a_counter_that_wraps_is_a_clock() {
-    let count = Arc::new((0..ROWS).map(|k| ((65_400 + k) % 65_536) as u16).collect::<UInt16Array>());
-    let mut m = plain();
-    m.clock.unit = Some(TimeUnit::Count);
-    (m.clock.rate_hz, m.clock.wraps_at) = (Some(100.0), Some(65_536.0));
-    let a = read(&m, &with(columns(), "t", count)).unwrap();
-    assert_eq!((a.step_s, a.segments.len(), a.dx_m.len()), (0.01, 1, ROWS));
-}
-
-/// The second half of a flight over midnight, in 10 ms: a time of day, a duration, and the same in minutes.
-#[test]
-fn times_of_day_and_durations_have_a_unit_of_their_own() {
-    let day_ms = 86_400_000;
-    let of_day = |k: usize| ((day_ms - 2000 + 10 * k as i64) % day_ms) as i32;
-    let of_day: ArrayRef = Arc::new(Time32MillisecondArray::from_iter_values((0..ROWS).map(of_day)));
-    let duration: ArrayRef = Arc::new(DurationMicrosecondArray::from_iter_values(
-        (0..ROWS as i64).map(|k| 5_000_000 + 10_000 * k),
-    ));
-    let minutes = reals(|t| 7.0 + t / 60.0);
-    for (clock, unit) in [(of_day, None), (duration, None), (minutes, Some(TimeUnit::Minute))] {
-        let mut m = plain();
-        m.clock.unit = unit;
-        let a = read(&m, &with(columns(), "t", clock)).unwrap();
-        assert!((a.step_s - 0.01).abs() < 1e-9 && a.segments.len() == 1, "{} s", a.step_s);
-        assert_eq!(a.dx_m.len(), ROWS);
-    }
-}
-
-#[test]
-fn numbers_since_1970_and_text_are_instants() {
-    let seconds = |k: usize| 1_763_525_580_250 + 10 * k as i64;
-    let unix: ArrayRef = Arc::new((0..ROWS).map(seconds).collect::<Int64Array>());
-    let text: ArrayRef = Arc::new(
-        (0..ROWS)
-            .map(|k| Some(jiff::Timestamp::from_millisecond(seconds(k)).unwrap().to_string()))
-            .collect::<StringArray>(),
-    );
-    for (clock, unit, epoch) in [(unix, Some(TimeUnit::Millisecond), Epoch::Unix), (text, None, Epoch::None)]
-    {
+fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
+    const FIRST_MS: i64 = 1_763_525_580_250;
+    let whole = |first: i64, each: i64| -> ArrayRef {
+        Arc::new((0..ROWS as i64).map(|k| first + each * k).collect::<Int64Array>())
+    };
+    let of_type = |array: ArrayRef, kind: DataType| cast(&array, &kind).unwrap();
+    let stamps = |zone: Option<&str>| {
+        let kind = DataType::Timestamp(ArrowUnit::Millisecond, zone.map(Into::into));
+        of_type(whole(FIRST_MS, 10), kind)
+    };
+    let nanoseconds = DataType::Timestamp(ArrowUnit::Nanosecond, None);
+    let instant = |k: i64| jiff::Timestamp::from_millisecond(FIRST_MS + 10 * k).unwrap().to_string();
+    let text = (0..ROWS as i64).map(|k| Some(instant(k))).collect::<StringArray>();
+    let of_day = (0..ROWS as i32).map(|k| (86_398_000 + 10 * k) % 86_400_000);
+    let count = (0..ROWS).map(|k| ((65_400 + k) % 65_536) as u16);
+    let (second, millisecond) = (Some(TimeUnit::Second), Some(TimeUnit::Millisecond));
+    let (none, there) = (Epoch::None, Some("Europe/Istanbul"));
+    let utc = Some("2025-11-19T04:13:00.25Z");
+    let cases: [(ArrayRef, Option<TimeUnit>, Epoch, Option<&str>, Option<&str>); 15] = [
+        (reals(|t| 10.0 + t), second, none, there, None),
+        (reals(|t| 7.0 + t / 60.0), Some(TimeUnit::Minute), none, there, None),
+        (whole(FIRST_MS, 10), millisecond, none, there, None),
+        (whole(FIRST_MS, 10), millisecond, Epoch::Unix, None, utc),
+        (whole(1000 * FIRST_MS, 10_000), Some(TimeUnit::Microsecond), Epoch::Unix, None, utc),
+        (whole(1_000_000 * FIRST_MS, 10_000_000), Some(TimeUnit::Nanosecond), none, there, None),
+        (stamps(Some("UTC")), None, none, None, utc),
+        (stamps(None), None, none, None, None),
+        (stamps(None), None, none, there, Some("2025-11-19T01:13:00.25Z")),
+        (of_type(stamps(None), nanoseconds), None, none, Some("UTC"), utc),
+        (Arc::new(text), None, none, None, utc),
+        (Arc::new(Time32MillisecondArray::from_iter_values(of_day)), None, none, there, None),
+        // The type of a duration wins over the mapped unit.
+        (of_type(whole(5000, 10), DataType::Duration(ArrowUnit::Millisecond)), second, none, there, None),
+        (Arc::new(count.collect::<UInt16Array>()), Some(TimeUnit::Count), none, there, None),
+        (
+            reals(|t| 46_345.25 + t / 86_400.0),
+            Some(TimeUnit::Day),
+            Epoch::Excel,
+            Some("UTC"),
+            Some("2026-11-19T06:00:00Z"),
+        ),
+    ];
+    for (clock, unit, epoch, zone, start) in cases {
+        let case = format!("{} {unit:?} {epoch:?} {zone:?}", clock.data_type());
         let mut m = plain();
         (m.clock.unit, m.clock.epoch) = (unit, epoch);
-        let (_dir, file) = place("x.parquet");
+        if unit == Some(TimeUnit::Count) {
+            (m.clock.rate_hz, m.clock.wraps_at) = (Some(100.0), Some(65_536.0));
+        }
+        m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
+        m.identity.time_zone = zone.map(str::to_owned);
         let columns = with(columns(), "t", clock);
-        write(&file, &columns);
-        let log = opened(&file, &m);
-        assert_eq!(log.start_utc().unwrap().unwrap().to_string(), "2025-11-19T04:13:00.25Z");
-        assert!((read(&m, &columns).unwrap().step_s - 0.01).abs() < 1e-9);
+        let a = read(&m, &columns).unwrap();
+        // A double holds days since 1899 to a microsecond.
+        let tolerance_s = if epoch == Epoch::Excel { 2e-6 } else { 1e-9 };
+        assert!((a.step_s - 0.01).abs() < tolerance_s, "{case}: {} s", a.step_s);
+        assert_eq!((a.segments.len(), a.dx_m.len()), (1, ROWS), "{case}");
+        let instant = |text: &str| text.parse::<jiff::Timestamp>().unwrap().as_millisecond();
+        let found = identity("N1_x.parquet", &m, &columns).ok();
+        assert_eq!(found.as_deref().map(instant), start.map(instant), "{case}");
     }
 }
 

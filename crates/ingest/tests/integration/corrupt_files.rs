@@ -33,12 +33,18 @@ fn code(result: Result<Log, Error>) -> String {
 fn files_that_are_no_logs_are_distinguished() {
     let dir = tempfile::tempdir().unwrap();
     let m = plain();
-    let at = |name: &str, bytes: &[u8]| {
+    let opened = |name: &str, bytes: &[u8]| {
         let file = dir.path().join(name);
         std::fs::write(&file, bytes).unwrap();
-        code(Log::open(&LogFiles::one(&file), &Arc::new(m.clone())))
+        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
     };
+    let at = |name: &str, bytes: &[u8]| code(opened(name, bytes));
+    let foreign = opened("hdf.parquet", b"\x89HDF\r\n\x1a\n").unwrap_err().diagnostic();
+    assert!(foreign.message.contains("HDF5") && foreign.hint.unwrap().contains("docs/convert-logs.md"));
     assert_eq!(at("empty.parquet", b""), "empty_log");
+    let rows = dir.path().join("rows.parquet");
+    write(&rows, &[("t", Arc::new(Float64Array::from(Vec::<f64>::new())))]);
+    assert_eq!(code(Log::open(&LogFiles::one(&rows), &Arc::new(m.clone()))), "empty_log");
     assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
     assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "encrypted");
     assert_eq!(code(Log::open(&LogFiles::one(dir.path()), &Arc::new(m.clone()))), "unreadable");
@@ -46,15 +52,6 @@ fn files_that_are_no_logs_are_distinguished() {
         code(Log::open(&LogFiles::one(dir.path().join("none.parquet")), &Arc::new(m.clone()))),
         "unreadable"
     );
-}
-
-#[test]
-fn a_log_without_rows_is_reported() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("none.parquet");
-    let none: ArrayRef = Arc::new(Float64Array::from(Vec::<f64>::new()));
-    write(&file, &[("t", none)]);
-    assert_eq!(code(Log::open(&LogFiles::one(&file), &Arc::new(plain()))), "empty_log");
 }
 
 #[test]
@@ -164,19 +161,6 @@ fn names_that_look_alike_are_told_apart() {
         m.channels.screw_position = Some(channel(mapped, Unit::Metre));
         let hint = read(&file, &m).unwrap_err().diagnostic().hint.unwrap();
         assert!(hint.contains(point), "{hint}");
-    }
-}
-
-#[test]
-fn a_file_of_another_tool_is_named() {
-    let (_dir, file) = place("flight.parquet");
-    for (head, format) in
-        [(&b"MDF     4.10    "[..], "MDF"), (b"\x89HDF\r\n\x1a\n", "HDF5"), (b"t,m\n0,1\n", "CSV")]
-    {
-        std::fs::write(&file, head).unwrap();
-        let diagnostic = Log::open(&LogFiles::one(&file), &Arc::new(plain())).unwrap_err().diagnostic();
-        let text = diagnostic.to_string();
-        assert!(text.contains(format) && diagnostic.hint.unwrap().contains("docs/convert-logs.md"), "{text}");
     }
 }
 

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, Decimal128Array, DictionaryArray, DurationMillisecondArray, Float16Array, Float32Array,
-    Float64Array, Int16Array, Int32Array, Int64Array, ListArray, RecordBatch, StringArray,
-    Time32MillisecondArray, TimestampMillisecondArray, TimestampNanosecondArray,
+    ArrayRef, Decimal128Array, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array,
+    Int32Array, Int64Array, ListArray, RecordBatch, StringArray, Time32MillisecondArray,
+    TimestampMillisecondArray,
 };
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema};
 use ingest::log::identity::IdentityFields;
@@ -196,47 +196,6 @@ fn every_numeric_type_is_read() {
 }
 
 #[test]
-fn every_clock_gives_the_same_step() {
-    let ticks = |per_second: i64| {
-        Int64Array::from((0..5).map(|i| 1_700_000_000 * per_second + i * per_second / 50).collect::<Vec<_>>())
-    };
-    let clocks: Vec<(ArrayRef, Option<TimeUnit>)> = vec![
-        (reals(&[10.0, 10.02, 10.04, 10.06, 10.08]), Some(TimeUnit::Second)),
-        (Arc::new(ticks(1000)), Some(TimeUnit::Millisecond)),
-        (Arc::new(ticks(1_000_000)), Some(TimeUnit::Microsecond)),
-        (Arc::new(ticks(1_000_000_000)), Some(TimeUnit::Nanosecond)),
-        (
-            Arc::new(
-                ticks(1000)
-                    .reinterpret_cast::<arrow::datatypes::TimestampMillisecondType>()
-                    .with_timezone("UTC"),
-            ),
-            None,
-        ),
-        (
-            Arc::new(ticks(1_000_000_000).reinterpret_cast::<arrow::datatypes::TimestampNanosecondType>()),
-            None,
-        ),
-    ];
-    let x = reals(&[0.0, 1.0, 2.0, 3.0, 4.0]);
-    for (clock, unit) in clocks {
-        let absolute = unit.is_none();
-        let mut m = plain();
-        m.clock.unit = unit;
-        let (_dir, file) = place("N1_20261119T041300Z.parquet");
-        write(&file, &[("t", clock), ("m", x.clone()), ("s", x.clone()), ("f", x.clone())]);
-        let log = opened(&file, &m);
-        let at = log.actuators(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
-        let line = log.read_actuator(&at[0], &m.channels, LINEAR).unwrap();
-        assert!((line.step_s - 0.02).abs() < 1e-9, "{line:?}");
-        assert_eq!(
-            log.start_utc().unwrap().map(jiff::Timestamp::as_second),
-            absolute.then_some(1_700_000_000)
-        );
-    }
-}
-
-#[test]
 fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
     let x = || reals(&[0.0, 1.0]);
@@ -290,27 +249,6 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
 }
 
 #[test]
-fn an_absolute_clock_in_milliseconds_keeps_its_instant() {
-    let m = plain();
-    let stamps = |t: ArrayRef| {
-        let (_dir, file) = place("x.parquet");
-        write(&file, &[("t", t)]);
-        opened(&file, &m).start_utc().unwrap().unwrap().to_string()
-    };
-    assert_eq!(
-        stamps(Arc::new(TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]))),
-        "2025-11-19T04:13:00.25Z"
-    );
-    assert_eq!(
-        stamps(Arc::new(TimestampNanosecondArray::from(vec![
-            1_763_525_580_250_000_000,
-            1_763_525_580_350_000_000
-        ]))),
-        "2025-11-19T04:13:00.25Z"
-    );
-}
-
-#[test]
 fn text_where_numbers_should_stand_is_refused_by_name() {
     let m = plain();
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
@@ -332,22 +270,6 @@ fn a_dot_in_a_name_is_part_of_the_name() {
     let x = || reals(&[1.0, 2.0]);
     let a = only(&m, &[("t", reals(&[0.0, 0.1])), ("ail.m", x()), ("ail.s", x()), ("ail.f", x())], LINEAR);
     assert_eq!(a.motor_m, [1.0, 2.0]);
-}
-
-/// Istanbul is three hours ahead: a clock that names no zone is local, and never taken for UTC.
-#[test]
-fn a_local_clock_takes_the_mapped_zone_or_gives_no_departure() {
-    let mut m = plain();
-    let start = |m: &Mapping| {
-        let (_dir, file) = place("x.parquet");
-        let stamps = TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]);
-        write(&file, &[("t", Arc::new(stamps))]);
-        opened(&file, m).start_utc().unwrap().map(|t| t.to_string())
-    };
-    m.identity.time_zone = Some("Europe/Istanbul".into());
-    assert_eq!(start(&m).as_deref(), Some("2025-11-19T01:13:00.25Z"));
-    m.identity.time_zone = None;
-    assert_eq!(start(&m), None);
 }
 
 /// Two flights of a minute and more, five hours apart, in a file that names no flight: their mean would be no gap of
@@ -416,8 +338,31 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
     }
 }
 
+/// A rotary actuator by the torque and the angles that its fields note.
+#[test]
+fn units_of_the_arrow_fields_are_proposed() {
+    let field = |name: &str, unit: &str| {
+        let noted = [("unit".to_owned(), unit.to_owned())];
+        Field::new(name, DataType::Float64, true).with_metadata(noted.into())
+    };
+    let fields = [("time_s", "s"), ("rudder_motor", "deg"), ("rudder_screw", "rad"), ("rudder_load", "N·m")];
+    let schema = Arc::new(Schema::new(fields.map(|(name, unit)| field(name, unit)).to_vec()));
+    let (_dir, file) = place("x.parquet");
+    let batch = RecordBatch::try_new(Arc::clone(&schema), vec![reals(&[0.0, 0.1]); 4]).unwrap();
+    let mut writer = ArrowWriter::try_new(std::fs::File::create(&file).unwrap(), schema, None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    let found = ingest::infer::propose(&file).unwrap();
+    let units: Vec<_> = found.channels.values().map(|(_, unit)| *unit).collect();
+    assert_eq!(units, [Some(Unit::Degree), Some(Unit::Radian), Some(Unit::NewtonMetre)]);
+}
+
 /// The identity of a log whose motor, screw and load are one column.
-fn identity(name: &str, m: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<String, records::Diagnostic> {
+pub(crate) fn identity(
+    name: &str,
+    m: &Mapping,
+    columns: &[(&str, ArrayRef)],
+) -> Result<String, records::Diagnostic> {
     let (_dir, file) = place(name);
     write(&file, columns);
     let log = opened(&file, m);
@@ -485,32 +430,9 @@ fn a_landing_stands_for_the_departure() {
     assert_eq!(of(&m), "2026-11-19T02:13:00Z");
 }
 
-/// 2026-11-19 is day 46345 of spreadsheets (as LibreOffice has it): 6:00 in UTC is a quarter of a day more.
-#[test]
-fn days_since_1899_are_instants() {
-    let mut m = plain();
-    m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
-    (m.clock.epoch, m.clock.unit) = (Epoch::Excel, Some(TimeUnit::Day));
-    let days: Vec<f64> = (0..100).map(|k| 46_345.25 + f64::from(k) * 0.1 / 86_400.0).collect();
-    let start = identity("N1_x.parquet", &m, &[("t", reals(&days))]).unwrap();
-    let start: jiff::Timestamp = start.parse().unwrap();
-    let wanted: jiff::Timestamp = "2026-11-19T06:00:00Z".parse().unwrap();
-    assert!(start.duration_since(wanted).as_secs_f64().abs() < 1e-5, "{start}");
-}
-
-/// A duration column has a unit of its own, whatever the configuration says.
-#[test]
-fn the_type_of_a_duration_wins_over_the_mapped_unit() {
-    let m = plain();
-    let t: ArrayRef = Arc::new(DurationMillisecondArray::from_iter_values((0..100).map(|k| 20 * k)));
-    let x = reals(&(0..100).map(|k| f64::from(k % 7)).collect::<Vec<_>>());
-    let a = only(&m, &[("t", t), ("m", x.clone()), ("s", x.clone()), ("f", x)], LINEAR);
-    assert!((a.step_s - 0.02).abs() < 1e-12, "{} s", a.step_s);
-}
-
 /// `höhe` with a composed and a decomposed ö: a file of one system, and a configuration of another.
 #[test]
-fn accents_of_names_are_composed_and_blanks_are_told_apart() {
+fn accents_of_names_are_composed() {
     let composed = "{position}_h\u{f6}he";
     let m = mapping(
         channel(composed, Unit::Metre),
@@ -533,15 +455,6 @@ fn accents_of_names_are_composed_and_blanks_are_told_apart() {
     assert_eq!((found.len(), found[0].position.as_str()), (1, "au\u{df}en\u{f6}"));
     let a = log.read_actuator(&found[0], &m.channels, LINEAR).unwrap();
     assert_eq!(a.motor_m, [1.0, 2.0]);
-    let m = mapping(
-        channel("{position} motor", Unit::Metre),
-        channel("s", Unit::Metre),
-        channel("f", Unit::Newton),
-    );
-    write(&file, &[("t", x()), ("left\u{a0}motor", x()), ("s", x()), ("f", x())]);
-    let log = opened(&file, &m);
-    let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
-    assert!(hint.contains("left\u{a0}motor") && hint.contains("U+00A0"), "{hint}");
 }
 
 /// `FLT_NO` begins as `{position}_FORCE_LBF` does, and is not meant.

@@ -179,20 +179,15 @@ fn conditions_apply_to_each_actuator() {
     let column = |value: fn(usize) -> f64| -> ArrayRef {
         Arc::new(Float64Array::from((0..100).map(value).collect::<Vec<_>>()))
     };
-    let mut columns = vec![("t".to_owned(), column(|k| k as f64 * 0.01))];
-    for (position, mode) in [("a", column(|k| (k / 50) as f64)), ("b", column(|k| (k / 90) as f64))] {
-        for channel in ["m", "s", "f"] {
-            columns.push((format!("{position}_{channel}"), column(|k| k as f64)));
-        }
-        columns.push((format!("{position}_mode"), mode));
-        let own_s =
-            if position == "a" { column(|k| k as f64 * 0.01) } else { column(|k| 0.4 + k as f64 * 0.01) };
-        columns.push((format!("{position}_t"), own_s));
-    }
-    let batch = RecordBatch::try_from_iter(columns).unwrap();
-    let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    let mut columns = vec![
+        ("t", column(|k| k as f64 * 0.01)),
+        ("a_t", column(|k| k as f64 * 0.01)),
+        ("b_t", column(|k| 0.4 + k as f64 * 0.01)),
+        ("a_mode", column(|k| (k / 50) as f64)),
+        ("b_mode", column(|k| (k / 90) as f64)),
+    ];
+    columns.extend(["a_m", "a_s", "a_f", "b_m", "b_s", "b_f"].map(|name| (name, column(|k| k as f64))));
+    layouts::write(&file, &columns);
     let mut mapping = mapping(
         channel("{position}_m", Unit::Metre),
         channel("{position}_s", Unit::Metre),

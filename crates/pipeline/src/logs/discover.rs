@@ -32,6 +32,9 @@ pub struct DiscoveredLogs {
     pub(crate) seen: SeenObjects,
 }
 
+/// A log and the name that it goes by.
+pub type NamedLog = (LogFiles, String);
+
 /// Every log that fits the patterns, by the shown name of its first file.
 ///
 /// # Errors
@@ -96,9 +99,23 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// As [`discover`], where groups or pieces must be searched.
-pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<(LogFiles, String)>, Error> {
+pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<NamedLog>, Error> {
     let named = |path: &PathBuf| Ok((log_containing(config, path)?, path.display().to_string()));
     flight_paths(config, paths).iter().map(named).collect()
+}
+
+/// About `most` of some logs: evenly among all, which are in order of their names, and at least one of each tail.
+pub fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLog> {
+    /// Of more logs the tails are not read: each takes a read of its footer.
+    const IDENTIFIED: usize = 10_000;
+    let all = logs.len();
+    let tail = |(files, name): &NamedLog| Some(identify(files, name, config).ok()?.0.tail_number);
+    let tails: Vec<_> = logs.par_iter().map(|log| if all > IDENTIFIED { None } else { tail(log) }).collect();
+    let is_even = |k: usize| (k + 1) * most / all > k * most / all;
+    let mut seen: BTreeSet<_> = (0..all).filter(|k| is_even(*k)).filter_map(|k| tails[k].clone()).collect();
+    let chosen = logs.into_iter().zip(tails).enumerate();
+    let chosen = chosen.filter(|(k, (_, tail))| is_even(*k) || tail.clone().is_some_and(|t| seen.insert(t)));
+    chosen.map(|(_, (log, _))| log).collect()
 }
 
 /// The whole log that a file given by hand belongs to.

@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use ingest::LogFiles;
 use job::Config;
 use job::part_identification::IdentifiedParams;
 use pipeline::inspect::check::{ChannelCheck, LogCheck, RATIO, check_logs};
-use pipeline::logs::discover;
+use pipeline::logs::discover::{self, NamedLog};
 use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 
@@ -61,10 +60,12 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
 }
 
-type NamedLogs = Vec<(LogFiles, String)>;
-
 /// The logs to be checked, and the faults of what cannot be listed.
-fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs, Vec<Diagnostic>), Failure> {
+fn logs(
+    args: &CheckArgs,
+    config: &Config,
+    output: &Output,
+) -> Result<(Vec<NamedLog>, Vec<Diagnostic>), Failure> {
     if !args.logs.is_empty() {
         return Ok((discover::named_logs(config, &args.logs)?, Vec::new()));
     }
@@ -75,14 +76,9 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs
     let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
     let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).collect();
     if logs.len() > args.limit {
-        output.note(&format!("checking {} of {} logs; use `--limit` to check more", args.limit, logs.len()));
-        // Evenly among all, which are in order of their names: of each folder, and mostly of each tail.
-        let (all, most) = (logs.len(), args.limit.max(1));
-        let mut k = 0;
-        logs.retain(|_| {
-            k += 1;
-            k * most / all > (k - 1) * most / all
-        });
+        let all = logs.len();
+        logs = discover::sampled(config, logs, args.limit.max(1));
+        output.note(&format!("checking {} of {all} logs; use `--limit` to check more", logs.len()));
     }
     Ok((logs, faults))
 }

@@ -46,7 +46,7 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
         let names = selected(&query).into_iter().filter_map(|(column, name)| Some((column, name.as_ref()?)));
         let names = names.map(|(column, name)| format!("{} `{name}`", called(column)));
         output.note(&format!(
-            "no record of {}{}; list the store's contents with `freeplay store info`",
+            "no record of {}{}; list all units of the store with `freeplay trend`",
             names.collect::<Vec<_>>().join(", "),
             range(args)
         ));

@@ -170,6 +170,9 @@ fn log_page(logs: &[LogRecord], reason: &dyn Fn(&LogRecord) -> Option<String>) -
         (number("refused", 2), &|l| l.refused.to_string()),
         (number("time [s]", 5), &|l| format!("{:.1}", l.duration_s)),
     ];
+    if logs.is_empty() {
+        return "no log was new or changed\n".to_owned();
+    }
     let mut classes = Reasons::new();
     for log in logs {
         *classes.entry(class(log).replace('_', " ")).or_default() += 1;
