@@ -34,42 +34,18 @@ pub fn load_band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> 
     Some(LoadBand { p05_n, p95_n, reversals })
 }
 
-/// Loads that are counted together. Counts of two or more quantiles over a block are vectorized.
-const BLOCK: usize = 64;
-
 /// Changes from beyond one side of a threshold to beyond the other.
 pub(crate) fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
-    let (mut side, mut changes, mut at) = (0.0, 0, 0);
-    while at < load_n.len() {
-        at += BLOCK * run_length_on_side(&load_n[at..], side);
-        let end = load_n.len().min(at + BLOCK);
-        for &f in load_n[at..end].iter().filter(|f| f.abs() > threshold_n) {
-            changes += usize::from(side * f < 0.0);
-            side = f.signum();
-        }
-        at = end;
+    let (mut side, mut changes) = (0.0, 0);
+    for &f in load_n.iter().filter(|f| f.abs() > threshold_n) {
+        changes += usize::from(side * f < 0.0);
+        side = f.signum();
     }
     changes
 }
 
-/// Number of blocks from here on that stay on one side, or between the two sides.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn run_length_on_side(load_n: &[f64], side: f64) -> usize {
-    let (blocks, _) = load_n.as_chunks::<BLOCK>();
-    let mut count = 0;
-    for block in blocks {
-        let mut against = 0_u64;
-        for f in block {
-            against += u64::from(f * side < 0.0);
-        }
-        if side == 0.0 || against != 0 {
-            return count;
-        }
-        count += 1;
-    }
-    count
-}
-
+/// Loads that are counted together, so that counts of two or more quantiles are vectorized.
+const BLOCK: usize = 64;
 /// Loads that brackets are laid by.
 const SUBSAMPLE_SIZE: usize = 2048;
 /// Fewer loads for each of those are put in order at once.
