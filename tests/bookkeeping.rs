@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::fuzz::engine::is_gate;
+use crate::gate::is_gate;
 use crate::harness::{TestFleet, facts, rewrite};
 
 const TABLE: &str = "sample-data/installations.csv";
