@@ -16,28 +16,6 @@ fn a_second_run_does_nothing() {
 }
 
 #[test]
-fn a_changed_part_redoes_only_the_logs_it_flew_in() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N412FP"]);
-    fleet.configure("stiffness_n_per_m = 6.5e7", "stiffness_n_per_m = 6.6e7");
-    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
-    fleet.configure("limit_m = 150e-6", "limit_m = 151e-6");
-    fleet.run_ok(&["run", "--tail", "N412FP"]);
-    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert_eq!(plan.matches("setting changed").count(), 0, "{plan}");
-    let records = fleet.run_ok(&["query", "tail", "N412FP", "--json"]);
-    assert_eq!(records.matches("\"flight_id\"").count(), 40, "a flight is there once");
-}
-
-#[test]
-fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
-    let fleet = TestFleet::processed();
-    fleet.configure("limit_m = 150e-6", "limit_m = 160e-6");
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
-}
-
-#[test]
 fn a_renamed_or_touched_log_is_recognised_by_its_content() {
     let fleet = TestFleet::processed();
     let before = fleet.exported();
@@ -122,22 +100,6 @@ fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
     }
 }
 
-#[test]
-fn redo_does_all_again_and_stores_each_flight_once() {
-    let fleet = TestFleet::processed();
-    let before = fleet.exported();
-    let account = fleet.run_ok(&["run", "--redo", "--tail", "N413FP"]);
-    assert!(account.contains("40 records of 10 flights"), "{account}");
-    assert_eq!(fleet.exported(), before);
-}
-
-#[test]
-fn a_limit_leaves_the_rest_for_the_next_run() {
-    let fleet = TestFleet::sample();
-    assert!(fleet.run_ok(&["run", "--limit", "7"]).contains("28 records of 7 flights"));
-    assert!(fleet.run_ok(&["run"]).contains("92 records of 23 flights"));
-}
-
 /// When the log that spoke for a flight breaks, its copy takes over on the next run.
 #[test]
 fn a_copy_speaks_when_the_first_log_breaks() {
@@ -155,15 +117,6 @@ fn a_copy_speaks_when_the_first_log_breaks() {
     let again = fleet.freeplay(&["run"]);
     assert_eq!(again.code, Some(1));
     assert!(to_do(&again.out).ends_with("31 logs: 0 new or changed, 31 already processed"));
-}
-
-/// The selection applies before the limit, also to logs that are not in the store yet.
-#[test]
-fn a_limit_counts_only_selected_logs() {
-    let fleet = TestFleet::sample();
-    let account = fleet.run_ok(&["run", "--tail", "N414FP", "--limit", "3"]);
-    assert!(account.contains("3 new or changed, 0 already processed, 20 excluded by --tail/--serial/--since/--until, 7 left for later by --limit"), "{account}");
-    assert!(account.contains("12 records of 3 flights"), "{account}");
 }
 
 #[test]
@@ -210,24 +163,6 @@ fn a_record_is_explained_and_recomputed_bitwise() {
     assert_eq!(result.code, Some(1), "{result:?}");
     assert!(result.err.contains("error[not_parquet]"), "{}", result.err);
     assert_eq!(fleet.freeplay(&["explain", "N412FP-0003", "rudder"]).code, Some(2));
-}
-
-/// Two methods side by side over the fleet: each in a store of its own, compared actuator by actuator.
-#[test]
-fn two_methods_live_side_by_side_and_are_compared() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    fleet.run_ok(&["run"]);
-    assert!(fleet.run_ok(&["diff", "results", "results"]).starts_with("0 of 40 actuator-flights differ"));
-    fleet.configure("path = \"results\"", "path = \"trial\"");
-    fleet.configure("method = \"contact\"", "method = \"midrange\"");
-    fleet.run_ok(&["run"]);
-    let output = fleet.run_ok(&["diff", "results", "trial"]);
-    assert!(output.starts_with("40 of 40 actuator-flights differ"), "{output}");
-    let few = fleet.run_ok(&["diff", "results", "trial", "--min-change-um", "1000"]);
-    assert!(few.starts_with("0 of 40"), "{few}");
-    let rows = fleet.run_ok(&["diff", "results", "trial", "--format", "csv"]);
-    assert_eq!(rows.lines().count(), 41);
 }
 
 #[test]
