@@ -368,41 +368,6 @@ fn a_limit_for_all_parts_serves_those_that_state_none() {
     assert_eq!(rows.len(), 12);
 }
 
-#[test]
-fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
-    let fleet = TestFleet::processed();
-    let info: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "info", "--json"])).unwrap();
-    assert_eq!(
-        (info["records"].as_i64(), info["flights"].as_i64(), info["serials"].as_i64()),
-        (Some(120), Some(30), Some(12))
-    );
-    fleet.run_ok(&["store", "info", "--max-age", "1h"]);
-    let late = fleet.freeplay(&["store", "info", "--max-age", "0s"]);
-    assert_eq!(late.code, Some(1), "{late:?}");
-    assert!(late.err.contains("error[run_overdue]"), "{}", late.err);
-}
-
-#[test]
-fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--limit", "10"]);
-    fleet.run_ok(&["run"]);
-    let before = fleet.exported();
-    fleet.run_ok(&["store", "compact"]);
-    assert_eq!(fleet.exported(), before);
-    assert!(fleet.run_ok(&["store", "verify"]).contains("OK: all data files present"));
-    let files = glob::glob(fleet.path("results/gaps/*.parquet").to_str().unwrap()).unwrap().flatten();
-    for file in files {
-        let mut bytes = std::fs::read(&file).unwrap();
-        let middle = bytes.len() / 2;
-        bytes[middle] ^= 1;
-        std::fs::write(&file, bytes).unwrap();
-    }
-    let result = fleet.freeplay(&["store", "verify"]);
-    assert_eq!(result.code, Some(1), "{result:?}");
-    assert!(result.err.contains("hint:"), "{}", result.err);
-}
-
 /// First step of a new user: the mapping that `init` proposes from the logs reads those logs.
 #[test]
 fn a_proposal_from_logs_reads_them() {

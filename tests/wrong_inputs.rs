@@ -135,38 +135,6 @@ fn the_samples_of_another_aircraft_are_named_with_both_flights() {
     assert_eq!(run.matches("  repeated ").count(), 1, "{run}");
 }
 
-/// A serial number typed again moves a history to a unit that does not exist.
-#[test]
-fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() {
-    let fleet = TestFleet::processed();
-    edit(&fleet, "sample-data/installations.csv", |table| table.replace("1040-0005", "1040-0050"));
-    let run = fleet.run_ok(&["run"]);
-    let changes = run.split("state changes in this run: ").nth(1).unwrap();
-    let lost = "1040-0005: normal → no state (no flight is left); cause: 10 flights of N412FP aileron_left (2026-09-10 to 2026-11-10) \
-                moved from EMA-27-1040 / 1040-0005 to EMA-27-1040 / 1040-0050";
-    assert!(changes.starts_with("2 units\n") && changes.contains(lost), "{run}");
-    // What has another serial number is all that changed: the other units of the tail have the state they had.
-    assert!(!changes.contains("1040-0006"), "{run}");
-}
-
-/// A part without a limit, or without its table, has units that no exit code can speak for.
-#[test]
-fn units_that_no_limit_covers_are_named_by_run_trend_and_report() {
-    let fleet = TestFleet::sample();
-    edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6\nwatch_m = 110e-6\n", "", 1));
-    let run = fleet.run_ok(&["run", "--fail-on", "act"]);
-    let note = "part EMA-27-1040 has no limit: 6 units unassessed; add `limit_m` to";
-    assert!(run.contains(note), "{run}");
-    assert!(fleet.run_ok(&["trend"]).contains(note));
-    fleet.run_ok(&["report", "--output", "pages"]);
-    let report = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    assert!(report["notes"][0].as_str().unwrap().starts_with(note), "{}", report["notes"]);
-    edit(&fleet, "pipeline.toml", |text| text.replace("EMA-27-1060", "EMA-27-1006"));
-    let trend = fleet.run_ok(&["trend"]);
-    assert!(trend.contains("part EMA-27-1060 is not configured (nearest: EMA-27-1006)"), "{trend}");
-}
-
 /// Minutes in the metadata of a log, a workbook, a column that is there twice, and a play in micrometres.
 #[test]
 fn units_and_formats_of_single_files_are_refused_with_what_is_wanted() {

@@ -44,13 +44,29 @@ fn try_blocks(page: &str) -> Page {
     let sound = TestFleet::sample();
     sound.run_ok(&["run", "--tail", "N412FP", "--limit", "2"]);
     let page = Page::read(&top().join("tests/data").join(page));
-    let mut tried = Try::new(&page, sound.copied());
-    for block in &page.blocks {
-        tried.fleet = sound.copied();
-        tried.block(block, &mut String::new());
-    }
-    tried.bless();
-    assert!(tried.faults.is_empty(), "{}", tried.faults.join("\n\n"));
+    let try_some = |blocks: &[Block]| {
+        let mut tried = Try::new(&page, sound.copied());
+        for block in blocks {
+            tried.fleet = sound.copied();
+            tried.block(block, &mut String::new());
+        }
+        (tried.faults, tried.blessed)
+    };
+    let mut all = Try::new(&page, sound.copied());
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = page
+            .blocks
+            .chunks(page.blocks.len().div_ceil(4))
+            .map(|part| scope.spawn(|| try_some(part)))
+            .collect();
+        for part in parts {
+            let (faults, blessed) = part.join().unwrap();
+            all.faults.extend(faults);
+            all.blessed.extend(blessed);
+        }
+    });
+    all.bless();
+    assert!(all.faults.is_empty(), "{}", all.faults.join("\n\n"));
     page
 }
 

@@ -86,15 +86,3 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
     let page = std::fs::read_to_string(fleet.path("pages/index.html")).unwrap();
     assert!(page.contains("Wrong mapping or setting."));
 }
-
-#[test]
-fn a_copy_of_a_log_is_counted_and_named_with_the_log_that_owns_the_flight() {
-    let fleet = TestFleet::sample();
-    let log = &fleet.logs()[3];
-    std::fs::copy(log, log.with_file_name("zcopy.parquet")).unwrap();
-    let account = fleet.run_ok(&["run"]);
-    let owner = log.file_name().unwrap().to_str().unwrap();
-    let line = account.lines().find(|line| line.contains("copy of")).unwrap_or_else(|| panic!("{account}"));
-    assert!(line.contains("zcopy.parquet") && line.contains(owner), "{line}");
-    assert!(account.contains("duplicates"), "{account}");
-}
