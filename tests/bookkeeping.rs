@@ -323,28 +323,6 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
 }
 
 #[test]
-fn records_are_taken_out_and_come_back() {
-    let fleet = TestFleet::processed();
-    let (before, states) = (fleet.exported(), trend(&fleet));
-    let nothing = fleet.freeplay(&["store", "forget"]);
-    assert_eq!(nothing.code, Some(2));
-    assert!(nothing.err.contains("nothing_selected"), "{nothing:?}");
-    let told = fleet.run_ok(&["store", "forget", "--tail", "N414FP"]);
-    assert!(told.contains("took out 40 records (10 flights of 1 tail)") && told.contains("--undo"), "{told}");
-    assert_eq!((records_with(&fleet, "N414FP"), trend(&fleet).contains_key("1040-0013")), (0, false));
-    // Neither a run nor a compaction brings them back; an unchanged log is not read again.
-    fleet.run_ok(&["run"]);
-    fleet.run_ok(&["store", "compact"]);
-    fleet.run_ok(&["store", "verify"]);
-    assert_eq!(records_with(&fleet, "N414FP"), 0);
-    assert!(
-        fleet.run_ok(&["store", "forget", "--tail", "N414FP", "--undo"]).contains("brought back 40 records")
-    );
-    assert_eq!((fleet.exported(), trend(&fleet)), (before, states));
-    assert_eq!(fleet.freeplay(&["store", "forget", "--flight", "X"]).code, Some(1));
-}
-
-#[test]
 fn a_unit_keeps_its_history_under_its_numbers_of_today() {
     let fleet = TestFleet::processed();
     let before = trend(&fleet)["1040-0013"].clone();
@@ -402,21 +380,6 @@ fn a_hangar_check_above_the_limit_makes_the_state_until_a_renewal() {
     let refused = fleet.freeplay(&["run"]);
     assert_eq!(refused.code, Some(2));
     assert!(refused.err.contains("checks.csv") && refused.err.contains("64 µm are 64e-6"), "{}", refused.err);
-}
-
-/// `freeplay query N412FP`, with a word, with an option, and with a name that nothing has.
-#[test]
-fn a_known_name_is_enough_for_a_query() {
-    let fleet = TestFleet::processed();
-    let by_word = fleet.run_ok(&["query", "tail", "N412FP"]);
-    assert_eq!(fleet.run_ok(&["query", "N412FP"]), by_word);
-    assert_eq!(fleet.run_ok(&["query", "--tail", "N412FP"]), by_word);
-    assert_eq!(fleet.run_ok(&["query", "1040-0005"]), fleet.run_ok(&["query", "serial", "1040-0005"]));
-    let unknown = fleet.freeplay(&["query", "N412F"]);
-    assert_eq!(unknown.code, Some(2));
-    assert!(unknown.err.contains("`N412FP`"), "{}", unknown.err);
-    assert_eq!(fleet.freeplay(&["query"]).code, Some(2));
-    assert!(fleet.freeplay(&["query", "wing", "N412FP"]).err.contains("cannot be selected by `wing`"));
 }
 
 /// Versions of the installations table: as it is; another unit on the left aileron; the elevators swapped earlier.

@@ -33,20 +33,6 @@ fn logs_are_structured_when_that_is_asked_for() {
 }
 
 #[test]
-fn every_command_has_a_purpose_and_an_example() {
-    let fleet = TestFleet::empty();
-    let all = fleet.run_ok(&["--help"]);
-    for command in
-        ["init", "check", "run", "estimate", "query", "trend", "simulate", "store", "completions", "man"]
-    {
-        assert!(all.contains(&format!("  {command} ")), "{command} is not in the help");
-        let help = fleet.run_ok(&[command, "--help"]);
-        assert!(help.contains("Example"), "{command} shows no example: {help}");
-        assert!(help.contains("freeplay "), "{command}");
-    }
-}
-
-#[test]
 fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
     let fleet = TestFleet::empty();
     fleet.run_ok(&["init", "new-fleet"]);
@@ -173,24 +159,6 @@ fn init_invents_no_serial_number() {
 }
 
 #[test]
-fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
-    let fleet = TestFleet::sample();
-    for args in [&["fly"][..], &["run", "--tale", "N1"], &["query", "tail"], &["run", "--since", "yesterday"]]
-    {
-        assert_eq!(fleet.freeplay(args).code, Some(2), "{args:?}");
-    }
-    let tale = fleet.freeplay(&["run", "--tale", "N1"]);
-    assert!(tale.err.contains("--tail"), "{}", tale.err);
-    fleet.configure("bandwidth_hz", "bandwith_hz");
-    let result = fleet.freeplay(&["run"]);
-    assert_eq!(result.code, Some(2));
-    assert!(result.err.contains("error[unknown_key]"), "{}", result.err);
-    assert!(result.err.contains("hint: `bandwidth_hz`?"), "{}", result.err);
-    assert!(result.err.contains("no changes were made"), "{}", result.err);
-    assert!(!fleet.path("results").exists());
-}
-
-#[test]
 fn rows_come_as_table_json_csv_and_parquet() {
     let fleet = TestFleet::sample();
     fleet.run_ok(&["run", "--limit", "3"]);
@@ -216,21 +184,6 @@ fn rows_come_as_table_json_csv_and_parquet() {
     fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
     assert_eq!(Table::read(&fleet.path("all.parquet")).rows(), 12);
     assert!(fleet.run_ok(&["trend"]).contains(" units as of "));
-}
-
-#[test]
-fn a_query_that_finds_nothing_is_well_and_has_no_rows() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--limit", "1"]);
-    assert_eq!(fleet.run_ok(&["query", "tail", "N412FP", "--since", "2030-01-01", "--json"]).trim(), "[]");
-}
-
-#[test]
-fn a_store_that_is_not_there_says_who_makes_it() {
-    let fleet = TestFleet::sample();
-    let result = fleet.freeplay(&["query", "tail", "N412FP"]);
-    assert_eq!(result.code, Some(3));
-    assert!(result.err.contains("freeplay run"), "{}", result.err);
 }
 
 /// Rows 3000 to 3399 are missing: the next sample of the trace has the time of the log, not that of its number.
@@ -330,12 +283,6 @@ fn a_held_store_is_code_3() {
 }
 
 #[test]
-fn fail_on_tells_a_scheduler_with_code_4() {
-    let fleet = TestFleet::sample();
-    assert_eq!(fleet.freeplay(&["run", "--fail-on", "watch"]).code, Some(4));
-}
-
-#[test]
 fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
     let fleet = TestFleet::sample();
     let row = |day: i32| {
@@ -421,61 +368,6 @@ fn a_limit_for_all_parts_serves_those_that_state_none() {
     assert_eq!(rows.len(), 12);
 }
 
-#[test]
-fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
-    let fleet = TestFleet::processed();
-    let info: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "info", "--json"])).unwrap();
-    assert_eq!(
-        (info["records"].as_i64(), info["flights"].as_i64(), info["serials"].as_i64()),
-        (Some(120), Some(30), Some(12))
-    );
-    fleet.run_ok(&["store", "info", "--max-age", "1h"]);
-    let late = fleet.freeplay(&["store", "info", "--max-age", "0s"]);
-    assert_eq!(late.code, Some(1), "{late:?}");
-    assert!(late.err.contains("error[run_overdue]"), "{}", late.err);
-}
-
-#[test]
-fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--limit", "10"]);
-    fleet.run_ok(&["run"]);
-    let before = fleet.exported();
-    fleet.run_ok(&["store", "compact"]);
-    assert_eq!(fleet.exported(), before);
-    assert!(fleet.run_ok(&["store", "verify"]).contains("OK: all data files present"));
-    let files = glob::glob(fleet.path("results/gaps/*.parquet").to_str().unwrap()).unwrap().flatten();
-    for file in files {
-        let mut bytes = std::fs::read(&file).unwrap();
-        let middle = bytes.len() / 2;
-        bytes[middle] ^= 1;
-        std::fs::write(&file, bytes).unwrap();
-    }
-    let result = fleet.freeplay(&["store", "verify"]);
-    assert_eq!(result.code, Some(1), "{result:?}");
-    assert!(result.err.contains("hint:"), "{}", result.err);
-}
-
-#[test]
-fn a_refused_run_leaves_nothing_behind() {
-    let fleet = TestFleet::empty();
-    fleet.run_ok(&["init"]);
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(2));
-    assert!(!fleet.path("results").exists());
-}
-
-/// The configuration may lie elsewhere, in a folder whose name looks like a pattern.
-#[test]
-fn a_configuration_elsewhere_is_read_from_there() {
-    let fleet = TestFleet::sample();
-    let odd = fleet.path("fleet [1] ü");
-    std::fs::create_dir(&odd).unwrap();
-    std::fs::rename(fleet.path("pipeline.toml"), odd.join("pipeline.toml")).unwrap();
-    std::fs::rename(fleet.path("sample-data"), odd.join("sample-data")).unwrap();
-    fleet.run_ok(&["run", "--limit", "2", "--config", "fleet [1] ü/pipeline.toml"]);
-    assert!(odd.join("results").exists());
-}
-
 /// First step of a new user: the mapping that `init` proposes from the logs reads those logs.
 #[test]
 fn a_proposal_from_logs_reads_them() {
@@ -503,22 +395,6 @@ fn a_proposal_for_torques_has_a_rotary_part() {
     fleet.run_ok(&["init", "new-fleet", "--from", "a/logs"]);
     let proposed = std::fs::read_to_string(fleet.path("new-fleet/pipeline.toml")).unwrap();
     assert!(proposed.contains("kind = \"rotary\"") && proposed.contains("unit = \"N.m\""), "{proposed}");
-}
-
-/// Scripts read the first line; a report of a fault needs the rest.
-#[test]
-fn the_version_has_a_commit_and_features_below_the_line_that_scripts_read() {
-    let fleet = TestFleet::sample();
-    let short = fleet.freeplay(&["-V"]);
-    let long = fleet.freeplay(&["--version"]);
-    let first = concat!("freeplay ", env!("CARGO_PKG_VERSION"));
-    assert_eq!((short.code, short.out.trim_end()), (Some(0), first));
-    let lines: Vec<&str> = long.out.lines().collect();
-    assert_eq!(lines[0], first);
-    for (line, start) in lines[1..].iter().zip(["commit: ", "build: ", "features: "]) {
-        assert!(line.starts_with(start) && line.len() > start.len(), "{line}");
-    }
-    assert_eq!(lines.len(), 4, "{lines:?}");
 }
 
 /// What a planner needs is there at 80 columns, no line is longer, and no word is cut: unit, state, date, reason and how
@@ -557,18 +433,6 @@ fn tables_fit_80_columns_and_keep_what_matters() {
     assert!(records.contains("3 records departure [UTC] tail position serial"), "{records}");
 }
 
-/// Colour is an addition on terminals: `always` brings it, `NO_COLOR` and a pipe do not.
-#[test]
-fn states_are_coloured_only_where_colour_is_on() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N414FP"]);
-    let coloured = fleet.run_ok(&["trend", "--color", "always"]);
-    assert!(coloured.contains("\u{1b}[33m\u{1b}[1m▲ plan\u{1b}[0m"), "{coloured:?}");
-    assert!(!fleet.run_ok(&["trend"]).contains('\u{1b}'));
-    let csv = fleet.run_ok(&["trend", "--color", "always", "--format", "csv"]);
-    assert!(!csv.contains('\u{1b}'), "{csv}");
-}
-
 #[test]
 fn json_lines_hold_the_objects_of_the_json_array() {
     let fleet = TestFleet::sample();
@@ -582,22 +446,6 @@ fn json_lines_hold_the_objects_of_the_json_array() {
         assert_eq!(lines, array, "{args:?}");
         assert!(!lines.is_empty(), "{args:?}");
     }
-}
-
-#[test]
-fn options_are_grouped_and_every_table_of_the_store_has_its_files() {
-    let fleet = TestFleet::sample();
-    let help = fleet.run_ok(&["trend", "--help"]);
-    for heading in ["Selection:", "Output:", "Global options:", "Views:"] {
-        assert!(help.contains(&format!("\n{heading}\n")), "{heading}: {help}");
-    }
-    fleet.run_ok(&["run", "--tail", "N414FP"]);
-    for table in ["gaps", "logs", "runs", "work"] {
-        let files = fleet.run_ok(&["store", "files", "--table", table]);
-        assert!(files.lines().count() > 0 && files.contains(table), "{table}: {files}");
-        assert!(files.lines().all(|file| std::path::Path::new(file).exists()), "{table}: {files}");
-    }
-    assert_eq!(fleet.run_ok(&["store", "files", "--table", "alerts"]), "", "no alert is configured");
 }
 
 /// The shell asks the program; names come from the store, and without one there are none and no message.

@@ -12,7 +12,6 @@ mod harness;
 mod hostile;
 mod logs;
 mod markdown;
-mod mistakes;
 mod report_contents;
 mod runs;
 mod states;

@@ -92,23 +92,6 @@ fn work_on_a_unit_that_was_never_installed_is_named() {
     assert_eq!(json["unknown_units"].as_array().unwrap().len(), 2);
 }
 
-/// A typo of a part number takes nothing away: the records and the states of its units stay until it is corrected.
-#[test]
-fn a_misspelt_part_number_takes_nothing_away() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
-    let before = fleet.exported();
-    edit(&fleet, "pipeline.toml", |toml| toml.replace("EMA-27-1040", "EMA-27-1004"));
-    let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
-    assert_eq!(run.code, Some(1), "{run:?}");
-    assert!(run.out.contains("20 stored records of logs that failed now stay"), "{}", run.out);
-    let gaps = |rows: &str| rows.lines().filter(|line| line.contains("EMA-27-1040")).count();
-    assert_eq!(gaps(&fleet.exported()), gaps(&before));
-    let cause = "10 logs  part_unknown: part number EMA-27-1040 is installed, but not configured; first sample-data/logs/N412FP/";
-    assert_eq!(run.out.matches("part_unknown").count(), 1, "{}", run.out);
-    assert!(run.out.contains(cause), "{}", run.out);
-}
-
 /// Inputs are not written over; a device is written to and stays one; a link stays a link.
 #[test]
 fn an_output_replaces_no_input_and_no_device() {
@@ -136,15 +119,6 @@ fn an_output_replaces_no_input_and_no_device() {
     }
 }
 
-#[test]
-fn a_date_of_assessment_that_has_not_come_is_noted() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "1", "--quiet"]);
-    let result = fleet.freeplay(&["trend", "--as-of", "2190-01-01"]);
-    assert!(result.err.contains("--as-of 2190-01-01 is in the future"), "{result:?}");
-    assert!(!fleet.freeplay(&["trend"]).err.contains("future"));
-}
-
 /// The samples of another aircraft's log under a log's own name: no range shows it, but two estimates are one.
 #[test]
 fn the_samples_of_another_aircraft_are_named_with_both_flights() {
@@ -159,80 +133,6 @@ fn the_samples_of_another_aircraft_are_named_with_both_flights() {
         assert!(line.contains(name), "{line}");
     }
     assert_eq!(run.matches("  repeated ").count(), 1, "{run}");
-}
-
-/// A removal in a later year: the unit would fly on in its old place.
-#[test]
-fn dates_of_installations_that_are_still_to_come_are_named() {
-    let fleet = TestFleet::sample();
-    edit(&fleet, "sample-data/installations.csv", |table| table.replace("2026-10-12", "2126-10-12"));
-    let run = fleet.run_ok(&["run"]);
-    assert!(run.contains("1060-0008: `removed_utc` is 2126-10-12, a date to come\n"), "{run}");
-}
-
-/// A serial number typed again moves a history to a unit that does not exist.
-#[test]
-fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() {
-    let fleet = TestFleet::processed();
-    edit(&fleet, "sample-data/installations.csv", |table| table.replace("1040-0005", "1040-0050"));
-    let run = fleet.run_ok(&["run"]);
-    let changes = run.split("state changes in this run: ").nth(1).unwrap();
-    let lost = "1040-0005: normal → no state (no flight is left); cause: 10 flights of N412FP aileron_left (2026-09-10 to 2026-11-10) \
-                moved from EMA-27-1040 / 1040-0005 to EMA-27-1040 / 1040-0050";
-    assert!(changes.starts_with("2 units\n") && changes.contains(lost), "{run}");
-    // What has another serial number is all that changed: the other units of the tail have the state they had.
-    assert!(!changes.contains("1040-0006"), "{run}");
-}
-
-/// A part without a limit, or without its table, has units that no exit code can speak for.
-#[test]
-fn units_that_no_limit_covers_are_named_by_run_trend_and_report() {
-    let fleet = TestFleet::sample();
-    edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6\nwatch_m = 110e-6\n", "", 1));
-    let run = fleet.run_ok(&["run", "--fail-on", "act"]);
-    let note = "part EMA-27-1040 has no limit: 6 units unassessed; add `limit_m` to";
-    assert!(run.contains(note), "{run}");
-    assert!(fleet.run_ok(&["trend"]).contains(note));
-    fleet.run_ok(&["report", "--output", "pages"]);
-    let report = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    assert!(report["notes"][0].as_str().unwrap().starts_with(note), "{}", report["notes"]);
-    edit(&fleet, "pipeline.toml", |text| text.replace("EMA-27-1060", "EMA-27-1006"));
-    let trend = fleet.run_ok(&["trend"]);
-    assert!(trend.contains("part EMA-27-1060 is not configured (nearest: EMA-27-1006)"), "{trend}");
-}
-
-/// A position that is spelt otherwise in the configuration would leave its actuator out without a word.
-#[test]
-fn installed_positions_that_no_log_has_are_named() {
-    let fleet = TestFleet::sample();
-    fleet.configure(
-        "[channel.motor_position]",
-        "[channel]\npositions = [\"aileron_right\"]\n\n[channel.motor_position]",
-    );
-    let run = fleet.run_ok(&["run"]);
-    let named =
-        "aileron_left, elevator_left, elevator_right of 3 tails: units are installed there, and no log has";
-    assert!(run.contains(named), "{run}");
-}
-
-#[test]
-fn tails_that_only_a_flights_table_or_an_override_knows_are_named_with_the_nearest() {
-    let fleet = TestFleet::sample();
-    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
-    let table =
-        "tail_number,flight_id,departure_utc,flight_hours\nN412-FP,N412FP-0001,2026-09-07T04:00:00Z,2.0\n";
-    std::fs::write(fleet.path("flights.csv"), table).unwrap();
-    edit(&fleet, "pipeline.toml", |text| {
-        text + "\n[[override]]\ntails = [\"N413PF\"]\n[override.channel.load]\nsign = -1\n"
-    });
-    let run = fleet.run_ok(&["run"]);
-    for named in [
-        "flights.csv: tail N412-FP has neither",
-        "[[override]]: tail N413PF has neither an installation nor a log; nearest: N413FP",
-    ] {
-        assert!(run.contains(named), "{named}: {run}");
-    }
 }
 
 /// Minutes in the metadata of a log, a workbook, a column that is there twice, and a play in micrometres.
@@ -270,22 +170,4 @@ fn units_and_formats_of_single_files_are_refused_with_what_is_wanted() {
         assert_eq!(report.code, Some(2), "{wanted}: {report:?}");
         assert!(report.err.contains("checks.csv") && report.err.contains(wanted), "{wanted}: {}", report.err);
     }
-    let log = log.to_str().unwrap();
-    let trace = fleet.freeplay(&["estimate", log, "--trace", "t.csv"]);
-    assert_eq!(trace.code, Some(2), "{trace:?}");
-    assert!(
-        trace.err.contains("use the extension .parquet") && !fleet.path("t.csv").exists(),
-        "{}",
-        trace.err
-    );
-}
-
-#[test]
-fn a_named_pipe_as_a_table_is_refused_at_once() {
-    let fleet = TestFleet::empty();
-    let made = std::process::Command::new("mkfifo").arg(fleet.path("history.csv")).status().unwrap();
-    assert!(made.success());
-    let found = fleet.freeplay(&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"]);
-    assert_eq!(found.code, Some(2), "{found:?}");
-    assert!(found.err.contains("it is a pipe, a socket or a device"), "{found:?}");
 }

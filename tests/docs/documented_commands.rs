@@ -5,6 +5,7 @@
 //! Comments above a block change the defaults: `first: COMMAND` runs before it and is not shown, `exit 1` is the
 //! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
 //! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
+//! `edit: ["FILE", "FROM", "TO"]` replaces text before its block.
 //! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except where lines are
 //! omitted.
 
@@ -38,6 +39,52 @@ fn commands_in_the_pages_do_what_the_pages_say() {
     assert!(faults.is_empty(), "{}", faults.join("\n\n"));
 }
 
+/// Runs each block of a page of `tests/data` in a copy of a fleet with two stored flights.
+fn try_blocks(page: &str) -> Page {
+    let sound = TestFleet::sample();
+    sound.run_ok(&["run", "--tail", "N412FP", "--limit", "2"]);
+    let page = Page::read(&top().join("tests/data").join(page));
+    let try_some = |blocks: &[Block]| {
+        let mut tried = Try::new(&page, sound.copied());
+        for block in blocks {
+            tried.fleet = sound.copied();
+            tried.block(block, &mut String::new());
+        }
+        (tried.faults, tried.blessed)
+    };
+    let mut all = Try::new(&page, sound.copied());
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = page
+            .blocks
+            .chunks(page.blocks.len().div_ceil(4))
+            .map(|part| scope.spawn(|| try_some(part)))
+            .collect();
+        for part in parts {
+            let (faults, blessed) = part.join().unwrap();
+            all.faults.extend(faults);
+            all.blessed.extend(blessed);
+        }
+    });
+    all.bless();
+    assert!(all.faults.is_empty(), "{}", all.faults.join("\n\n"));
+    page
+}
+
+#[test]
+fn commands_do_what_they_did_when_a_person_last_read_it() {
+    try_blocks("commands.md");
+}
+
+#[test]
+fn errors_read_as_they_were_last_read_by_a_person() {
+    let page = try_blocks("errors.md");
+    assert!(!page.text.contains("panicked") && !page.text.contains("os error 21"));
+    let explained = fs::read_to_string(top().join("docs/errors.md")).unwrap();
+    for code in Regex::new(r"error\[(\w+)\]").unwrap().captures_iter(&page.text) {
+        assert!(explained.contains(&format!("`{}`", &code[1])), "{} is not in docs/errors.md", &code[1]);
+    }
+}
+
 fn marks<'b>(blocks: &[&'b Block]) -> Vec<&'b str> {
     blocks.iter().filter_map(|block| block.mark("not run:")).collect()
 }
@@ -69,21 +116,33 @@ struct Try<'p> {
 impl<'p> Try<'p> {
     /// Runs a page from its first block to its last.
     fn of(page: &'p Page) -> Vec<String> {
-        let mut tried =
-            Self { page, fleet: TestFleet::sample_data(), faults: Vec::new(), blessed: Vec::new() };
+        let mut tried = Self::new(page, TestFleet::sample_data());
         let mut output = String::new();
-        for block in &page.blocks {
-            if let Some(command) = block.mark("first:") {
-                tried.run(&Step { script: command.to_owned(), shown: None, code: 0 });
-            }
-            if block.marks.iter().any(|mark| mark == "output") {
-                tried.compare(&block.span, &output);
-            } else if runs(block) && block.mark("not run:").is_none() {
-                output = steps(block).iter().map(|step| tried.run(step)).collect();
-            }
-        }
+        page.blocks.iter().for_each(|block| tried.block(block, &mut output));
         tried.bless();
         tried.faults
+    }
+
+    fn new(page: &'p Page, fleet: TestFleet) -> Self {
+        Self { page, fleet, faults: Vec::new(), blessed: Vec::new() }
+    }
+
+    /// Runs a block, or compares the output of the one before with it.
+    fn block(&mut self, block: &Block, output: &mut String) {
+        for change in block.marks.iter().filter_map(|mark| mark.strip_prefix("edit: ")) {
+            let [file, from, to]: [String; 3] = serde_json::from_str(change).unwrap();
+            let (file, text) = (self.fleet.path(&file), fs::read_to_string(self.fleet.path(&file)).unwrap());
+            assert!(text.contains(&from), "{from} is not in {}", file.display());
+            fs::write(file, text.replacen(&from, &to, 1)).unwrap();
+        }
+        if let Some(command) = block.mark("first:") {
+            self.run(&Step { script: command.to_owned(), shown: None, code: 0 });
+        }
+        if block.marks.iter().any(|mark| mark == "output") {
+            self.compare(&block.span, output);
+        } else if runs(block) && block.mark("not run:").is_none() {
+            *output = steps(block).iter().map(|step| self.run(step)).collect();
+        }
     }
 
     /// Runs a command in the shell, where the last one left off.

@@ -2,5 +2,4 @@
 
 mod docs_links;
 mod documented_commands;
-mod error_messages;
 mod walk_throughs;

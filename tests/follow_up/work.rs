@@ -90,37 +90,6 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
     assert_eq!(after["new"][0]["tail_number"], "N415FP");
 }
 
-#[test]
-fn wrong_decisions_change_nothing() {
-    let empty = TestFleet::sample();
-    let missing = empty.freeplay(&["work", "list"]);
-    assert_eq!(missing.code, Some(3), "there is no store: {missing:?}");
-    let fleet = fleet();
-    let before = fleet.run_ok(&["work", "list", "--json"]);
-    let reason = ["--reason", "x", "--by", "mk"];
-    for (args, code) in [
-        (["work", "close", "W9"].as_slice(), "no_such_request"),
-        (&["work", "defer", "W1", "--until", "2020-01-01"], "date_passed"),
-        (&["work", "acknowledge", "W1", "--reason", " "], "empty_name"),
-        (&["work", "list", "--serial", "1040-9999"], "unknown_name"),
-    ] {
-        let args = if args[1] == "list" || args.contains(&"--reason") {
-            args.to_vec()
-        } else {
-            [args, &reason].concat()
-        };
-        let result = fleet.command(&args).env("USER", "mk").output().unwrap();
-        let err = String::from_utf8(result.stderr).unwrap();
-        assert_eq!(result.status.code(), Some(2), "{args:?}: {err}");
-        assert!(err.contains(&format!("error[{code}]")), "{args:?}: {err}");
-    }
-    assert_eq!(fleet.run_ok(&["work", "list", "--json"]), before);
-    fleet.run_ok(&["work", "close", "W1", "--reason", "x", "--by", "mk"]);
-    let again = fleet.freeplay(&["work", "close", "W1", "--reason", "x", "--by", "mk"]);
-    assert_eq!(again.code, Some(2));
-    assert!(again.err.contains("error[request_closed]"), "{}", again.err);
-}
-
 /// A name cannot move the cursor of the terminal, nor become a formula of a spreadsheet.
 #[test]
 fn hostile_names_and_remarks_stay_text() {

@@ -15,71 +15,6 @@ fn a_second_run_does_nothing() {
     assert_eq!(fleet.exported(), before);
 }
 
-#[test]
-fn a_changed_part_redoes_only_the_logs_it_flew_in() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N412FP"]);
-    fleet.configure("stiffness_n_per_m = 6.5e7", "stiffness_n_per_m = 6.6e7");
-    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
-    fleet.configure("limit_m = 150e-6", "limit_m = 151e-6");
-    fleet.run_ok(&["run", "--tail", "N412FP"]);
-    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert_eq!(plan.matches("setting changed").count(), 0, "{plan}");
-    let records = fleet.run_ok(&["query", "tail", "N412FP", "--json"]);
-    assert_eq!(records.matches("\"flight_id\"").count(), 40, "a flight is there once");
-}
-
-#[test]
-fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
-    let fleet = TestFleet::processed();
-    fleet.configure("limit_m = 150e-6", "limit_m = 160e-6");
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
-}
-
-#[test]
-fn a_renamed_or_touched_log_is_recognised_by_its_content() {
-    let fleet = TestFleet::processed();
-    let before = fleet.exported();
-    let log = &fleet.logs()[0];
-    std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
-    let other = &fleet.logs()[5];
-    let bytes = std::fs::read(other).unwrap();
-    std::fs::remove_file(other).unwrap();
-    std::fs::write(other, bytes).unwrap();
-    let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("0 records of 0 flights"), "{account}");
-    assert_eq!(fleet.exported(), before);
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
-}
-
-/// A changed byte that changes neither size nor date: found only when contents are compared.
-#[test]
-fn content_is_compared_on_request() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    fleet.run_ok(&["run"]);
-    let log = &fleet.logs()[4];
-    let written = std::fs::metadata(log).unwrap().modified().unwrap();
-    let mut content = std::fs::read(log).unwrap();
-    let sound = content.clone();
-    let middle = content.len() / 2;
-    content[middle] ^= 1;
-    std::fs::write(log, content).unwrap();
-    std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("10 logs: 0 new or changed, 10 already processed"));
-    let result = fleet.freeplay(&["run", "--verify-content"]);
-    assert!(to_do(&result.out).ends_with("10 logs: 1 new or changed, 9 already processed"), "{result:?}");
-    // A failed log of the same size and date is compared too.
-    assert_eq!(result.code, Some(1), "its checksum is wrong: {result:?}");
-    std::fs::write(log, sound).unwrap();
-    std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1), "the same size and date");
-    fleet.run_ok(&["run", "--verify-content"]);
-    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
-    assert!(page.contains("known 9") && page.contains("10 logs"), "{page}");
-}
-
 /// Less memory and more workers than logs move no number.
 #[test]
 fn a_memory_budget_and_idle_workers_change_no_record() {
@@ -93,16 +28,6 @@ fn a_memory_budget_and_idle_workers_change_no_record() {
         spread.run_ok(&["run", "--jobs", "8"]);
         assert_eq!(spread.exported(), plain.exported(), "{settings}");
     }
-}
-
-#[test]
-fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
-    let fleet = TestFleet::sample();
-    let log = &fleet.logs()[3];
-    std::fs::copy(log, log.with_file_name("copy.parquet")).unwrap();
-    fleet.run_ok(&["run"]);
-    let plain = TestFleet::processed();
-    assert_eq!(fleet.exported(), plain.exported());
 }
 
 /// Two recordings of one flight: the one whose name sorts first is used, and the other is named, also where two recorders
@@ -125,50 +50,6 @@ fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
 }
 
 #[test]
-fn redo_does_all_again_and_stores_each_flight_once() {
-    let fleet = TestFleet::processed();
-    let before = fleet.exported();
-    let account = fleet.run_ok(&["run", "--redo", "--tail", "N413FP"]);
-    assert!(account.contains("40 records of 10 flights"), "{account}");
-    assert_eq!(fleet.exported(), before);
-}
-
-#[test]
-fn a_limit_leaves_the_rest_for_the_next_run() {
-    let fleet = TestFleet::sample();
-    assert!(fleet.run_ok(&["run", "--limit", "7"]).contains("28 records of 7 flights"));
-    assert!(fleet.run_ok(&["run"]).contains("92 records of 23 flights"));
-}
-
-/// When the log that spoke for a flight breaks, its copy takes over on the next run.
-#[test]
-fn a_copy_speaks_when_the_first_log_breaks() {
-    let fleet = TestFleet::sample();
-    let log = &fleet.logs()[3];
-    std::fs::copy(log, log.with_file_name("z_copy.parquet")).unwrap();
-    fleet.run_ok(&["run"]);
-    let before = fleet.exported();
-    std::fs::write(log, b"broken").unwrap();
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
-    assert!(fleet.run_ok(&["run", "--dry-run"]).contains("its flight has no other log now"));
-    // The broken log stays an error until it is repaired.
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
-    assert_eq!(fleet.exported(), before);
-    let again = fleet.freeplay(&["run"]);
-    assert_eq!(again.code, Some(1));
-    assert!(to_do(&again.out).ends_with("31 logs: 0 new or changed, 31 already processed"));
-}
-
-/// The selection applies before the limit, also to logs that are not in the store yet.
-#[test]
-fn a_limit_counts_only_selected_logs() {
-    let fleet = TestFleet::sample();
-    let account = fleet.run_ok(&["run", "--tail", "N414FP", "--limit", "3"]);
-    assert!(account.contains("3 new or changed, 0 already processed, 20 excluded by --tail/--serial/--since/--until, 7 left for later by --limit"), "{account}");
-    assert!(account.contains("12 records of 3 flights"), "{account}");
-}
-
-#[test]
 fn the_account_does_not_depend_on_who_was_faster() {
     let account = |jobs: &str| {
         let fleet = TestFleet::sample();
@@ -180,94 +61,6 @@ fn the_account_does_not_depend_on_who_was_faster() {
         ["found", "known", "done", "flights", "estimated", "refused"].map(|key| report[key].to_string())
     };
     assert_eq!(account("1"), account("2"));
-}
-
-#[test]
-fn a_pattern_that_reaches_our_own_results_does_not_read_them() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "**/*_N41*.parquet");
-    fleet.run_ok(&["run"]);
-    fleet.configure("**/*_N41*.parquet", "**/*.parquet");
-    std::fs::remove_file(fleet.path("sample-data/truth.parquet")).unwrap();
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
-}
-
-/// A stored estimate can be recomputed from the provenance in its record.
-#[test]
-fn a_record_is_explained_and_recomputed_bitwise() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
-    fleet.run_ok(&["run"]);
-    let output = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]);
-    for part in ["bit-identical", "stiffness_n_per_m = 50000000.0", "motor [m]", "computed by Freeplay"] {
-        assert!(output.contains(part), "{part} is not in {output}");
-    }
-    let json = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left", "--json"]);
-    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(json["replay"]["verdict"], "same");
-    fleet.configure("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7");
-    assert!(fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]).contains("settings changed"));
-    std::fs::write(&fleet.logs()[2], b"gone").unwrap();
-    let result = fleet.freeplay(&["explain", "N412FP-0003", "aileron_left"]);
-    assert_eq!(result.code, Some(1), "{result:?}");
-    assert!(result.err.contains("error[not_parquet]"), "{}", result.err);
-    assert_eq!(fleet.freeplay(&["explain", "N412FP-0003", "rudder"]).code, Some(2));
-}
-
-/// Two methods side by side over the fleet: each in a store of its own, compared actuator by actuator.
-#[test]
-fn two_methods_live_side_by_side_and_are_compared() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    fleet.run_ok(&["run"]);
-    assert!(fleet.run_ok(&["diff", "results", "results"]).starts_with("0 of 40 actuator-flights differ"));
-    fleet.configure("path = \"results\"", "path = \"trial\"");
-    fleet.configure("method = \"contact\"", "method = \"midrange\"");
-    fleet.run_ok(&["run"]);
-    let output = fleet.run_ok(&["diff", "results", "trial"]);
-    assert!(output.starts_with("40 of 40 actuator-flights differ"), "{output}");
-    let few = fleet.run_ok(&["diff", "results", "trial", "--min-change-um", "1000"]);
-    assert!(few.starts_with("0 of 40"), "{few}");
-    let rows = fleet.run_ok(&["diff", "results", "trial", "--format", "csv"]);
-    assert_eq!(rows.lines().count(), 41);
-}
-
-#[test]
-fn metrics_tell_when_a_run_last_completed_and_how() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    std::fs::write(&fleet.logs()[0], b"").unwrap();
-    let result = fleet.freeplay(&["run", "--metrics", "freeplay.prom"]);
-    assert_eq!(result.code, Some(1));
-    let text = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
-    for line in [
-        "freeplay_logs_found 10",
-        "freeplay_logs_in_error 1",
-        "freeplay_records_estimated 36",
-        "freeplay_run_exit_code 1",
-    ] {
-        assert!(text.contains(&format!("\n{line}\n")), "{line} is not in {text}");
-    }
-    assert!(text.contains("freeplay_run_completed_timestamp_seconds 1"));
-    // Every sample has its help and type, as the format asks.
-    let samples = text.lines().filter(|l| !l.starts_with('#')).count();
-    assert_eq!(text.lines().filter(|l| l.starts_with("# TYPE")).count(), samples);
-}
-
-#[test]
-fn a_tail_that_went_quiet_is_named() {
-    let fleet = TestFleet::sample();
-    let account = fleet.run_ok(&["run"]);
-    assert!(!account.contains("no data"), "{account}");
-    let installations = fleet.path("pipeline.toml");
-    let text = std::fs::read_to_string(&installations).unwrap() + "stale_after_days = 20.0\n";
-    std::fs::write(&installations, text).unwrap();
-    for log in fleet.logs().iter().rev().filter(|log| log.to_string_lossy().contains("N414FP")).take(6) {
-        std::fs::remove_file(log).unwrap();
-    }
-    std::fs::remove_dir_all(fleet.path("results")).unwrap();
-    let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("no data     from 1 tail: N414FP since"), "{account}");
 }
 
 /// The screw channel of one aircraft is 4 ms late from some flight on: the run reports it, and the gap stays.

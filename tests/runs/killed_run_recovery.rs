@@ -95,29 +95,3 @@ fn the_list_of_files_holds_every_row_once() {
     // Two rows for each log that was to be done, and two for each run.
     assert_eq!((rows("logs"), rows("runs")), (16, 4));
 }
-
-#[test]
-fn the_logs_of_a_run_are_reported_by_class_and_reason() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    std::fs::write(&fleet.logs()[0], b"broken").unwrap();
-    assert_eq!(fleet.freeplay(&["run", "--limit", "8"]).code, Some(0));
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
-    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
-    assert!(page.contains("completed, some logs failed: 2 logs (done 1, error 1)"), "{page}");
-    assert!(page.contains("not_parquet"), "{page}");
-    let page = fleet.run_ok(&["store", "runs", "--last", "1"]);
-    assert!(page.starts_with("1 run\n"), "{page}");
-    // Only its date is new: that log is known, and no record is counted twice.
-    let log = &fleet.logs()[3];
-    let content = std::fs::read(log).unwrap();
-    std::fs::remove_file(log).unwrap();
-    std::fs::write(log, content).unwrap();
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1), "the broken log is still in error");
-    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
-    assert!(page.contains("1 log (known 1)"), "{page}");
-    fleet.freeplay(&["run"]);
-    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
-    assert!(page.ends_with("no log was new or changed\n"), "{page}");
-    assert_eq!(fleet.freeplay(&["store", "runs", "--run", "never"]).code, Some(2));
-}

@@ -1,6 +1,7 @@
-//! Twenty ways for a run to fail without an error: each is injected, and must be reported by its code.
+//! Ways for a run to fail without an error: each is injected, and must be reported by its code. Mistakes in files and
+//! settings are in `tests/data/errors.md`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::harness::{CommandResult, TestFleet, copy, facts, print_line, rewrite};
 use crate::runs::injected_faults::Injector;
@@ -31,12 +32,6 @@ fn relabel(fleet: &TestFleet, name: &str, key: &str, value: &str) {
     rewrite(&log, &log.with_file_name(name), &labels, |_| true, |_| true);
 }
 
-fn edit(file: &Path, from: &str, to: &str) {
-    let text = std::fs::read_to_string(file).unwrap();
-    assert!(text.contains(from), "{from} is not in {}", file.display());
-    std::fs::write(file, text.replace(from, to)).unwrap();
-}
-
 fn run(fleet: &TestFleet) -> CommandResult {
     fleet.freeplay(&["run", "--jobs", "1"])
 }
@@ -45,15 +40,6 @@ fn run(fleet: &TestFleet) -> CommandResult {
 type Way = (&'static str, fn(&TestFleet, &Injector) -> CommandResult, i32, &'static str);
 
 const WAYS: &[Way] = &[
-    (
-        "a pattern fits nothing",
-        |f, _| {
-            f.configure("sample-data/logs/**", "sample-data/log/**");
-            run(f)
-        },
-        2,
-        "no_log_matched",
-    ),
     (
         "a log cannot be listed",
         |f, _| {
@@ -111,52 +97,6 @@ const WAYS: &[Way] = &[
         1,
         "after this machine's clock",
     ),
-    (
-        "the timer never fired",
-        |f, _| {
-            run(f);
-            f.freeplay(&["store", "info", "--max-age", "0s"])
-        },
-        1,
-        "run_overdue",
-    ),
-    (
-        "the load is wired the other way round",
-        |f, _| {
-            f.configure("unit = \"N\"", "unit = \"N\"\nsign = -1");
-            run(f);
-            f.freeplay(&["store", "export", "--format", "csv"])
-        },
-        0,
-        "load_sign_flipped",
-    ),
-    (
-        "a limit is given in micrometres",
-        |f, _| {
-            f.configure("limit_m = 150e-6", "limit_m = 150.0");
-            run(f)
-        },
-        2,
-        "out_of_range",
-    ),
-    (
-        "a stiffness is given in another unit",
-        |f, _| {
-            f.configure("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 50.0");
-            run(f)
-        },
-        2,
-        "out_of_range",
-    ),
-    (
-        "the configuration is of an older release",
-        |f, _| {
-            f.configure("[trend]", "[trend]\nhorizon_h = 20000.0");
-            run(f)
-        },
-        2,
-        "unknown_key",
-    ),
     ("the disk is full", |f, injector| injector.full_disk(f), 3, "No space left on device"),
     ("another run holds the store", |f, injector| injector.beside_a_run_that_hangs(f), 3, "store_held"),
     (
@@ -179,19 +119,6 @@ const WAYS: &[Way] = &[
         "duplicate_flight",
     ),
     (
-        "a unit was removed before the flight",
-        |f, _| {
-            let table = f.path("sample-data/installations.csv");
-            let text = std::fs::read_to_string(&table).unwrap();
-            let without = |line: &&str| !(line.contains("N413FP") && line.contains("aileron_left"));
-            let kept: Vec<&str> = text.lines().filter(without).collect();
-            std::fs::write(table, kept.join("\n")).unwrap();
-            run(f)
-        },
-        1,
-        "unit_unknown",
-    ),
-    (
         "an aircraft is not in the table",
         |f, _| {
             relabel(f, "new.parquet", "tail_number", "N999ZZ");
@@ -201,25 +128,6 @@ const WAYS: &[Way] = &[
         "tail_unknown",
     ),
     (
-        "a part is not configured",
-        |f, _| {
-            edit(&f.path("sample-data/installations.csv"), "EMA-27-1060", "EMA-27-1061");
-            run(f)
-        },
-        1,
-        "part_unknown",
-    ),
-    (
-        "a log was copied in part",
-        |f, _| {
-            let bytes = std::fs::read(first(f)).unwrap();
-            std::fs::write(first(f), &bytes[..bytes.len() / 2]).unwrap();
-            run(f)
-        },
-        1,
-        "not_parquet",
-    ),
-    (
         "a load is scaled away",
         |f, _| {
             f.configure("unit = \"N\"", "unit = \"N\"\nscale = 1e-12");
@@ -227,31 +135,6 @@ const WAYS: &[Way] = &[
         },
         1,
         "load_too_small",
-    ),
-    (
-        "the store was moved",
-        |f, _| {
-            run(f);
-            std::fs::rename(f.path("results"), f.path("elsewhere")).unwrap();
-            f.freeplay(&["store", "info", "--max-age", "30h"])
-        },
-        3,
-        "store_missing",
-    ),
-    (
-        "a byte of the store changed",
-        |f, _| {
-            run(f);
-            let pattern = f.path("results/gaps/*.parquet");
-            let file = glob::glob(pattern.to_str().unwrap()).unwrap().flatten().next().unwrap();
-            let mut bytes = std::fs::read(&file).unwrap();
-            let middle = bytes.len() / 2;
-            bytes[middle] ^= 1;
-            std::fs::write(file, bytes).unwrap();
-            f.freeplay(&["store", "verify"])
-        },
-        1,
-        "store_damaged",
     ),
     ("a log never ends", |f, injector| injector.hanging_log(f), 1, "log_timeout"),
 ];
@@ -268,5 +151,5 @@ fn a_run_that_goes_quietly_wrong_is_noticed_by_name() {
         }
     }
     print_line(&format!("{} ways planted, {} missed", WAYS.len(), missed.len()));
-    assert!(WAYS.len() >= 20 && missed.is_empty(), "{}", missed.join("\n\n"));
+    assert!(missed.is_empty(), "{}", missed.join("\n\n"));
 }

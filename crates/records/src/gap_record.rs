@@ -3,6 +3,7 @@
 use arrow::datatypes::SchemaRef;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use strum::{EnumString, IntoStaticStr};
 
 use crate::flight::Flight;
 use crate::ids::{PartNumber, Position, SerialNumber};
@@ -10,8 +11,9 @@ use crate::row_schema::{self, Cells as _, text_cell};
 use crate::stored_row;
 
 /// Whether the flight allows an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr, EnumString)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Status {
     /// `gap_m` holds a number.
     Estimated,
@@ -25,22 +27,11 @@ pub enum Status {
 impl Status {
     /// Value of the `status` column.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Estimated => "estimated",
-            Self::Refused => "refused",
-            Self::Withdrawn => "withdrawn",
-        }
-    }
-
-    fn parse(text: &str) -> Result<Self, String> {
-        let known = [Self::Estimated, Self::Refused, Self::Withdrawn]
-            .into_iter()
-            .find(|status| status.as_str() == text);
-        known.ok_or_else(|| format!("`{text}` is no status"))
+        self.into()
     }
 }
 
-text_cell!(Status, Status::parse);
+text_cell!(Status, row_schema::word);
 
 stored_row! {
     /// Everything needed to reproduce the estimate bitwise.

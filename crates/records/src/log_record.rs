@@ -2,14 +2,16 @@
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use strum::{EnumString, IntoStaticStr};
 
 use crate::gap_record::RecordKey;
-use crate::row_schema::text_cell;
+use crate::row_schema::{self, text_cell};
 use crate::stored_row;
 
 /// How a log ended.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr, EnumString)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum LogOutcome {
     /// The records of its flight are stored, or belong to another log.
     #[default]
@@ -26,8 +28,6 @@ pub enum LogOutcome {
 }
 
 impl LogOutcome {
-    const ALL: [Self; 5] = [Self::Done, Self::Error, Self::Known, Self::Unaccounted, Self::NotReached];
-
     /// Outcomes that leave the earlier status of a log valid.
     pub const UNSETTLED: [Self; 2] = [Self::Unaccounted, Self::NotReached];
 
@@ -38,22 +38,11 @@ impl LogOutcome {
 
     /// Value of the `outcome` column.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Error => "error",
-            Self::Known => "known",
-            Self::Unaccounted => "unaccounted",
-            Self::NotReached => "not_reached",
-        }
-    }
-
-    fn parse(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|outcome| outcome.as_str() == text);
-        known.ok_or_else(|| format!("`{text}` is no outcome"))
+        self.into()
     }
 }
 
-text_cell!(LogOutcome, LogOutcome::parse);
+text_cell!(LogOutcome, row_schema::word);
 
 stored_row! {
     /// Status of one log: enough to know, without opening it, whether it must be processed again.

@@ -377,6 +377,11 @@ macro_rules! read_cell {
     };
 }
 
+/// Parses a word of an enum.
+pub(crate) fn word<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("`{text}` is none of its words"))
+}
+
 /// Implements both for a type that is a text: `as_str`, and a function that parses it.
 macro_rules! text_cell {
     ($type:ty, $parse:path) => {

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
 
 use super::layers::Source;
-use crate::config::limits::positive;
 
 /// States of quantities other than the gap: of a unit, of a tail, of a part.
 pub const QUANTITY_STATES: [&str; 11] = [
@@ -140,8 +139,6 @@ impl AlertChannel {
             };
             found.push(source.at(&["alerts", name, "states"], c));
         }
-        let timeout = positive("timeout_s", Some(self.timeout_s));
-        found.extend(timeout.map(|c| source.at(&["alerts", name, "timeout_s"], c)));
     }
 }
 

@@ -1,12 +1,11 @@
 //! What any setting's value must be.
 
-use records::Diagnostic;
+use std::ops::Range;
 
-/// A value that must be above zero when it is given.
-pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Diagnostic> {
-    let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
-    Some(Diagnostic::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
-}
+use records::Diagnostic;
+use toml::de::{DeTable, DeValue};
+
+use super::layers::Source;
 
 /// Least and largest plausible value of each physical setting, by key: one to several orders of magnitude beyond any
 /// actuator, sensor or recorder. A value outside was given in another unit, and could leave the numbers of a filter.
@@ -66,12 +65,66 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("max_rows", 1.0, 1e11),
 ];
 
-/// A value outside the plausible range of its key. Zero, negative and non-finite values have diagnostics of their own.
-pub(crate) fn implausible(key: &str, value: Option<f64>) -> Option<Diagnostic> {
-    let value = value.filter(|value| value.is_finite() && *value != 0.0)?;
-    let (_, least, most) = PLAUSIBLE.iter().find(|(name, ..)| *name == key)?;
-    let is_signed = *least == 0.0 || key == "scale";
-    if (*least..=*most).contains(&value.abs()) || (value < 0.0 && !is_signed) {
+/// Keys whose value may be of any size above zero.
+const POSITIVE: [&str; 2] = ["timeout_s", "give_up_s"];
+
+/// Keys whose zero, negative and non-finite values have diagnostics of their own: the part's model and the channel refuse
+/// them.
+const REFUSED_ELSEWHERE: [&str; 7] = [
+    "stiffness_n_per_m",
+    "screw_mass_kg",
+    "stiffness_nm_per_rad",
+    "inertia_kg_m2",
+    "reference_radius_m",
+    "v_d_m2",
+    "scale",
+];
+
+/// Every number of a configuration that no actuator, sensor, recorder or machine can have, at its key.
+pub(super) fn check(source: &Source<'_>) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    check_table(source.table(), source, &mut found);
+    found
+}
+
+fn check_table(table: &DeTable<'_>, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+    for (key, value) in table {
+        check_value(key.get_ref(), &key.span(), value.get_ref(), source, found);
+    }
+}
+
+fn check_value(
+    key: &str,
+    span: &Range<usize>,
+    value: &DeValue<'_>,
+    source: &Source<'_>,
+    found: &mut Vec<Diagnostic>,
+) {
+    let number = match value {
+        DeValue::Table(table) => return check_table(table, source, found),
+        DeValue::Array(values) => {
+            return values.iter().for_each(|value| check_value(key, span, value.get_ref(), source, found));
+        }
+        DeValue::Float(number) => number.as_str().parse().ok(),
+        DeValue::Integer(number) => {
+            i128::from_str_radix(number.as_str(), number.radix()).ok().map(|number| number as f64)
+        }
+        _ => None,
+    };
+    found.extend(number.and_then(|number| implausible(key, number)).map(|c| source.at_span(span.clone(), c)));
+}
+
+/// What is wrong with the value of a key.
+fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
+    let range = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
+    let is_signed = range.is_some_and(|(_, least, _)| *least == 0.0) || REFUSED_ELSEWHERE.contains(&key);
+    let is_positive = POSITIVE.contains(&key) || range.is_some() && !is_signed;
+    if is_positive && !(value.is_finite() && value > 0.0) {
+        let what = format!("`{key}` is {value}, which must be a number above zero");
+        return Some(Diagnostic::new("not_positive", what));
+    }
+    let (_, least, most) = range.filter(|_| value.is_finite() && value != 0.0)?;
+    if (*least..=*most).contains(&value.abs()) {
         return None;
     }
     let what = format!("`{key}` is {value:e}, outside the plausible range {least:e} to {most:e}");
@@ -80,11 +133,6 @@ pub(crate) fn implausible(key: &str, value: Option<f64>) -> Option<Diagnostic> {
         "stiffness_n_per_m" => "stiffness is in N/m: 50 N/µm is 5e7; ranges are in docs/configuration.md",
         _ => "check the unit that ends the key's name; ranges are in docs/configuration.md",
     }))
-}
-
-/// A value that is not above zero, or not plausible.
-pub(crate) fn bounded(key: &str, value: Option<f64>) -> Option<Diagnostic> {
-    positive(key, value).or_else(|| implausible(key, value))
 }
 
 /// Smallest and largest plausible limit of free play, m: one beyond them was given in another unit.

@@ -155,11 +155,11 @@ impl Config {
             match (PartNumber::new(number), settings.check()) {
                 (Ok(number), Ok(part)) => drop(parts.insert(number, part)),
                 (Err(e), _) => diagnostics.push(source.at(&["part"], Diagnostic::new("empty_name", e))),
-                (_, Err(found)) => diagnostics.extend(found.into_iter().map(|(key, diagnostic)| {
-                    let path: Vec<&str> =
-                        ["part", number].into_iter().chain(key.iter().map(String::as_str)).collect();
-                    source.at(&path, diagnostic)
-                })),
+                (_, Err(found)) => diagnostics.extend(
+                    found
+                        .into_iter()
+                        .map(|(key, diagnostic)| source.at(&[&["part", number], key].concat(), diagnostic)),
+                ),
             }
         }
         let overrides = Overrides::check(&document, &source);

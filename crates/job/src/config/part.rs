@@ -8,7 +8,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
 
-use crate::config::limits::{bounded, implausible};
 use crate::config::quantity_limits::QuantityLimits;
 use crate::filter_cache::FilterCache;
 
@@ -179,31 +178,7 @@ pub struct Part {
 }
 
 /// A key below the part's table, and what is wrong with it.
-pub(crate) type SettingError = (Vec<String>, Diagnostic);
-
-/// Checks the numbers of a table and of those below it; `path` is the key of the table.
-fn check_numbers(value: &serde_json::Value, path: &mut Vec<String>, keys: &mut SettingsValidator) {
-    match value {
-        serde_json::Value::Object(table) if !path.iter().any(|key| key == "quantity_limits") => {
-            for (key, value) in table {
-                path.push(key.clone());
-                check_numbers(value, path, keys);
-                path.pop();
-            }
-        }
-        serde_json::Value::Array(values) => {
-            values.iter().for_each(|value| check_numbers(value, path, keys));
-        }
-        value => {
-            let name = path.last().map_or("", String::as_str);
-            keys.found.extend(implausible(name, value.as_f64()).map(|c| (path.clone(), c)));
-        }
-    }
-}
-
-fn owned(key: &[&str]) -> Vec<String> {
-    key.iter().map(|key| (*key).to_owned()).collect()
-}
+pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -226,10 +201,6 @@ impl PartSettings {
     pub(crate) fn check(&self) -> Result<Part, Vec<SettingError>> {
         let mut keys = SettingsValidator::default();
         self.check_kind(&mut keys);
-        self.check_ranges(&mut keys);
-        keys.positive(&["reference_load_n"], self.reference_load_n);
-        keys.positive(&["limit_m"], self.limit_m);
-        keys.positive(&["watch_m"], self.watch_m);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
             keys.report(
@@ -258,16 +229,6 @@ impl PartSettings {
                 quantity_limits: self.quantity_limits.unwrap_or_default(),
             }),
             _ => Err(keys.found),
-        }
-    }
-
-    /// Every number that no actuator, sensor or limit can have.
-    fn check_ranges(&self, keys: &mut SettingsValidator) {
-        if let Ok(table) = serde_json::to_value(self) {
-            check_numbers(&table, &mut Vec::new(), keys);
-        }
-        for (key, limit) in self.quantity_limits.iter().flat_map(QuantityLimits::entries) {
-            keys.found.extend(bounded(key[1], limit).map(|c| (owned(key), c)));
         }
     }
 
@@ -303,7 +264,6 @@ impl PartSettings {
         let stiffness = keys.required(&["stiffness_n_per_m"], self.stiffness_n_per_m);
         let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
         let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
-        keys.positive(&["lead_m_per_rev"], self.lead_m_per_rev);
         let actuator =
             keys.made(&["stiffness_n_per_m"], estimator::ActuatorModel::linear(stiffness?, damping?, mass?))?;
         Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
@@ -329,9 +289,6 @@ impl PartSettings {
             );
             return None;
         };
-        keys.positive(&["noise", "initial_position_rms_m"], noise.initial_position_rms_m);
-        keys.positive(&["noise", "initial_speed_rms_m_per_s"], noise.initial_speed_rms_m_per_s);
-        keys.positive(&["noise", "initial_backlash_rms_m"], noise.initial_backlash_rms_m);
         match noise.model {
             NoiseModel::Sensors => noise.sensors(self, keys).map(estimator::NoiseModel::Sensors),
             NoiseModel::PerStep => {
@@ -395,7 +352,6 @@ impl NoiseSettings {
                 ],
             ),
         };
-        keys.positive(&["noise", "bandwidth_hz"], self.bandwidth_hz);
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");
             keys.report(&["noise"], Diagnostic::new("bad_parameter", what));
@@ -420,7 +376,7 @@ struct SettingsValidator {
 
 impl SettingsValidator {
     fn report(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
-        self.found.push((owned(key), diagnostic));
+        self.found.push((key, diagnostic));
     }
 
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
@@ -433,11 +389,6 @@ impl SettingsValidator {
             );
         }
         value
-    }
-
-    fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
-        let name = key.last().copied().unwrap_or_default();
-        self.found.extend(crate::config::limits::positive(name, value).map(|c| (owned(key), c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

@@ -27,19 +27,6 @@ pub struct QuantityLimits {
 }
 
 impl QuantityLimits {
-    /// The keys below the table that holds the limits, and their values.
-    pub(crate) fn entries(&self) -> [(&'static [&'static str], Option<f64>); 7] {
-        [
-            (&["quantity_limits", "stiffness_share"], self.stiffness_share),
-            (&["quantity_limits", "friction_share"], self.friction_share),
-            (&["quantity_limits", "lost_motion_share"], self.lost_motion_share),
-            (&["quantity_limits", "delay_s"], self.delay_s),
-            (&["quantity_limits", "load_zero_share"], self.load_zero_share),
-            (&["quantity_limits", "load_delay_s"], self.load_delay_s),
-            (&["quantity_limits", "nis_share"], self.nis_share),
-        ]
-    }
-
     /// These limits, and others where a key is not given.
     #[must_use]
     pub fn or(self, other: Self) -> Self {

@@ -8,7 +8,6 @@ use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
 use records::Diagnostic;
 
 use super::layers::Source;
-use crate::config::limits::{bounded, implausible, positive};
 
 /// Every diagnostic about the channels, each at its key.
 pub(super) fn check(
@@ -126,22 +125,13 @@ fn one(
         let what = format!("`scale` is {}, which would make every value the same", channel.scale);
         found.push(("scale", Diagnostic::new("bad_scale", what)));
     }
-    for (key, value) in [
-        ("gear_ratio", Some(channel.gear_ratio)),
-        ("wraps_at", channel.wraps_at),
-        ("rate_hz", channel.rate_hz),
-    ] {
-        found.extend(bounded(key, value).map(|c| (key, c)));
-    }
     found.extend(status_bits(channel).map(|c| ("valid_bits", c)));
-    found.extend(implausible("scale", Some(channel.scale)).map(|c| ("scale", c)));
     for (key, value) in
         [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
     {
         if !value.is_finite() {
             found.push((key, Diagnostic::new("bad_parameter", format!("`{key}` is {value}, not a number"))));
         }
-        found.extend(implausible(key, Some(value)).map(|c| (key, c)));
     }
     found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
     found
@@ -202,7 +192,6 @@ fn conditions(condition: &SampleFilter, groups: &BTreeMap<String, GroupMapping>)
         let what = format!("`margin_s` of the condition on `{column}` is {margin_s}");
         found.push(Diagnostic::new("bad_parameter", what).hint("seconds, zero or more"));
     }
-    found.extend(positive("rate_hz", condition.rate_hz));
     let map = ChannelMapping { group: condition.group.clone(), ..ChannelMapping::default() };
     found.extend(unknown_group("when", &map, groups));
     found

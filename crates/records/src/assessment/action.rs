@@ -4,12 +4,14 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use jiff::Timestamp;
+use strum::IntoStaticStr;
 
 use crate::assessment::trend_row::{ChangePoint, TrendRow};
 use crate::time::day_text;
 
 /// What a unit's state asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Action {
     /// State `act`: the gap is at or above the limit, and the part does not ask for an inspection first.
     Replace,
@@ -24,12 +26,7 @@ pub enum Action {
 impl Action {
     /// Its word in columns.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Replace => "replace",
-            Self::Inspect => "inspect",
-            Self::CheckLogs => "check_logs",
-            Self::SetLimit => "set_limit",
-        }
+        self.into()
     }
 
     /// The action that a state and its reason ask for, with the states of other quantities.

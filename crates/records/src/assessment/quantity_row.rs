@@ -2,12 +2,27 @@
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use strum::{EnumString, IntoStaticStr};
 
 use crate::row;
 
 /// A followed quantity, named like its column of the records; its unit ends the name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    IntoStaticStr,
+    EnumString,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 #[expect(missing_docs, reason = "each is documented in the records table under its name")]
 pub enum Quantity {
     GapM,
@@ -39,23 +54,12 @@ impl Quantity {
 
     /// Name of the column.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::GapM => "gap_m",
-            Self::LostMotionM => "lost_motion_m",
-            Self::StiffnessNPerM => "stiffness_n_per_m",
-            Self::FrictionN => "friction_n",
-            Self::FrictionDryN => "friction_dry_n",
-            Self::FrictionLoadShare => "friction_load_share",
-            Self::SkewS => "skew_s",
-            Self::LoadZeroN => "load_zero_n",
-            Self::LoadDelayS => "load_delay_s",
-            Self::Nis => "nis",
-        }
+        self.into()
     }
 
     /// The quantity with a name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|quantity| quantity.as_str() == name)
+        name.parse().ok()
     }
 
     /// Name for readers.
@@ -88,8 +92,9 @@ impl Quantity {
 }
 
 /// Whose a change is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ChangeScope {
     /// One unit alone: the actuator, or its own sensors.
     Unit,
@@ -102,11 +107,7 @@ pub enum ChangeScope {
 impl ChangeScope {
     /// Its word in columns.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Unit => "unit",
-            Self::Tail => "tail",
-            Self::Part => "part",
-        }
+        self.into()
     }
 
     /// State of a tail or a part that changed; a unit has one by quantity.

@@ -1,12 +1,14 @@
 //! Alert record: one change of state, and what became of its message in each channel.
 
 use jiff::Timestamp;
+use strum::{EnumString, IntoStaticStr};
 
-use crate::row_schema::text_cell;
+use crate::row_schema::{self, text_cell};
 use crate::stored_row;
 
 /// What became of an alert.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, EnumString)]
+#[strum(serialize_all = "snake_case")]
 pub enum AlertStatus {
     /// The change itself: it needs no message, or its messages have rows of their own.
     Recorded,
@@ -23,33 +25,18 @@ pub enum AlertStatus {
 }
 
 impl AlertStatus {
-    const ALL: [Self; 6] =
-        [Self::Recorded, Self::Pending, Self::Sending, Self::Sent, Self::Unconfirmed, Self::Dropped];
-
     /// Value of the `status` column.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Recorded => "recorded",
-            Self::Pending => "pending",
-            Self::Sending => "sending",
-            Self::Sent => "sent",
-            Self::Unconfirmed => "unconfirmed",
-            Self::Dropped => "dropped",
-        }
+        self.into()
     }
 
     /// Whether the message has not been received, or perhaps not.
     pub fn is_unsent(self) -> bool {
         matches!(self, Self::Pending | Self::Sending | Self::Unconfirmed)
     }
-
-    fn parse(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|status| status.as_str() == text);
-        known.ok_or_else(|| format!("`{text}` is no status of an alert"))
-    }
 }
 
-text_cell!(AlertStatus, AlertStatus::parse);
+text_cell!(AlertStatus, row_schema::word);
 
 stored_row! {
     /// One change of state, or its message in one channel.

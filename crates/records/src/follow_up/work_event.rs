@@ -1,12 +1,14 @@
 //! Work event: one step in the life of a work request. Events are only added; the request is their sum.
 
 use jiff::Timestamp;
+use strum::{EnumString, IntoStaticStr};
 
-use crate::row_schema::text_cell;
+use crate::row_schema::{self, text_cell};
 use crate::stored_row;
 
 /// Kind of a work event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, EnumString)]
+#[strum(serialize_all = "snake_case")]
 pub enum WorkEventKind {
     /// A run found the unit in state `plan` or `act`.
     Opened,
@@ -31,38 +33,9 @@ pub enum WorkEventKind {
 }
 
 impl WorkEventKind {
-    const ALL: [Self; 10] = [
-        Self::Opened,
-        Self::Acknowledged,
-        Self::Deferred,
-        Self::Returned,
-        Self::Moved,
-        Self::StateChanged,
-        Self::Reopened,
-        Self::Removed,
-        Self::Maintained,
-        Self::Closed,
-    ];
-
     /// Value of the `event` column.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Opened => "opened",
-            Self::Acknowledged => "acknowledged",
-            Self::Deferred => "deferred",
-            Self::Returned => "returned",
-            Self::Moved => "moved",
-            Self::StateChanged => "state_changed",
-            Self::Reopened => "reopened",
-            Self::Removed => "removed",
-            Self::Maintained => "maintained",
-            Self::Closed => "closed",
-        }
-    }
-
-    fn parse(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|kind| kind.as_str() == text);
-        known.ok_or_else(|| format!("`{text}` is no event of a work request"))
+        self.into()
     }
 
     /// Whether the event closes its request.
@@ -71,7 +44,7 @@ impl WorkEventKind {
     }
 }
 
-text_cell!(WorkEventKind, WorkEventKind::parse);
+text_cell!(WorkEventKind, row_schema::word);
 
 stored_row! {
     /// One step in the life of a work request.

@@ -156,3 +156,41 @@ proptest! {
         prop_assert!(findings.iter().all(|found| found.code == "store_records_missing"), "{:?}", findings);
     }
 }
+
+/// Every flight has each of its positions once, all of one estimate.
+fn assert_whole(records: &[GapRecord]) {
+    let mut flights: BTreeMap<_, Vec<&GapRecord>> = BTreeMap::new();
+    for record in records {
+        let flight = (record.flight.tail_number.clone(), record.flight.flight_id.clone());
+        flights.entry(flight).or_default().push(record);
+    }
+    for (flight, records) in flights {
+        let positions: Vec<&str> = records.iter().map(|r| r.position.as_str()).collect();
+        assert_eq!(positions, POSITIONS, "{flight:?}");
+        assert!(records.windows(2).all(|r| r[0].estimate.gap_m == r[1].estimate.gap_m), "{flight:?}");
+    }
+}
+
+#[test]
+fn a_reader_beside_a_writer_sees_whole_commits_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let reader = Store::open(dir.path()).unwrap();
+    std::thread::scope(|scope| {
+        let writing = scope.spawn(move || {
+            for step in 0..24 {
+                let gap_m = 1e-6 * f64::from(step);
+                let flight = i64::from(step % 5);
+                writer.commit(&[result(1, flight, gap_m), result(2, flight, gap_m)]).unwrap();
+                if step % 10 == 9 {
+                    writer.compact().unwrap();
+                }
+            }
+        });
+        while !writing.is_finished() {
+            assert_whole(&reader.records(&Query::default()).unwrap());
+        }
+        writing.join().unwrap();
+    });
+    assert_eq!(reader.records(&Query::default()).unwrap().len(), 30);
+}
