@@ -7,10 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray, Scalar};
+use arrow::array::{Array, ArrayRef, AsArray, Int64Array, Scalar};
 use arrow::compute::cast;
 use arrow::compute::kernels::cmp;
-use arrow::datatypes::{DataType, Int64Type, UInt64Type};
+use arrow::datatypes::{DataType, UInt64Type};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
@@ -180,22 +180,16 @@ impl RowTable {
         self.each(samples, &samples.leaf, |array| {
             let wrong =
                 || wrong_type(&samples.leaf, array, "whole numbers, of which `valid_bits` names bits");
-            let wide =
-                if array.data_type() == &DataType::UInt64 { DataType::UInt64 } else { DataType::Int64 };
             if !array.data_type().is_integer() {
                 return Err(wrong());
             }
-            let words = cast(array, &wide).map_err(|_| wrong())?;
-            let mark = |word: Option<u64>| {
-                word.map_or(f64::NAN, |word| f64::from(u8::from(word & set == set && word & clear == 0)))
+            let words: Int64Array = match array.as_primitive_opt::<UInt64Type>() {
+                Some(words) => words.unary(u64::cast_signed),
+                None => cast(array, &DataType::Int64).map_err(|_| wrong())?.as_primitive().clone(),
             };
-            match words.as_primitive_opt::<UInt64Type>() {
-                Some(words) => marks.extend(words.iter().map(mark)),
-                None => {
-                    let words = words.as_primitive::<Int64Type>();
-                    marks.extend(words.iter().map(|word| mark(word.map(i64::cast_unsigned))));
-                }
-            }
+            let [set, clear] = [set, clear].map(u64::cast_signed);
+            let mark = |word: i64| f64::from(u8::from(word & set == set && word & clear == 0));
+            marks.extend(words.iter().map(|word| word.map_or(f64::NAN, mark)));
             Ok(())
         })?;
         Ok(marks)

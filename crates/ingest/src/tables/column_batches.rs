@@ -14,8 +14,9 @@ use arrow::array::{
     Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
     StringBuilder, TimestampMicrosecondArray, new_null_array,
 };
-use arrow::compute::cast;
+use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
+use arrow::error::ArrowError;
 use jiff::Timestamp;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
@@ -52,6 +53,13 @@ impl StringColumn {
     pub fn get(&self, row: usize) -> Option<&str> {
         let text = self.0.is_valid(row).then(|| trim_ascii_fast(self.0.value(row)))?;
         (!text.is_empty()).then_some(text)
+    }
+
+    /// The texts of several columns, one after the other.
+    pub(super) fn joined(columns: &[Self]) -> Result<Self, ErrorKind> {
+        let arrays: Vec<&dyn Array> = columns.iter().map(|column| &column.0 as &dyn Array).collect();
+        let detail = |e: ArrowError| ErrorKind::Table { row: None, column: None, detail: e.to_string() };
+        concat(&arrays).map(|texts| Self(texts.as_string().clone())).map_err(detail)
     }
 }
 

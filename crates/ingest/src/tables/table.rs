@@ -2,13 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use arrow::array::RecordBatch;
-use arrow::compute::concat_batches;
-use arrow::datatypes::Schema;
 
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::tables::cell::{bad_cell, missing, position};
 use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 
@@ -40,13 +37,16 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-        let all = concat_batches(&schema, batches).map_err(|e| {
-            Error::new(name, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
-        })?;
-        let all = TableBatch::new(name, all, 0);
-        let (header, rows) = (all.header().to_vec(), all.len());
-        let columns = (0..header.len()).map(|column| all.texts(Some(column))).collect::<Result<_, _>>()?;
+        let parts: Vec<TableBatch> =
+            batches.iter().map(|batch| TableBatch::new(name, batch.clone(), 0)).collect();
+        let header = parts.first().map(|part| part.header().to_vec()).unwrap_or_default();
+        let column = |column: usize| {
+            let texts = parts.iter().map(|part| part.texts(Some(column)));
+            let texts = StringColumn::joined(&texts.collect::<Result<Vec<_>, _>>()?);
+            texts.map_err(|fault| Error::new(name, fault))
+        };
+        let columns = (0..header.len()).map(column).collect::<Result<_, _>>()?;
+        let rows = parts.iter().map(TableBatch::len).sum();
         Ok(Self { file: name.to_owned(), header, columns, rows, names: ColumnAliases::new() })
     }
 

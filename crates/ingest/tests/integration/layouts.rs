@@ -1,6 +1,7 @@
 //! Logs as fleets write them: several actuators or one, every unit, every kind of clock.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,12 +22,15 @@ use records::Position;
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
-    let fields: Vec<_> =
-        columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
-    let schema = Arc::new(Schema::new(fields));
-    let batch = RecordBatch::try_new(Arc::clone(&schema), columns.iter().map(|c| Arc::clone(&c.1)).collect())
-        .unwrap();
-    let mut writer = ArrowWriter::try_new(std::fs::File::create(file).unwrap(), schema, None).unwrap();
+    let field = |(name, array): &(&str, ArrayRef)| Field::new(*name, array.data_type().clone(), true);
+    let arrays = columns.iter().map(|(_, array)| Arc::clone(array)).collect();
+    write_fields(file, columns.iter().map(field).collect(), arrays);
+}
+
+/// The same with fields that may have metadata.
+fn write_fields(file: &Path, fields: Vec<Field>, arrays: Vec<ArrayRef>) {
+    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
+    let mut writer = ArrowWriter::try_new(File::create(file).unwrap(), batch.schema(), None).unwrap();
     writer.write(&batch).unwrap();
     writer.close().unwrap();
 }
@@ -312,13 +316,8 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
         Field::new("m", DataType::Int32, true).with_metadata(noted.into()),
         Field::new("s", DataType::Float64, true),
     ];
-    let schema = Arc::new(Schema::new(fields.to_vec()));
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    let columns = vec![reals(&[0.0, 0.1]), counts, reals(&[1.0, 2.0])];
-    let mut writer =
-        ArrowWriter::try_new(std::fs::File::create(&file).unwrap(), Arc::clone(&schema), None).unwrap();
-    writer.write(&RecordBatch::try_new(schema, columns).unwrap()).unwrap();
-    writer.close().unwrap();
+    write_fields(&file, fields.to_vec(), vec![reals(&[0.0, 0.1]), counts, reals(&[1.0, 2.0])]);
     let read = |motor: ChannelMapping| {
         let m = mapping(motor, channel("s", Unit::Metre), channel("s", Unit::Newton));
         read(&file, &m, LINEAR).map_err(|e| e.diagnostic())
@@ -346,12 +345,8 @@ fn units_of_the_arrow_fields_are_proposed() {
         Field::new(name, DataType::Float64, true).with_metadata(noted.into())
     };
     let fields = [("time_s", "s"), ("rudder_motor", "deg"), ("rudder_screw", "rad"), ("rudder_load", "N·m")];
-    let schema = Arc::new(Schema::new(fields.map(|(name, unit)| field(name, unit)).to_vec()));
     let (_dir, file) = place("x.parquet");
-    let batch = RecordBatch::try_new(Arc::clone(&schema), vec![reals(&[0.0, 0.1]); 4]).unwrap();
-    let mut writer = ArrowWriter::try_new(std::fs::File::create(&file).unwrap(), schema, None).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    write_fields(&file, fields.map(|(name, unit)| field(name, unit)).to_vec(), vec![reals(&[0.0, 0.1]); 4]);
     let found = ingest::infer::propose(&file).unwrap();
     let units: Vec<_> = found.channels.values().map(|(_, unit)| *unit).collect();
     assert_eq!(units, [Some(Unit::Degree), Some(Unit::Radian), Some(Unit::NewtonMetre)]);
