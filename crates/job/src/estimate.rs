@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
-use estimator::{Filter, FilterWorkspace, GainSchedule, MidRangeEstimate, Samples, midrange};
+use estimator::contact::{self, ContactEstimate, ContactPlot, PartPrior, Rejection};
+use estimator::{Filter, GainSchedule, MidRangeEstimate, Samples, midrange};
 use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
 
@@ -86,11 +86,8 @@ pub fn contact_regression(
     if let Some(reason) = pre_check_rejection(channels) {
         return Ok(Err(reason));
     }
-    match contact::estimate(&samples(channels), &prior(channels, part)) {
-        Ok(ContactOutcome::Estimated(found)) => Ok(Ok(found)),
-        Ok(ContactOutcome::Refused(why)) => Ok(Err(why.code())),
-        Err(e) => Err(Diagnostic::new("estimate_failed", e)),
-    }
+    let outcome = contact::estimate(&samples(channels), &prior(channels, part));
+    Ok(outcome.map_err(|e| Diagnostic::new("estimate_failed", e))?.map_err(Rejection::code))
 }
 
 /// Flights of more samples get workspaces of their own, so that no thread keeps large ones.
@@ -99,7 +96,7 @@ const MAX_KEPT_SAMPLES: usize = 2 << 20;
 /// Reusable workspaces of one thread.
 #[derive(Debug, Default)]
 struct Workspaces {
-    published: FilterWorkspace,
+    published: Vec<f64>,
     contact: contact::ContactWorkspace,
 }
 
@@ -197,10 +194,8 @@ fn contact_estimate(
     prior: &PartPrior,
     workspace: &mut contact::ContactWorkspace,
 ) -> Result<GapEstimate, estimator::Error> {
-    Ok(match contact::estimate_with(&samples(channels), prior, workspace)? {
-        ContactOutcome::Estimated(found) => from_contact(&found),
-        ContactOutcome::Refused(why) => GapEstimate::refused(why.code()),
-    })
+    let outcome = contact::estimate_with(&samples(channels), prior, workspace)?;
+    Ok(outcome.map_or_else(|why| GapEstimate::refused(why.code()), |found| from_contact(&found)))
 }
 
 /// The gap by the published statistic, for a flight whose channels show one.

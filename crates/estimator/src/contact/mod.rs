@@ -71,14 +71,11 @@ pub fn estimate_with(
     room: &mut ContactWorkspace,
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
-    Ok(match look(samples, prior, room) {
-        Ok((frame, contact)) => {
-            let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
-            let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
-            ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m)))
-        }
-        Err(refusal) => ContactOutcome::Refused(refusal),
-    })
+    Ok(look(samples, prior, room).map(|(frame, contact)| {
+        let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
+        let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
+        Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m))
+    }))
 }
 
 /// Why a flight does not allow an estimate, as far as the channels show it without a regression: for the published

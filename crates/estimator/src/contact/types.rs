@@ -112,14 +112,8 @@ pub struct ContactEstimate {
     pub flags: Vec<QualityFlag>,
 }
 
-/// The result of a flight.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ContactOutcome {
-    /// Its gap, and what was estimated with it.
-    Estimated(Box<ContactEstimate>),
-    /// Why the flight does not allow an estimate.
-    Refused(Rejection),
-}
+/// The result of a flight: its gap, or why the flight does not allow an estimate.
+pub type ContactOutcome = Result<Box<ContactEstimate>, Rejection>;
 
 impl ContactEstimate {
     /// Friction at the 95 % load, N.
