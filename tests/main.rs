@@ -15,4 +15,5 @@ mod mistakes;
 mod report_contents;
 mod runs;
 mod states;
+mod stroke;
 mod wrong_inputs;

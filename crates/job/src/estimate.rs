@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use estimator::contact::{self, ContactEstimate, ContactPlot, PartPrior, Rejection};
+use estimator::contact::{self, ContactEstimate, ContactPlot, GapAtPlace, PartPrior, Rejection};
 use estimator::{Filter, GainSchedule, MidRangeEstimate, Samples, midrange};
 use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
@@ -238,6 +238,8 @@ fn with_published(mut estimate: GapEstimate, published: Option<&MidRangeEstimate
 
 fn from_contact(found: &ContactEstimate) -> GapEstimate {
     let (p05_m, p95_m) = found.gap_bounds_m;
+    let largest = found.largest_gap();
+    let profile = |of: fn(&GapAtPlace) -> f64| found.gap_profile.iter().map(of).collect();
     GapEstimate {
         status: Status::Estimated,
         flags: found.flags.iter().map(|flag| flag.code().to_owned()).collect(),
@@ -263,9 +265,12 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         friction_dry_se_n: Some(found.friction_se.dry_n),
         friction_load_share: Some(found.friction.lost_share),
         friction_load_share_se: Some(found.friction_se.lost_share),
-        gap_largest_m: found.gap_largest_m.map(|largest| largest.0),
-        gap_largest_se_m: found.gap_largest_m.map(|largest| largest.1),
-        gap_largest_at_m: found.gap_largest_m.map(|largest| largest.2),
+        gap_largest_m: largest.map(|place| place.gap_m),
+        gap_largest_se_m: largest.map(|place| place.gap_se_m),
+        gap_largest_at_m: largest.map(|place| place.at_m),
+        gap_profile_at_m: profile(|place| place.at_m),
+        gap_profile_m: profile(|place| place.gap_m),
+        gap_profile_se_m: profile(|place| place.gap_se_m),
         preload_n: found.preload_n.map(|preload| preload.0),
         preload_se_n: found.preload_n.map(|preload| preload.1),
         gap_midrange_fitted_m: found.midrange_at_fit_m,
