@@ -4,23 +4,23 @@
 //!
 //! `batch_in_a_room` reuses its memory and the settled gain.
 //!
-//! `even_unsettled` restarts before the gain settles, `even` runs on long after: a step takes the same.
+//! `stream_even` restarts before the gain settles, or runs on long after: a step takes the same.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot go on has failed")]
 
+mod made_flight;
+
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use estimator::SensorNoise;
 use estimator::contact::{self, PartPrior};
-use estimator::{
-    ActuatorModel, Filter, FilterWorkspace, GainSchedule, NoiseModel, Samples, Stream, StreamingGap, gap,
-    midrange,
-};
+use estimator::{Filter, GainSchedule, Samples, Stream, StreamingGap, gap, midrange};
+use made_flight::{STEP_S, channels};
 
 /// Positions, loads and S of so many samples stay in the second cache.
 const SAMPLES: usize = 16_384;
 /// Columns of so many do not stay in any.
 const OUT_OF_CACHE: usize = 2_097_152;
+const COUNTS: [usize; 3] = [512, SAMPLES, OUT_OF_CACHE];
 /// The gain settles in hundreds of steps.
 const UNSETTLED: usize = 64;
 
@@ -29,30 +29,7 @@ fn main() {
 }
 
 fn filter() -> Filter {
-    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
-    let noise = NoiseModel::Sensors(SensorNoise {
-        screw_rms_m: 3e-6,
-        screw_resolution_m: 2.3e-6,
-        motor_rms_m: 1e-6,
-        motor_resolution_m: 3e-7,
-        unknown_force_n: 200.0,
-        bandwidth_hz: 10.0,
-    });
-    Filter::new(&actuator, 0.004, &noise).unwrap()
-}
-
-/// A load that swings and a gap of 100 µm that follows its side.
-fn channels(count: usize) -> (Vec<f64>, Vec<f64>) {
-    let load_n: Vec<f64> = (0..count).map(|k| 5e3 * (k as f64 * 0.004).sin()).collect();
-    let dx_m = load_n.iter().map(|u| u / 5e7 + 50e-6 * u.signum()).collect();
-    (dx_m, load_n)
-}
-
-fn track(bencher: Bencher, count: usize) {
-    let ((dx_m, load_n), filter, whole) = (channels(count), filter(), 0..count);
-    let segments = std::slice::from_ref(&whole);
-    let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
-    bencher.counter(ItemsCount::new(count)).bench_local(|| filter.track(black_box(&samples), None).unwrap());
+    made_flight::filter().unwrap()
 }
 
 #[divan::bench]
@@ -61,97 +38,46 @@ fn schedule(bencher: Bencher) {
     bencher.bench_local(|| GainSchedule::new(black_box(&filter)));
 }
 
-#[divan::bench]
-fn batch(bencher: Bencher) {
-    track(bencher, SAMPLES);
-}
-
-fn in_a_room(bencher: Bencher, count: usize) {
-    let ((dx_m, load_n), schedule, whole) = (channels(count), GainSchedule::new(&filter()), 0..count);
+/// Calls `run` with as many samples.
+fn over<T>(bencher: Bencher, count: usize, mut run: impl FnMut(&Samples<'_>) -> T) {
+    let ([motor_m, dx_m, load_n], whole) = (channels(count), 0..count);
     let segments = std::slice::from_ref(&whole);
-    let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let mut room = FilterWorkspace::default();
-    bencher
-        .counter(ItemsCount::new(count))
-        .bench_local(|| schedule.filter_with(black_box(&samples), None, &mut room).unwrap());
+    let samples = Samples { step_s: STEP_S, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
+    bencher.counter(ItemsCount::new(count)).bench_local(|| run(black_box(&samples)));
 }
 
-#[divan::bench]
-fn batch_in_a_room(bencher: Bencher) {
-    in_a_room(bencher, SAMPLES);
+/// The settled gain is to be found. Of the fewest samples an eighth comes before the gain has settled.
+#[divan::bench(args = COUNTS, sample_count = 30)]
+fn batch(bencher: Bencher, count: usize) {
+    let filter = filter();
+    over(bencher, count, |samples| filter.track(samples, None).unwrap());
 }
 
-#[divan::bench(sample_count = 30)]
-fn batch_in_a_room_out_of_cache(bencher: Bencher) {
-    in_a_room(bencher, OUT_OF_CACHE);
+#[divan::bench(args = COUNTS, sample_count = 30)]
+fn batch_in_a_room(bencher: Bencher, count: usize) {
+    let (schedule, mut room) = (GainSchedule::new(&filter()), Vec::new());
+    over(bencher, count, |samples| schedule.filter_with(samples, None, &mut room).unwrap());
 }
 
-/// An eighth of the samples come before the gain has settled; the settled gain is found already.
-#[divan::bench]
-fn batch_in_a_room_short(bencher: Bencher) {
-    in_a_room(bencher, 512);
+#[divan::bench(args = COUNTS, sample_count = 30)]
+fn published_estimate(bencher: Bencher, count: usize) {
+    let (schedule, mut room) = (GainSchedule::new(&filter()), Vec::new());
+    over(bencher, count, |samples| midrange::estimate_with(samples, &schedule, &mut room).unwrap());
 }
 
-/// As few, and the settled gain to be found.
-#[divan::bench]
-fn batch_short(bencher: Bencher) {
-    track(bencher, 512);
+#[divan::bench(args = COUNTS, sample_count = 30)]
+fn load_band(bencher: Bencher, count: usize) {
+    over(bencher, count, |samples| gap::load_band(samples.load_n, samples.segments));
 }
 
-fn published(bencher: Bencher, count: usize) {
-    let ((dx_m, load_n), schedule, whole) = (channels(count), GainSchedule::new(&filter()), 0..count);
-    let segments = std::slice::from_ref(&whole);
-    let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let mut room = FilterWorkspace::default();
-    bencher
-        .counter(ItemsCount::new(count))
-        .bench_local(|| midrange::estimate_with(black_box(&samples), &schedule, &mut room).unwrap());
-}
-
-#[divan::bench]
-fn published_estimate(bencher: Bencher) {
-    published(bencher, SAMPLES);
-}
-
-#[divan::bench(sample_count = 30)]
-fn published_estimate_out_of_cache(bencher: Bencher) {
-    published(bencher, OUT_OF_CACHE);
-}
-
-#[divan::bench(sample_count = 30)]
-fn load_band_out_of_cache(bencher: Bencher) {
-    let ((_, load_n), whole) = (channels(OUT_OF_CACHE), 0..OUT_OF_CACHE);
-    bencher
-        .counter(ItemsCount::new(OUT_OF_CACHE))
-        .bench_local(|| gap::load_band(black_box(&load_n), std::slice::from_ref(&whole)));
-}
-
-/// A screw of K = 5·10⁷ N/m with a gap of 100 µm, 200 N of friction while it moves, and the load of [`channels`].
 #[divan::bench(sample_count = 10)]
 fn contact_regression(bencher: Bencher) {
-    let ((_, load_n), whole) = (channels(OUT_OF_CACHE), 0..OUT_OF_CACHE);
-    let time_s = |k: usize| k as f64 * 0.004;
-    let motor_m: Vec<f64> = (0..OUT_OF_CACHE).map(|k| 0.02 * (0.7 * time_s(k)).sin()).collect();
-    let dx_m: Vec<f64> = (0..OUT_OF_CACHE)
-        .map(|k| load_n[k] - 200.0 * (0.7 * time_s(k)).cos().signum())
-        .map(|force_n| force_n / 5e7 + 50e-6 * force_n.signum())
-        .collect();
-    let segments = std::slice::from_ref(&whole);
-    let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let prior = PartPrior::of_stiffness(5e7);
-    let mut room = contact::ContactWorkspace::default();
-    bencher
-        .counter(ItemsCount::new(OUT_OF_CACHE))
-        .bench_local(|| contact::estimate_with(black_box(&samples), &prior, &mut room).unwrap());
-}
-
-#[divan::bench(sample_count = 30)]
-fn batch_out_of_cache(bencher: Bencher) {
-    track(bencher, OUT_OF_CACHE);
+    let (prior, mut room) = (PartPrior::of_stiffness(5e7), contact::ContactWorkspace::default());
+    over(bencher, OUT_OF_CACHE, |samples| contact::estimate_with(samples, &prior, &mut room).unwrap());
 }
 
 fn stream(bencher: Bencher, start: fn(&Filter) -> Stream, restart_each: usize) {
-    let ((dx_m, load_n), fresh) = (channels(SAMPLES), start(&filter()));
+    let ([_, dx_m, load_n], fresh) = (channels(SAMPLES), start(&filter()));
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
         let mut stream = fresh;
         let mut sum_m = 0.0;
@@ -165,14 +91,9 @@ fn stream(bencher: Bencher, start: fn(&Filter) -> Stream, restart_each: usize) {
     });
 }
 
-#[divan::bench]
-fn stream_even(bencher: Bencher) {
-    stream(bencher, Stream::constant_time, SAMPLES);
-}
-
-#[divan::bench]
-fn stream_even_unsettled(bencher: Bencher) {
-    stream(bencher, Stream::constant_time, UNSETTLED);
+#[divan::bench(args = [SAMPLES, UNSETTLED])]
+fn stream_even(bencher: Bencher, restart_each: usize) {
+    stream(bencher, Stream::constant_time, restart_each);
 }
 
 #[divan::bench]
@@ -182,13 +103,13 @@ fn stream_as_batch(bencher: Bencher) {
 
 #[divan::bench]
 fn gap_of_the_batch(bencher: Bencher) {
-    let (s_m, _) = channels(SAMPLES);
+    let [_, s_m, _] = channels(SAMPLES);
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| gap::mid_range(black_box(&s_m)).unwrap());
 }
 
 #[divan::bench]
 fn gap_running(bencher: Bencher) {
-    let (s_m, _) = channels(SAMPLES);
+    let [_, s_m, _] = channels(SAMPLES);
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
         let mut gap = StreamingGap::<256>::new(2e-6).unwrap();
         black_box(&s_m).iter().for_each(|s| gap.push(*s));
@@ -199,7 +120,7 @@ fn gap_running(bencher: Bencher) {
 /// A product and two sums, each waiting for the one before: no recursion of this kind is shorter.
 #[divan::bench]
 fn floor_of_latency(bencher: Bencher) {
-    let (dx_m, load_n) = channels(SAMPLES);
+    let [_, dx_m, load_n] = channels(SAMPLES);
     bencher
         .counter(ItemsCount::new(SAMPLES))
         .bench_local(|| dx_m.iter().zip(&load_n).fold(black_box(0.5), |x: f64, (y, u)| (x * 0.5 + y) + u));
@@ -208,7 +129,7 @@ fn floor_of_latency(bencher: Bencher) {
 /// A sum in the order of the samples: each addition waits for the one before.
 #[divan::bench]
 fn floor_of_a_sum(bencher: Bencher) {
-    let (dx_m, _) = channels(SAMPLES);
+    let [_, dx_m, _] = channels(SAMPLES);
     bencher
         .counter(ItemsCount::new(SAMPLES))
         .bench_local(|| black_box(&dx_m).iter().fold(black_box(0.0), |sum: f64, y| sum + y));
@@ -217,7 +138,7 @@ fn floor_of_a_sum(bencher: Bencher) {
 /// Two columns read and one written, from memory.
 #[divan::bench(sample_count = 30)]
 fn floor_of_memory(bencher: Bencher) {
-    let (dx_m, load_n) = channels(OUT_OF_CACHE);
+    let [_, dx_m, load_n] = channels(OUT_OF_CACHE);
     let mut s_m = vec![0.0; OUT_OF_CACHE];
     bencher.counter(ItemsCount::new(OUT_OF_CACHE)).bench_local(|| {
         for ((s, y), u) in black_box(&mut s_m).iter_mut().zip(&dx_m).zip(&load_n) {

@@ -15,4 +15,5 @@ mod markdown;
 mod report_contents;
 mod runs;
 mod states;
+mod stroke;
 mod wrong_inputs;

@@ -16,60 +16,28 @@ use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrang
 /// Stiffness of the part, N/m.
 const STIFFNESS_N_PER_M: f64 = 5e7;
 
-/// Channels of a flight.
-struct Channels {
-    step_s: f64,
-    motor_m: Vec<f64>,
-    dx_m: Vec<f64>,
-    load_n: Vec<f64>,
-}
-
-impl Channels {
-    fn read(text: &str) -> Result<Self, Box<dyn Error>> {
-        let mut time_s = Vec::new();
-        let (mut motor_m, mut dx_m, mut load_n) = (Vec::new(), Vec::new(), Vec::new());
-        for (number, line) in text.lines().enumerate().skip(1) {
-            let cell = |cell: &str| if cell.trim().is_empty() { Ok(f64::NAN) } else { cell.trim().parse() };
-            let row: Vec<f64> = line
-                .split(',')
-                .map(cell)
-                .collect::<Result<_, _>>()
-                .map_err(|error| format!("line {}: {error}", number + 1))?;
-            let [time, motor, screw, load] = row[..] else {
-                return Err(format!("line {}: {} cells; four are needed", number + 1, row.len()).into());
-            };
-            time_s.push(time);
-            motor_m.push(motor);
-            dx_m.push(screw - motor);
-            load_n.push(load);
-        }
-        let (Some(first), Some(last)) = (time_s.first(), time_s.last()) else {
-            return Err("the file has no rows".into());
+/// ΔS of the paper, m, and the contact regression of a flight.
+fn gaps(text: &str) -> Result<(f64, ContactOutcome), Box<dyn Error>> {
+    let [mut time_s, mut motor_m, mut dx_m, mut load_n] = [const { Vec::<f64>::new() }; 4];
+    for (number, line) in text.lines().enumerate().skip(1) {
+        let cell = |cell: &str| if cell.trim().is_empty() { Ok(f64::NAN) } else { cell.trim().parse() };
+        let row: Result<Vec<f64>, _> = line.split(',').map(cell).collect();
+        let [time, motor, screw, load] = row.map_err(|error| format!("line {}: {error}", number + 1))?[..]
+        else {
+            return Err(format!("line {}: four cells are needed", number + 1).into());
         };
-        let step_s = (last - first) / (time_s.len() - 1).max(1) as f64;
-        Ok(Self { step_s, motor_m, dx_m, load_n })
+        time_s.push(time);
+        motor_m.push(motor);
+        dx_m.push(screw - motor);
+        load_n.push(load);
     }
-}
-
-/// Gaps of a flight, m.
-struct Gaps {
-    /// ΔS of the paper.
-    published_m: f64,
-    /// Gap of the contact regression and its standard error, where the flight allows one.
-    contact_m: Option<(f64, f64)>,
-}
-
-fn gaps(text: &str) -> Result<Gaps, Box<dyn Error>> {
-    let channels = Channels::read(text)?;
-    let whole = 0..channels.dx_m.len();
-    let segments = std::slice::from_ref(&whole);
-    let samples = Samples {
-        step_s: channels.step_s,
-        motor_m: &channels.motor_m,
-        dx_m: &channels.dx_m,
-        load_n: &channels.load_n,
-        segments,
+    let (Some(first), Some(last)) = (time_s.first(), time_s.last()) else {
+        return Err("the file has no rows".into());
     };
+    let step_s = (last - first) / (time_s.len() - 1).max(1) as f64;
+    let whole = 0..dx_m.len();
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let actuator = ActuatorModel::linear(STIFFNESS_N_PER_M, 2000.0, 8.0)?;
     let noise = NoiseModel::Sensors(SensorNoise {
         screw_rms_m: 3e-6,
@@ -79,21 +47,19 @@ fn gaps(text: &str) -> Result<Gaps, Box<dyn Error>> {
         unknown_force_n: 200.0,
         bandwidth_hz: 10.0,
     });
-    let published = midrange::estimate(&samples, &Filter::new(&actuator, channels.step_s, &noise)?)?;
-    let contact_m = match contact::estimate(&samples, &PartPrior::of_stiffness(STIFFNESS_N_PER_M))? {
-        ContactOutcome::Estimated(found) => Some((found.gap_m, found.gap_se_m)),
-        ContactOutcome::Refused(_) => None,
-    };
-    Ok(Gaps { published_m: published.gap.gap_m, contact_m })
+    let published = midrange::estimate(&samples, &Filter::new(&actuator, step_s, &noise)?)?;
+    Ok((published.gap.gap_m, contact::estimate(&samples, &PartPrior::of_stiffness(STIFFNESS_N_PER_M))?))
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = std::env::args().nth(1).ok_or("name a CSV file")?;
-    let Gaps { published_m, contact_m } = gaps(&std::fs::read_to_string(file)?)?;
+    let (published_m, contact) = gaps(&std::fs::read_to_string(file)?)?;
     println!("mid-range of the paper: {:.1} µm", 1e6 * published_m);
-    match contact_m {
-        Some((gap_m, se_m)) => println!("contact regression: {:.1} ± {:.1} µm", 1e6 * gap_m, 1e6 * se_m),
-        None => println!("contact regression: the flight does not allow an estimate"),
+    match contact {
+        Ok(gap) => {
+            println!("contact regression: {:.1} ± {:.1} µm", 1e6 * gap.gap_m, 1e6 * gap.gap_se_m);
+        }
+        Err(why) => println!("contact regression: {}; {}", why.code(), why.remedy()),
     }
     Ok(())
 }
@@ -117,10 +83,10 @@ mod tests {
             let cells = [flight.time_s[k], flight.motor_m[k], flight.screw_m[k], flight.load_n[k]];
             writeln!(text, "{}", cells.map(|cell| format!("{cell:e}")).join(",")).unwrap();
         }
-        let Gaps { published_m, contact_m } = gaps(&text).unwrap();
-        let (gap_m, se_m) = contact_m.unwrap();
+        let (published_m, outcome) = gaps(&text).unwrap();
+        let gap = outcome.unwrap();
         assert!((published_m - 100e-6).abs() < 4e-6, "{published_m}");
-        assert!((gap_m - 100e-6).abs() < 4.0 * se_m && se_m < 2e-6, "{gap_m} ± {se_m}");
+        assert!((gap.gap_m - 100e-6).abs() < 4.0 * gap.gap_se_m && gap.gap_se_m < 2e-6, "{gap:?}");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
-use estimator::{Filter, FilterWorkspace, GainSchedule, MidRangeEstimate, Samples, midrange};
+use estimator::contact::{self, ContactEstimate, ContactPlot, GapAtPlace, PartPrior, Rejection};
+use estimator::{Filter, GainSchedule, MidRangeEstimate, Samples, midrange};
 use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
 
@@ -86,11 +86,8 @@ pub fn contact_regression(
     if let Some(reason) = pre_check_rejection(channels) {
         return Ok(Err(reason));
     }
-    match contact::estimate(&samples(channels), &prior(channels, part)) {
-        Ok(ContactOutcome::Estimated(found)) => Ok(Ok(found)),
-        Ok(ContactOutcome::Refused(why)) => Ok(Err(why.code())),
-        Err(e) => Err(Diagnostic::new("estimate_failed", e)),
-    }
+    let outcome = contact::estimate(&samples(channels), &prior(channels, part));
+    Ok(outcome.map_err(|e| Diagnostic::new("estimate_failed", e))?.map_err(Rejection::code))
 }
 
 /// Flights of more samples get workspaces of their own, so that no thread keeps large ones.
@@ -99,7 +96,7 @@ const MAX_KEPT_SAMPLES: usize = 2 << 20;
 /// Reusable workspaces of one thread.
 #[derive(Debug, Default)]
 struct Workspaces {
-    published: FilterWorkspace,
+    published: Vec<f64>,
     contact: contact::ContactWorkspace,
 }
 
@@ -197,10 +194,8 @@ fn contact_estimate(
     prior: &PartPrior,
     workspace: &mut contact::ContactWorkspace,
 ) -> Result<GapEstimate, estimator::Error> {
-    Ok(match contact::estimate_with(&samples(channels), prior, workspace)? {
-        ContactOutcome::Estimated(found) => from_contact(&found),
-        ContactOutcome::Refused(why) => GapEstimate::refused(why.code()),
-    })
+    let outcome = contact::estimate_with(&samples(channels), prior, workspace)?;
+    Ok(outcome.map_or_else(|why| GapEstimate::refused(why.code()), |found| from_contact(&found)))
 }
 
 /// The gap by the published statistic, for a flight whose channels show one.
@@ -243,6 +238,8 @@ fn with_published(mut estimate: GapEstimate, published: Option<&MidRangeEstimate
 
 fn from_contact(found: &ContactEstimate) -> GapEstimate {
     let (p05_m, p95_m) = found.gap_bounds_m;
+    let largest = found.largest_gap();
+    let profile = |of: fn(&GapAtPlace) -> f64| found.gap_profile.iter().map(of).collect();
     GapEstimate {
         status: Status::Estimated,
         flags: found.flags.iter().map(|flag| flag.code().to_owned()).collect(),
@@ -268,9 +265,12 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         friction_dry_se_n: Some(found.friction_se.dry_n),
         friction_load_share: Some(found.friction.lost_share),
         friction_load_share_se: Some(found.friction_se.lost_share),
-        gap_largest_m: found.gap_largest_m.map(|largest| largest.0),
-        gap_largest_se_m: found.gap_largest_m.map(|largest| largest.1),
-        gap_largest_at_m: found.gap_largest_m.map(|largest| largest.2),
+        gap_largest_m: largest.map(|place| place.gap_m),
+        gap_largest_se_m: largest.map(|place| place.gap_se_m),
+        gap_largest_at_m: largest.map(|place| place.at_m),
+        gap_profile_at_m: profile(|place| place.at_m),
+        gap_profile_m: profile(|place| place.gap_m),
+        gap_profile_se_m: profile(|place| place.gap_se_m),
         preload_n: found.preload_n.map(|preload| preload.0),
         preload_se_n: found.preload_n.map(|preload| preload.1),
         gap_midrange_fitted_m: found.midrange_at_fit_m,

@@ -143,6 +143,12 @@ stored_row! {
         pub preload_n: Option<f64>,
         /// Standard error of `preload_n`, N.
         pub preload_se_n: Option<f64>,
+        /// Places along the stroke, where the gap varies along it, as screw positions, m.
+        pub gap_profile_at_m: Vec<f64>,
+        /// Gap at each of `gap_profile_at_m`, m.
+        pub gap_profile_m: Vec<f64>,
+        /// Standard error of each of `gap_profile_m`, m.
+        pub gap_profile_se_m: Vec<f64>,
     }
 }
 

@@ -28,8 +28,8 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, AsArray, BooleanArray, Float64Array, Int64Array, ListArray, ListBuilder, RecordBatch,
-    StringArray, StringBuilder, StructArray, TimestampMicrosecondArray,
+    Array, ArrayRef, AsArray, BooleanArray, Float64Array, Float64Builder, Int64Array, ListArray, ListBuilder,
+    RecordBatch, StringArray, StringBuilder, StructArray, TimestampMicrosecondArray,
 };
 use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{
@@ -256,7 +256,7 @@ fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<TypedArray<'a>, 
     let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
     let typed = match column.data_type {
         DataType::Utf8 => array.as_string_opt().map(TypedArray::Text),
-        DataType::List(_) => array.as_list_opt().map(TypedArray::Texts),
+        DataType::List(_) => array.as_list_opt().map(TypedArray::List),
         DataType::Float64 => array.as_primitive_opt::<Float64Type>().map(TypedArray::Number),
         DataType::Int64 => array.as_primitive_opt::<Int64Type>().map(TypedArray::Count),
         DataType::Timestamp(..) => array.as_primitive_opt::<TimestampMicrosecondType>().map(TypedArray::Time),
@@ -267,7 +267,7 @@ fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<TypedArray<'a>, 
 
 enum TypedArray<'a> {
     Text(&'a StringArray),
-    Texts(&'a ListArray),
+    List(&'a ListArray),
     Number(&'a Float64Array),
     Count(&'a Int64Array),
     Time(&'a TimestampMicrosecondArray),
@@ -315,14 +315,24 @@ impl<'a> CellReader<'a> {
         parse(self.required(text)?).map_err(|problem| self.problem(problem.to_string()))
     }
 
-    fn texts(&mut self) -> Vec<String> {
+    /// The elements of a list; none of a cell that is empty.
+    fn list(&mut self) -> Option<ArrayRef> {
         match self.take() {
-            TypedArray::Texts(lists) if lists.is_valid(self.row) => {
-                let list = lists.value(self.row);
-                list.as_string_opt::<i32>().into_iter().flatten().flatten().map(str::to_owned).collect()
-            }
-            _ => Vec::new(),
+            TypedArray::List(lists) if lists.is_valid(self.row) => Some(lists.value(self.row)),
+            _ => None,
         }
+    }
+
+    fn texts(&mut self) -> Vec<String> {
+        let list = self.list();
+        let texts = list.as_ref().and_then(|list| list.as_string_opt::<i32>());
+        texts.into_iter().flatten().flatten().map(str::to_owned).collect()
+    }
+
+    fn numbers(&mut self) -> Vec<f64> {
+        let list = self.list();
+        let numbers = list.as_ref().and_then(|list| list.as_primitive_opt::<Float64Type>());
+        numbers.into_iter().flatten().flatten().collect()
     }
 
     fn number(&mut self) -> Option<f64> {
@@ -415,6 +425,7 @@ cell!(Option<String>, DataType::Utf8, nullable: true, |cells| cells
     .map(|c| c.as_deref())
     .collect::<StringArray>());
 cell!(Vec<String>, DataType::List(list_element()), nullable: false, |cells| texts(cells));
+cell!(Vec<f64>, DataType::List(number_element()), nullable: true, |cells| numbers(cells));
 cell!(f64, DataType::Float64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Float64Array>());
 cell!(Option<f64>, DataType::Float64, nullable: true, |cells| cells
     .iter()
@@ -429,6 +440,7 @@ cell!(Option<Timestamp>, time_type(), nullable: true, |cells| times(cells.iter()
 read_cell!(String, |cells| cells.parse(|text| Ok::<_, String>(text.to_owned())));
 read_cell!(Option<String>, |cells| Ok(cells.text().map(str::to_owned)));
 read_cell!(Vec<String>, |cells| Ok(cells.texts()));
+read_cell!(Vec<f64>, |cells| Ok(cells.numbers()));
 read_cell!(f64, |cells| {
     let number = cells.number();
     cells.required(number)
@@ -501,6 +513,19 @@ pub fn time_type() -> DataType {
 fn times(times: impl Iterator<Item = Option<Timestamp>>) -> TimestampMicrosecondArray {
     let micros = times.map(|time| time.map(Timestamp::as_microsecond));
     micros.collect::<TimestampMicrosecondArray>().with_timezone("UTC")
+}
+
+/// Lists of numbers; an empty one is a null.
+fn numbers(cells: &[&Vec<f64>]) -> ListArray {
+    let mut lists = ListBuilder::new(Float64Builder::new()).with_field(number_element());
+    for numbers in cells {
+        lists.append_option((!numbers.is_empty()).then(|| numbers.iter().map(|number| Some(*number))));
+    }
+    lists.finish()
+}
+
+fn number_element() -> Arc<Field> {
+    Arc::new(Field::new("element", DataType::Float64, true))
 }
 
 fn texts(cells: &[&Vec<String>]) -> ListArray {

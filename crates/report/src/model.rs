@@ -181,6 +181,10 @@ pub struct Installation {
     pub removed_utc: Option<Timestamp>,
 }
 
+/// The gap along the stroke: screw position, gap and standard error of each place, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GapProfile(pub Vec<[f64; 3]>);
+
 /// One flight of a unit; a report holds those of the whole fleet.
 #[derive(Debug, Clone)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
@@ -196,6 +200,8 @@ pub struct FlightRow {
     pub gap_midrange_m: Option<f64>,
     /// Largest gap along the stroke, where the gap varies.
     pub gap_largest_m: Option<f64>,
+    /// The gap by place there.
+    pub profile: Option<Box<GapProfile>>,
     pub load_reversals: Option<u64>,
     pub load_p05_n: Option<f64>,
     pub load_p95_n: Option<f64>,

@@ -11,7 +11,7 @@ use std::path::Path;
 use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
-use estimator::contact::{self, ContactOutcome, PartPrior};
+use estimator::contact::{self, PartPrior};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
@@ -98,10 +98,8 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
     let regression = |end: usize| {
         let segment = 0..end;
         let samples = samples(step_s, [&motor_m, &dx_m, &load_n], &segment);
-        match contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))? {
-            ContactOutcome::Estimated(found) => Ok::<f64, String>((found.gap_m / RADIUS_M).to_degrees()),
-            ContactOutcome::Refused(_) => Ok(f64::NAN),
-        }
+        let outcome = contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))?;
+        Ok::<f64, String>(outcome.map_or(f64::NAN, |found| (found.gap_m / RADIUS_M).to_degrees()))
     };
     Ok(GearBenchLog {
         authors_deg,

@@ -112,6 +112,7 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
         reference_load_n: None,
         limit_m: None,
         watch_m: None,
+        limit_applies_to: job::config::part::LimitedGap::Mean,
         filters: FilterCache::default(),
         axis: None,
         at_limit: job::config::part::AtLimit::default(),

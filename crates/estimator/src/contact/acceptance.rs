@@ -28,7 +28,7 @@ pub(crate) fn flags(
         (QualityFlag::GapNegative, is_negative),
         (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees && !is_preloaded),
         (QualityFlag::EstimatorsDisagree, !agrees && !is_preloaded),
-        (QualityFlag::GapVaries, found.gap_largest_m.is_some()),
+        (QualityFlag::GapVaries, !found.gap_profile.is_empty()),
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
         (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
         (QualityFlag::SoftContact, is_soft && !is_preloaded),

@@ -35,7 +35,7 @@ pub use fit::workspace::ContactWorkspace;
 pub use friction::flank::Flank;
 pub use friction::friction_model::Friction;
 pub use plot_data::{ContactPlot, Touch};
-pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, PartPrior};
+pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, GapAtPlace, PartPrior};
 
 use crate::error::Error;
 use crate::{Samples, model};
@@ -71,14 +71,11 @@ pub fn estimate_with(
     room: &mut ContactWorkspace,
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
-    Ok(match look(samples, prior, room) {
-        Ok((frame, contact)) => {
-            let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
-            let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
-            ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m)))
-        }
-        Err(refusal) => ContactOutcome::Refused(refusal),
-    })
+    Ok(look(samples, prior, room).map(|(frame, contact)| {
+        let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
+        let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
+        Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m))
+    }))
 }
 
 /// Why a flight does not allow an estimate, as far as the channels show it without a regression: for the published
@@ -193,7 +190,7 @@ fn report(
             lost_share: friction_error_n(&[(SHARE, 1.0)]) / frame.load_n,
             at_p95_n: friction_error_n(&[(DRY, 1.0), (SHARE, 1.0)]),
         },
-        gap_largest_m: contact.profile.map(|p| (p.largest_m.0, p.largest_m.1, p.largest_at_m)),
+        gap_profile: contact.profile.as_ref().map(|profile| profile.places.clone()).unwrap_or_default(),
         preload_n,
         loop_width_m: loop_width.map(|(m, _)| m),
         loop_width_se_m: loop_width.map(|(_, se_m)| se_m),

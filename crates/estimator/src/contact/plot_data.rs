@@ -5,9 +5,6 @@ use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::flank::Flank;
 
-/// Points of a flank's line.
-const POINTS: usize = 60;
-
 /// A stretch in contact on one flank, a tenth of a second or longer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
@@ -30,10 +27,10 @@ pub struct Touch {
 pub struct ContactPlot {
     /// In order of time on each side of the share of the load below which flanks may be soft.
     pub touches: Vec<Touch>,
-    /// The upper flank as fitted, from zero to the greatest force: N, m.
-    pub upper: Vec<(f64, f64)>,
-    /// The lower flank, from zero to the greatest force: N, m.
-    pub lower: Vec<(f64, f64)>,
+    /// Both ends of the upper flank as fitted, at no and at the greatest force: N, m.
+    pub upper: [(f64, f64); 2],
+    /// Both ends of the lower flank.
+    pub lower: [(f64, f64); 2],
 }
 
 impl ContactPlot {
@@ -45,7 +42,11 @@ impl ContactPlot {
             firm.chain(light).map(|(row, trust)| touch(frame, contact, row, trust)).collect();
         let flank = |flank: Flank| {
             let forces_n = touches.iter().filter(|t| t.flank == flank).map(|t| t.force_n.abs());
-            line(frame, contact, flank, forces_n.fold(0.0, f64::max))
+            let most_n = forces_n.fold(0.0, f64::max);
+            let at = |force_n: f64| {
+                (flank.sign() * force_n, contact.flank_m(flank.sign(), force_n / frame.load_n))
+            };
+            [at(0.0), at(most_n)]
         };
         let (upper, lower) = (flank(Flank::Upper), flank(Flank::Lower));
         Self { touches, upper, lower }
@@ -61,14 +62,4 @@ fn touch(frame: &Scaling, contact: &FlankFit, row: &DesignRow<COLUMNS>, trust: O
         dx_m: row.y_m - contact.other_m(row),
         trust,
     }
-}
-
-/// δX of a flank over the force that presses it, straight or bent.
-fn line(frame: &Scaling, contact: &FlankFit, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
-    let side = flank.sign();
-    let at = |k: usize| most_n * k as f64 / (POINTS - 1) as f64;
-    (0..POINTS)
-        .map(at)
-        .map(|force_n| (side * force_n, contact.flank_m(side, force_n / frame.load_n)))
-        .collect()
 }

@@ -2,6 +2,9 @@
 
 use crate::gap::statistic::extremes;
 
+/// Size of a subsample that shows a range, a sign, or the usual step of a channel.
+pub(crate) const LOOKS: usize = 4000;
+
 /// Middle and half length of what values span; a negative length where there are none.
 pub(crate) fn middle_and_half(values: &[f64]) -> (f64, f64) {
     let (low, high) = extremes(values);

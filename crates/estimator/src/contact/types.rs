@@ -47,6 +47,17 @@ impl PartPrior {
     }
 }
 
+/// The gap at a place of the stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GapAtPlace {
+    /// Screw position, m.
+    pub at_m: f64,
+    /// Gap there, m: an average over an eighth of the stroke seen.
+    pub gap_m: f64,
+    /// Its standard error, m.
+    pub gap_se_m: f64,
+}
+
 /// Standard errors of a fitted friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionErrors {
@@ -88,8 +99,9 @@ pub struct ContactEstimate {
     pub friction: Friction,
     /// Its standard errors.
     pub friction_se: FrictionErrors,
-    /// Where the gap varies along the stroke: the largest gap, its standard error, and the screw position where it is, m.
-    pub gap_largest_m: Option<(f64, f64, f64)>,
+    /// The gap by place, from one end of the stroke seen to the other, where it varies along the stroke; empty where it
+    /// does not.
+    pub gap_profile: Vec<GapAtPlace>,
     /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N.
     pub preload_n: Option<(f64, f64)>,
     /// Width of the loop of δX against the load at zero load, m: gap and friction wind-up together, measured rather than
@@ -112,16 +124,15 @@ pub struct ContactEstimate {
     pub flags: Vec<QualityFlag>,
 }
 
-/// The result of a flight.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ContactOutcome {
-    /// Its gap, and what was estimated with it.
-    Estimated(Box<ContactEstimate>),
-    /// Why the flight does not allow an estimate.
-    Refused(Rejection),
-}
+/// The result of a flight: its gap, or why the flight does not allow an estimate.
+pub type ContactOutcome = Result<Box<ContactEstimate>, Rejection>;
 
 impl ContactEstimate {
+    /// The largest gap along the stroke, where the gap varies.
+    pub fn largest_gap(&self) -> Option<&GapAtPlace> {
+        self.gap_profile.iter().max_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+    }
+
     /// Friction at the 95 % load, N.
     pub fn friction_n(&self) -> f64 {
         self.friction.at_n(self.load_p95_n)

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::gap::load_band::{self, LoadBand};
 use crate::gap::statistic::{self, GapStatistic};
-use crate::kalman::batch::{FilterWorkspace, GainSchedule};
+use crate::kalman::batch::GainSchedule;
 use crate::kalman::filter::Filter;
 use crate::kalman::nis::Nis;
 use crate::samples::Samples;
@@ -54,21 +54,21 @@ pub struct MidRangeEstimate {
 /// # Errors
 /// When the channels do not fit, nothing was measured, or S does not move.
 pub fn estimate(samples: &Samples<'_>, filter: &Filter) -> Result<MidRangeEstimate, Error> {
-    estimate_with(samples, &GainSchedule::new(filter), &mut FilterWorkspace::default())
+    estimate_with(samples, &GainSchedule::new(filter), &mut Vec::new())
 }
 
-/// As [`estimate`] (24–31), with a gain schedule and a workspace that many series share.
+/// As [`estimate`] (24–31), with a gain schedule, and memory for S, that many series share.
 ///
 /// # Errors
 /// As [`estimate`].
 pub fn estimate_with(
     samples: &Samples<'_>,
     schedule: &GainSchedule,
-    workspace: &mut FilterWorkspace,
+    s_m: &mut Vec<f64>,
 ) -> Result<MidRangeEstimate, Error> {
     let load = load_band::load_band(samples.load_n, samples.segments);
-    let nis = schedule.filter_with(samples, None, workspace)?;
-    let gap = statistic::mid_range(workspace.s_m())?;
+    let nis = schedule.filter_with(samples, None, s_m)?;
+    let gap = statistic::mid_range(s_m)?;
     let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRangeEstimate { gap, load, nis, samples: gap.upper + gap.lower })
 }

@@ -24,19 +24,6 @@ pub struct InnovationBuffers {
     pub variance_m2: Vec<f64>,
 }
 
-/// Memory for S(t), reused for the next series.
-#[derive(Debug, Default)]
-pub struct FilterWorkspace {
-    s_m: Vec<f64>,
-}
-
-impl FilterWorkspace {
-    /// S of the last series at each sample, m; NaN outside its segments.
-    pub fn s_m(&self) -> &[f64] {
-        &self.s_m
-    }
-}
-
 /// Settled gain and bandwidth of one filter: they depend on no measurement, so one schedule serves every series of these
 /// parameters, this step and this noise.
 #[derive(Debug, Clone)]
@@ -77,12 +64,12 @@ impl GainSchedule {
         samples: &Samples<'_>,
         innovations: Option<&mut InnovationBuffers>,
     ) -> Result<FilterOutput, Error> {
-        let mut workspace = FilterWorkspace::default();
-        let nis = self.filter_with(samples, innovations, &mut workspace)?;
-        Ok(FilterOutput { s_m: workspace.s_m, nis })
+        let mut s_m = Vec::new();
+        let nis = self.filter_with(samples, innovations, &mut s_m)?;
+        Ok(FilterOutput { s_m, nis })
     }
 
-    /// As [`GainSchedule::track`], with S in the workspace.
+    /// As [`GainSchedule::track`], with S, m, at each sample in memory that many series share.
     ///
     /// # Errors
     /// As [`GainSchedule::track`].
@@ -90,12 +77,12 @@ impl GainSchedule {
         &self,
         samples: &Samples<'_>,
         mut innovations: Option<&mut InnovationBuffers>,
-        workspace: &mut FilterWorkspace,
+        s_m: &mut Vec<f64>,
     ) -> Result<Nis, Error> {
         samples.check()?;
         let count = samples.dx_m.len();
-        workspace.s_m.clear();
-        workspace.s_m.resize(count, f64::NAN);
+        s_m.clear();
+        s_m.resize(count, f64::NAN);
         if let Some(out) = innovations.as_deref_mut() {
             out.innovation_m = vec![f64::NAN; count];
             out.variance_m2 = vec![f64::NAN; count];
@@ -109,7 +96,7 @@ impl GainSchedule {
             stream.start(y_m[first], held_n);
             let mut at = segment.start;
             stream.push_all(y_m.iter().zip(load_n), |step| {
-                workspace.s_m[at] = step.s_m();
+                s_m[at] = step.s_m();
                 nis.add_sample(step.innovation_m, step.innovation_variance_m2);
                 if let Some(out) = innovations.as_deref_mut() {
                     out.innovation_m[at] = step.innovation_m;

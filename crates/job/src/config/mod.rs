@@ -11,7 +11,7 @@ mod toml_errors;
 mod unknown_keys;
 mod validate_channels;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,7 +29,7 @@ use overrides::Overrides;
 pub use quantity_limits::QuantityLimits;
 
 use crate::METHOD_VERSION;
-use crate::config::part::Part;
+use crate::config::part::{LimitedGap, Part};
 
 /// A checked configuration.
 #[derive(Debug, Clone)]
@@ -61,6 +61,12 @@ impl Config {
     pub fn limit_m(&self, part: Option<&PartNumber>) -> Option<f64> {
         let own = part.and_then(|part| self.parts.get(part)?.limit_m);
         own.or(self.document.trend.limit_m)
+    }
+
+    /// The parts whose limits apply to the largest gap along the stroke.
+    pub fn parts_by_largest_gap(&self) -> BTreeSet<String> {
+        let is_largest = |part: &Part| part.limit_applies_to == LimitedGap::Largest;
+        self.parts.iter().filter(|(_, part)| is_largest(part)).map(|(number, _)| number.to_string()).collect()
     }
 
     /// A configuration without logs: defaults, to assess tables that other programs made.

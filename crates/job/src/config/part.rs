@@ -45,6 +45,17 @@ pub enum AtLimit {
     Inspect,
 }
 
+/// Which gap the limits of a part apply to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitedGap {
+    /// `gap_m`: the mean over the time of the flight (the default).
+    #[default]
+    Mean,
+    /// `gap_largest_m` of flights whose gap varies along the stroke, and `gap_m` of the others.
+    Largest,
+}
+
 /// `[part."EMA-27-1040"]`: what is known of a design.
 #[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -82,6 +93,8 @@ pub struct PartSettings {
     pub limit_m: Option<f64>,
     /// Alert level, m: state `watch` at or above.
     pub watch_m: Option<f64>,
+    /// The gap that limits, trend and forecast apply to: `mean` over the stroke (default), or `largest` along it.
+    pub limit_applies_to: Option<LimitedGap>,
     /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
     pub axis: Option<WearAxis>,
     /// Action in state `act`: `replace` (default) or `inspect`.
@@ -167,6 +180,8 @@ pub struct Part {
     pub limit_m: Option<f64>,
     /// Alert level, m.
     pub watch_m: Option<f64>,
+    /// The gap that its limits apply to.
+    pub limit_applies_to: LimitedGap,
     /// Gain schedules of its logs, as far as they have been found.
     pub filters: FilterCache,
     /// What wear follows, where that is known.
@@ -187,6 +202,7 @@ impl PartSettings {
             placeholder: false,
             limit_m: None,
             watch_m: None,
+            limit_applies_to: None,
             axis: None,
             at_limit: None,
             quantity_limits: None,
@@ -223,6 +239,7 @@ impl PartSettings {
                 reference_load_n: self.reference_load_n,
                 limit_m: self.limit_m,
                 watch_m: self.watch_m,
+                limit_applies_to: self.limit_applies_to.unwrap_or_default(),
                 filters: FilterCache::default(),
                 axis: self.axis,
                 at_limit: self.at_limit.unwrap_or_default(),

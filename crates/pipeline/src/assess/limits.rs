@@ -2,7 +2,7 @@
 
 use job::Config;
 use job::config::QuantityLimits;
-use job::config::part::{AtLimit, WearAxis};
+use job::config::part::{AtLimit, LimitedGap, WearAxis};
 use records::{Action, PartNumber};
 use trend::{Series, UsageAxis};
 
@@ -60,6 +60,13 @@ impl<'a> Limits<'a> {
     /// The act limit, m, or its stand-in.
     pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
         self.settings(part).limit_m
+    }
+
+    /// The gap that the limit of a part applies to: `largest` along the stroke, or its `mean`; none without a limit.
+    pub(crate) fn applies_to(self, part: Option<&str>) -> Option<&'static str> {
+        self.stated_m(part)?;
+        let applies_to = self.part(part).map(|part| part.limit_applies_to).unwrap_or_default();
+        Some(if applies_to == LimitedGap::Largest { "largest" } else { "mean" })
     }
 
     /// What a unit of a part whose gap is at its limit asks for: a replacement where the part says nothing.

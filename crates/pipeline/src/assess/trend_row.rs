@@ -80,6 +80,7 @@ pub(crate) fn row(
         trend_p_value: None,
         change_points: trend.changes.iter().filter_map(|c| change_point(c, history, wide)).collect(),
         limit_m,
+        limit_applies_to: None,
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
         crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
         crossing_hours_p95: crossing.and_then(|c| c.p95_hours),

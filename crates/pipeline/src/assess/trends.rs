@@ -115,7 +115,7 @@ pub fn assess_store_with_quantities(
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
-    let mut histories = load_histories(store)?;
+    let mut histories = load_histories(&store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
@@ -162,7 +162,7 @@ pub fn assess_run(
     units: &BTreeSet<UnitKey>,
     run: RunFacts<'_>,
 ) -> Result<RunAssessments, Error> {
-    let mut histories = load_histories(store)?;
+    let mut histories = load_histories(&store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
     let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
@@ -580,7 +580,9 @@ impl<'a> FleetContext<'a> {
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
         let inspection = installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of));
         let row = trend_row::inspected(row, inspection, history.until(as_of));
-        row.with_action(self.limits.at_limit(name.0.as_deref()))
+        let part = name.0.as_deref();
+        let row = TrendRow { limit_applies_to: self.limits.applies_to(part), ..row };
+        row.with_action(self.limits.at_limit(part))
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

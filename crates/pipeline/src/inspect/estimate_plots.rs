@@ -23,7 +23,7 @@ pub fn of_log(
 
 fn plot(log: &str, data: EstimatePlot) -> report::EstimatePlot {
     let (upper, lower, touches) = match data.picture {
-        Some(picture) => (picture.upper, picture.lower, picture.touches),
+        Some(picture) => (picture.upper.to_vec(), picture.lower.to_vec(), picture.touches),
         None => Default::default(),
     };
     let mut plot = report::EstimatePlot {

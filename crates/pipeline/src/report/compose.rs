@@ -43,7 +43,8 @@ pub fn compose(
 ) -> Result<Report, Error> {
     let mut checks = inspections::read(config)?;
     let mut logs = Logs::of(store)?;
-    let StoreContents { histories, mut extras, store_version } = StoreContents::until(ask.as_of_utc, store)?;
+    let StoreContents { histories, mut extras, store_version } =
+        StoreContents::until(ask.as_of_utc, &store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { fleet, drawn, before, past, priors } =
@@ -373,6 +374,7 @@ fn flight(
         gap_p95_m,
         gap_midrange_m,
         gap_largest_m,
+        profile: extras.profile.clone(),
         load_reversals: history.extras(flown).load_reversals(),
         load_p05_n,
         load_p95_n,

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use arrow::array::{Array, AsArray, ListArray, RecordBatch};
+use arrow::datatypes::Float64Type;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
+use report::GapProfile;
 use store::{Query, Store};
 
 use crate::error::Error;
@@ -18,6 +20,9 @@ use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
 /// Columns of numbers that a page shows and no assessment needs.
 const NUMBERS: [&str; 7] =
     ["unit_hours", "gap_p05_m", "gap_p95_m", "gap_midrange_m", "gap_largest_m", "load_p05_n", "load_p95_n"];
+
+/// Columns of the gap along the stroke.
+const PROFILE: [&str; 3] = ["gap_profile_at_m", "gap_profile_m", "gap_profile_se_m"];
 
 /// All flights of all units.
 pub(super) struct StoreContents {
@@ -35,6 +40,7 @@ pub(super) struct FlightExtras {
     /// Rejection code, or the most severe flag.
     pub(super) reason: Option<Box<str>>,
     pub(super) flags: Box<[Box<str>]>,
+    pub(super) profile: Option<Box<GapProfile>>,
     /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
     pub(super) quantities: [f32; Quantity::ALL.len()],
 }
@@ -51,7 +57,7 @@ impl StoreContents {
     pub(super) fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
         let until_utc = last.and_then(|last| last.checked_add(SignedDuration::from_micros(1)).ok());
         let mut columns = builder::stored_columns();
-        columns.extend(NUMBERS.into_iter().chain(["reason"]));
+        columns.extend(NUMBERS.into_iter().chain(["reason"]).chain(PROFILE));
         columns.extend(Quantity::ALL.map(Quantity::as_str));
         columns.sort_unstable();
         columns.dedup();
@@ -73,12 +79,24 @@ fn add(
     let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
     let reasons = TextColumn::of(chunk, &["reason"])?;
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
+    let profiles =
+        PROFILE.map(|name| batch.column_by_name(name).and_then(|column| column.as_list_opt::<i32>()));
     flights.add_to(rows, |row| FlightExtras {
         numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
         reason: reasons.get(row).map(Into::into),
         flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
+        profile: profile_of(&profiles, row),
         quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
     })
+}
+
+/// The gap along the stroke of a row, where it varies.
+fn profile_of(columns: &[Option<&ListArray>; 3], row: usize) -> Option<Box<GapProfile>> {
+    let lists = columns.map(|column| Some(column.filter(|column| column.is_valid(row))?.value(row)));
+    let [at_m, gap_m, gap_se_m] =
+        lists.each_ref().map(|list| list.as_ref()?.as_primitive_opt::<Float64Type>());
+    let gaps = at_m?.values().iter().zip(gap_m?.values()).zip(gap_se_m?.values());
+    Some(Box::new(GapProfile(gaps.map(|((at_m, m), se_m)| [*at_m, *m, *se_m]).collect())))
 }
 
 /// The flags of a row.

@@ -83,7 +83,8 @@ impl TrendRow {
             (Some(gap_m), None) => format!("{:.1} µm", 1e6 * gap_m),
             _ => "no gap".to_owned(),
         };
-        more.map_or_else(|| gap.clone(), |more| format!("{gap}, {more}"))
+        let largest = self.is_by_largest().then(|| "largest along the stroke".to_owned());
+        std::iter::once(gap).chain(largest).chain(more).collect::<Vec<_>>().join(", ")
     }
 
     fn over_since_text(&self) -> Option<String> {

@@ -148,6 +148,9 @@ row! {
         /// Date until when: `as_of_utc` to replace, or to inspect after a jump; `not_before_utc` to inspect; null where it
         /// is not known.
         pub due_utc: Option<Timestamp>,
+        /// Gap that `limit_m`, and every gap of this row, is about: `mean` over the stroke, or `largest` along it (the part's
+        /// `limit_applies_to`); null without a limit.
+        pub limit_applies_to: Option<&'static str>,
         /// Flight hours since the last flight, at the unit's own rate.
         #[serde(skip)]
         pub elapsed_hours: NoColumn<f64>,
@@ -161,6 +164,11 @@ row! {
 }
 
 impl TrendRow {
+    /// Whether the limit applies to the largest gap along the stroke.
+    pub fn is_by_largest(&self) -> bool {
+        self.limit_applies_to == Some("largest")
+    }
+
     /// Part number, if known, and serial number.
     pub fn unit(&self) -> (Option<String>, String) {
         (self.part_number.clone(), self.serial_number.clone())

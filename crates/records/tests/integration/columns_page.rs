@@ -58,6 +58,7 @@ fn type_name(column: &Column) -> String {
         DataType::Int64 => "i64",
         DataType::Timestamp(..) => "timestamp µs UTC",
         DataType::List(element) if element.data_type() == &DataType::Utf8 => "list of text",
+        DataType::List(element) if element.data_type() == &DataType::Float64 => "list of f64",
         DataType::List(_) => "list of struct",
         DataType::Boolean => "bool",
         other => panic!("{other} has no name on the page"),

@@ -1,9 +1,12 @@
-//! Small chart of a followed quantity that changed.
+//! Small charts: a followed quantity that changed, and the gap along the stroke.
 
 use jiff::Timestamp;
 use records::Quantity;
+use records::uncertainty::NORMAL_95;
 
-use crate::charts::frame::{DATA, Frame, INK, PLAN, day, thinned};
+use crate::charts::frame::{DATA, Frame, INK, LIMIT, PLAN, day, thinned};
+use crate::format::date;
+use crate::model::FlightRow;
 
 /// Most points; above it, each is the mean of neighbouring flights.
 const MAX_POINTS: usize = 90;
@@ -35,4 +38,32 @@ pub(crate) fn small_chart(
         frame.line([(from, level), (last[0], level)], INK);
     }
     frame.finish("")
+}
+
+/// The largest gap along the stroke of a flight whose gap varies, in words; and its picture: gap, µm, with its 90 % interval
+/// against the screw position, mm, the largest as a disc, and the limit, m, where it applies to the largest.
+pub(crate) fn stroke_profile(flight: &FlightRow, limit_m: Option<f64>) -> Option<(String, String)> {
+    let profile = flight.profile.as_ref()?;
+    let points: Vec<[f64; 4]> = profile
+        .0
+        .iter()
+        .map(|[at_m, m, se_m]| (1e3 * at_m, 1e6 * m, 1e6 * NORMAL_95 * se_m))
+        .map(|(at, gap, bound)| [at, gap - bound, gap, gap + bound])
+        .collect();
+    let (first, last) = (points.first()?, points.last()?);
+    let [at, low, gap, high] = points.iter().max_by(|a, b| a[2].total_cmp(&b[2]))?;
+    let largest = format!("{gap:.1} µm ({low:.1} to {high:.1}) at {at:.1} mm");
+    let limit = limit_m.map(|limit_m| 1e6 * limit_m);
+    let highest = points.iter().map(|p| p[3]).chain(limit).fold(0.0, f64::max);
+    let margin = 0.06 * (last[0] - first[0]);
+    let x = first[0] - 2.0 * margin..last[0] + margin;
+    let mut frame = Frame::new([420.0, 200.0], [14.0, 2.0, 24.0, 2.0], x, 0.0..1.1 * highest);
+    frame.grid(4);
+    frame.numbers(6, "mm");
+    let band: Vec<[f64; 3]> = points.iter().map(|[at, low, _, high]| [*at, *low, *high]).collect();
+    frame.clipped(|frame| frame.band(&band, DATA));
+    frame.line(points.iter().map(|[at, _, gap, _]| (*at, *gap)), INK);
+    limit.into_iter().for_each(|limit| frame.horizontal(limit, LIMIT));
+    frame.dot((*at, *gap), 3.5, DATA, &largest);
+    Some((format!("{}: largest {largest}", date(flight.departure_utc)), frame.finish("")))
 }

@@ -5,6 +5,7 @@ use jiff::Timestamp;
 use records::uncertainty::NORMAL_95;
 
 use crate::charts::history::{drawn_forecast, history, shows_crossing};
+use crate::charts::quantities::stroke_profile;
 use crate::format::{
     NO_DATA, count, counted, date, hours, level, micrometres, micrometres_cell, micrometres_or, minute, rate,
     unbroken, whole_dates,
@@ -30,6 +31,8 @@ struct View<'a> {
     /// Other units of the tail that need work.
     same_visit: Vec<&'a UnitView>,
     chart: String,
+    /// The latest flight whose gap varies along the stroke: its largest gap in words, and its picture.
+    profile: Option<(String, String)>,
     quantity_changes: Vec<Change>,
     charts: Vec<Chart>,
     levels: Vec<Level>,
@@ -63,6 +66,11 @@ pub fn unit_page(report: &Report, peers: &Peers<'_>, unit: &UnitView) -> Result<
         warnings: tail.map(|tail| report.warnings(Some(tail))).unwrap_or_default(),
         same_visit: if is_due { report.units.iter().filter(mate).collect() } else { Vec::new() },
         chart: history(unit, peers),
+        profile: unit
+            .flights
+            .iter()
+            .rev()
+            .find_map(|flight| stroke_profile(flight, row.limit_m.filter(|_| row.is_by_largest()))),
         quantity_changes: quantities::changes(report, "../", |change| {
             change.serial_number.as_ref() == Some(&row.serial_number) && change.part_number == row.part_number
         }),
@@ -91,8 +99,9 @@ fn facts(peers: &Peers<'_>, unit: &UnitView) -> Vec<(&'static str, String)> {
         _ => rate(middle),
     });
     let largest = unit.flights.iter().rev().find_map(|f| Some((f.departure_utc, f.gap_largest_m?)));
+    let largest = largest.filter(|_| !row.is_by_largest());
     let known = [
-        ("Gap", Some(unit.gap_text())),
+        (if row.is_by_largest() { "Gap, largest along the stroke" } else { "Gap" }, Some(unit.gap_text())),
         ("Limit [µm]", row.limit_m.map(micrometres)),
         ("Largest along the stroke", largest.map(|(at, m)| format!("{} µm, {}", micrometres(m), date(at)))),
         ("Wear [µm/1000 FH], 90 %", rates),

@@ -203,7 +203,8 @@ impl Contact {
     }
 
     /// The gap with the screw at a place of its stroke, metres.
-    pub(crate) fn gap_at_m(&self, screw_m: f64) -> f64 {
+    #[must_use]
+    pub fn gap_at_m(&self, screw_m: f64) -> f64 {
         if self.worn_m == 0.0 {
             return self.gap_m;
         }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::Samples;
 use crate::contact::codes::Rejection;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::stats::middle_and_half;
+use crate::contact::stats::{LOOKS, middle_and_half};
 use crate::contact::types::{PartPrior, SHORTEST_S};
 use crate::gap::load_band::{quantiles, reversals};
 
@@ -40,8 +40,6 @@ const PILE_RATIO: f64 = 2.0;
 /// Shortest time in that band of a clipped cell, s.
 const SHORTEST_PILE_S: f64 = 1.0;
 
-/// Size of the subsample of steps between neighbours.
-const LOOKS: usize = 4000;
 /// A sample is a spike beyond this many times the 90 % quantile of the steps.
 const SPIKE: f64 = 8.0;
 

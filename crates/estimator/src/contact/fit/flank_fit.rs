@@ -13,20 +13,19 @@ use crate::contact::fit::design_matrix::{
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
+use crate::contact::fit::robust_regression::REWEIGHTINGS;
 use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::stats::second_difference_rms;
+use crate::contact::stats::{LOOKS, second_difference_rms};
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
 use crate::samples::Samples;
 
-/// Size of the subsample of blocks from which the range of δX is found.
-const LOOKS: usize = 4000;
 /// Travel may exceed what is expected by this share. Over some 300 simulated flights that show their gap it
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
@@ -40,8 +39,6 @@ const EXCERPT_BLOCKS: usize = 6000;
 const LONGER: usize = 4;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
-/// Reweightings of the rows in each of them.
-const REWEIGHTINGS: usize = 3;
 /// Blocks up to which more iterations are cheap.
 const SHORT_BLOCKS: usize = 60_000;
 /// Share of the 95 % load beyond which flanks are stiff.
@@ -159,7 +156,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     }
     let (line_m, doubt, sigma) = gap_and_doubt(&line, spread_m, vibration_n, scaling, &workspace.whole);
     let profile = stroke_profile(&line, &workspace.whole, scaling);
-    let gap_m = profile.map_or((line_m, doubt.standard_error_m()), |profile| {
+    let gap_m = profile.as_ref().map_or((line_m, doubt.standard_error_m()), |profile| {
         // What one gap for the whole stroke leaves unexplained is explained now.
         let jackknife_m = JACKKNIFE * profile.mean_m.1;
         (profile.mean_m.0, Doubt { jackknife_m, candidates_m: 0.0, ..doubt }.standard_error_m())

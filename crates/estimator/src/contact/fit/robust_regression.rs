@@ -12,6 +12,8 @@ use crate::contact::stats::{MAD, median};
 const HUBER: f64 = 2.0;
 /// Beyond this many they lose all of it: a frozen channel is no noise.
 const WILD: f64 = 10.0;
+/// Rounds of reweighting of a fit of the whole flight.
+pub(crate) const REWEIGHTINGS: usize = 3;
 /// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
 const LEAST_SPREAD_M: f64 = 1e-12;
 

@@ -6,11 +6,10 @@ use crate::contact::fit::design_matrix::DesignRow;
 use crate::contact::fit::flank_fit::UNSEEN_GAP;
 use crate::contact::fit::robust_regression::{GaussianPrior, fit};
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
+use crate::contact::stats::LOOKS;
 
-/// Every fourth block is used, and at most a fixed number on long flights: a sign needs no more.
+/// Every fourth block is used, and at most [`LOOKS`] on long flights.
 const STRIDE: usize = 4;
-/// See [`STRIDE`].
-const LOOKS: usize = 4000;
 /// Slower than this the screw may stick, m/s.
 const SLIP_M_PER_S: f64 = 1e-3;
 /// The wind-up may be no less than this share of the part's against its sign before it counts as flipped.

@@ -6,8 +6,9 @@
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, priors};
-use crate::contact::fit::robust_regression::{GaussianPrior, fit};
+use crate::contact::fit::robust_regression::{GaussianPrior, REWEIGHTINGS, fit};
 use crate::contact::fit::scaling::Scaling;
+use crate::contact::types::GapAtPlace;
 
 /// Knots, evenly from one end of the stroke seen to the other.
 const KNOTS: usize = 9;
@@ -24,18 +25,14 @@ const CERTAIN: f64 = 4.0;
 const LEAST_SHARE: f64 = 0.1;
 /// Least share of the time near a knot that counts.
 const VISITED: f64 = 0.05;
-/// Reweightings of the rows.
-const REWEIGHTINGS: usize = 3;
 
 /// A gap that varies along the stroke.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StrokeProfile {
     /// Mean over the time that the screw spent at each place, and its standard error, m.
     pub(crate) mean_m: (f64, f64),
-    /// The largest gap and its standard error, m.
-    pub(crate) largest_m: (f64, f64),
-    /// Screw position of the largest gap, m.
-    pub(crate) largest_at_m: f64,
+    /// The knots at which the screw spent time enough.
+    pub(crate) places: Vec<GapAtPlace>,
 }
 
 /// The profile of a flight whose gap varies along the stroke for certain.
@@ -65,20 +62,21 @@ pub(crate) fn stroke_profile(
         let terms: Vec<(usize, f64)> = knots.chain(std::iter::once((GAP, gap))).collect();
         found.standard_error_of_sum_m(&terms, &rows)
     };
-    let only = |knot: usize| std::array::from_fn(|k| f64::from(u8::from(k == knot)));
+    let only = |knot: usize| -> [f64; KNOTS] { std::array::from_fn(|k| f64::from(u8::from(k == knot))) };
     let mean_m = value_m(&shares);
-    let (largest_m, knot) = (0..KNOTS)
-        .filter(|&k| shares[k] >= VISITED)
-        .map(|k| (value_m(&only(k)), k))
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let at = only(knot);
+    let visited = || (0..KNOTS).filter(|&k| shares[k] >= VISITED);
+    let at = visited().map(only).max_by(|a, b| value_m(a).total_cmp(&value_m(b)))?;
     let excess: [f64; KNOTS] = std::array::from_fn(|k| at[k] - shares[k]);
-    let excess_m = largest_m - mean_m;
+    let excess_m = value_m(&at) - mean_m;
     let is_certain = excess_m > CERTAIN * error_m(0.0, &excess) && excess_m > LEAST_SHARE * mean_m.abs();
+    let place = |knot: usize| GapAtPlace {
+        at_m: scaling.place_m.0 + scaling.place_m.1 * place_of(knot),
+        gap_m: value_m(&only(knot)),
+        gap_se_m: error_m(1.0, &only(knot)),
+    };
     is_certain.then(|| StrokeProfile {
         mean_m: (mean_m, error_m(1.0, &shares)),
-        largest_m: (largest_m, error_m(1.0, &at)),
-        largest_at_m: scaling.place_m.0 + scaling.place_m.1 * place_of(knot),
+        places: visited().map(place).collect(),
     })
 }
 

@@ -342,5 +342,6 @@ fn add_moved(before: &RecordBatch, after: &RecordBatch, moved: &mut MovedByPlace
 /// # Errors
 /// As [`Store::open`].
 pub fn open_store(config: &Config, installations: &Installations) -> Result<Store, Error> {
-    Bookkeeping::new(config, installations).join_to(Store::open(config.store())?)
+    Bookkeeping::new(config, installations)
+        .join_to(Store::open(config.store())?.by_largest_gap(config.parts_by_largest_gap()))
 }
