@@ -90,10 +90,7 @@ impl Stream {
     /// Without a steady state it continues as [`Stream::constant_time`], like the batch.
     pub fn steady_state(filter: &Filter) -> Self {
         let settled = filter.steady_state_gain().ok();
-        Self::with_steady_gain(filter, settled.map(|(gain, p)| SteadyGain::new(filter, gain, p)))
-    }
-
-    fn with_steady_gain(filter: &Filter, steady: Option<SteadyGain>) -> Self {
+        let steady = settled.map(|(gain, p)| SteadyGain::new(filter, gain, p));
         Self { steady, ..Self::constant_time(filter) }
     }
 
@@ -203,7 +200,7 @@ impl Stream {
 
     /// Restarts the filter: the next sample is the first of a new segment.
     pub fn restart(&mut self) {
-        *self = Self::with_steady_gain(&self.filter, self.steady);
+        *self = Self { steady: self.steady, ..Self::constant_time(&self.filter) };
     }
 }
 

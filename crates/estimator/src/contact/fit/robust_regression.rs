@@ -5,7 +5,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
-use crate::contact::fit::design_matrix::DesignRow;
+use crate::contact::fit::design_matrix::{DesignRow, dot};
 use crate::contact::stats::{MAD, median};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
@@ -178,12 +178,8 @@ fn solve_normal<const N: usize>(
 }
 
 impl<const N: usize> RobustFit<N> {
-    pub(crate) fn predict_m(&self, x: &[f64; N]) -> f64 {
-        self.beta.iter().zip(x).map(|(b, x)| b * x).sum()
-    }
-
     pub(crate) fn residual_m(&self, row: &DesignRow<N>) -> f64 {
-        row.y_m - self.predict_m(&row.x)
+        row.y_m - dot(&self.beta, &row.x)
     }
 
     /// A coefficient refitted with the weights of this fit: over all rows whose column `by` is at least `least` in
@@ -244,8 +240,7 @@ impl<const N: usize> RobustFit<N> {
                 (stretch, sum) = (Some(row.stretch), 0.0);
                 stretches += 1;
             }
-            let leverage: f64 = influence.iter().zip(&row.x).map(|(a, x)| a * x).sum();
-            sum += w * self.residual_m(row) * leverage;
+            sum += w * self.residual_m(row) * dot(&influence, &row.x);
         }
         total += sum * sum;
         let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);

@@ -4,7 +4,7 @@
 //! a gap, and a common error of the transducer, at each of some knots in addition; between knots both change linearly.
 
 use crate::contact::blocks::block_means::BlockMeans;
-use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE};
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE, dot};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, priors};
 use crate::contact::fit::robust_regression::{GaussianPrior, REWEIGHTINGS, fit};
 use crate::contact::fit::scaling::Scaling;
@@ -54,9 +54,7 @@ pub(crate) fn stroke_profile(
     });
     let found = fit(&rows, &beliefs, REWEIGHTINGS)?;
     let shares = time_shares(blocks, scaling);
-    let value_m = |weights: &[f64; KNOTS]| -> f64 {
-        found.beta[GAP] + weights.iter().zip(&found.beta[COLUMNS..]).map(|(w, b)| w * b).sum::<f64>()
-    };
+    let value_m = |weights: &[f64; KNOTS]| -> f64 { found.beta[GAP] + dot(weights, &found.beta[COLUMNS..]) };
     let error_m = |gap: f64, weights: &[f64; KNOTS]| {
         let knots = (COLUMNS..).zip(weights.iter().copied());
         let terms: Vec<(usize, f64)> = knots.chain(std::iter::once((GAP, gap))).collect();
