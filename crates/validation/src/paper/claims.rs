@@ -5,6 +5,7 @@ use estimator::{Filter, KalmanState};
 use rayon::prelude::*;
 use simulator::{Flight, Plant, Sensors};
 
+use crate::paper::operations::{OperationCount, count_step};
 use crate::paper::{Assumed, GAP_M, STEP_S, backlash_m, filter, fly, gap, states};
 
 /// Seeds of the flights; the figures show the first.
@@ -86,6 +87,8 @@ pub struct Claims {
     pub gap: GapStatistic,
     /// Error of ΔS with everything known, %.
     pub known: Change,
+    /// Operations of 24, 25, 26, 27 and 28 in a step.
+    pub operations: [OperationCount; 5],
     /// From wrong states.
     pub starts: Vec<Convergence>,
     /// From a wrong backlash with wrong covariances.
@@ -130,9 +133,11 @@ impl Claims {
         let tuning = TUNINGS.par_iter().map(|&factor| {
             Ok(Change::of(factor, &errors(&assume(Assumed { process_noise: factor, ..Assumed::default() })?)))
         });
+        let last = own.len() - 1;
         Ok(Self {
             gap: mid_range(&backlash_m(&own))?,
             known: Change::of(1.0, &errors(&known_m)),
+            operations: count_step(&usual, &own[last], flights[0].load_n[last], own[last].x[0]).0,
             starts: starts(&usual, &flights[0], &own)?,
             spreads: spreads(&usual, &flights[0], &own)?,
             noise: NOISES.par_iter().map(|&factor| noise(factor)).collect::<Result<_>>()?,

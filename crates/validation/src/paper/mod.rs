@@ -2,10 +2,12 @@
 
 mod claims;
 mod figures;
+mod operations;
 mod page;
 
 pub use claims::{Claims, ClaimsError};
 pub use figures::pictures;
+pub use operations::{OperationCount, count_step};
 pub use page::page;
 
 use estimator::gap::{GapStatistic, mid_range};
