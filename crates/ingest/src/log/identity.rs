@@ -1,6 +1,7 @@
 //! Which flight a log is: from its metadata, its constant columns or its path, in that order.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use jiff::tz::{AmbiguousOffset, TimeZone};
@@ -81,7 +82,7 @@ pub(crate) fn departure_on(
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
 ) -> Result<Timestamp, ErrorKind> {
-    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, date, detail);
+    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, &date, &detail);
     if let Some(start) = absolute {
         // The zone of the date may not be known: 14 h to either side of UTC at most.
         let after_h =
@@ -112,7 +113,7 @@ pub(crate) fn departure_before(
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
 ) -> Result<Timestamp, ErrorKind> {
-    let invalid = |detail: &str| invalid(IdentityField::LandingUtc, landing, detail);
+    let invalid = |detail: &str| invalid(IdentityField::LandingUtc, &landing, &detail);
     if date_alone(landing, mapping).is_some() {
         return Err(invalid("a date without a time of the day"));
     }
@@ -124,7 +125,7 @@ pub(crate) fn departure_before(
     landed.checked_sub(duration(length_s)).map_err(|e| invalid(&e.to_string()))
 }
 
-fn invalid(fact: IdentityField, found: impl ToString, detail: impl ToString) -> ErrorKind {
+fn invalid(fact: IdentityField, found: &dyn Display, detail: &dyn Display) -> ErrorKind {
     let (found, detail) = (found.to_string(), detail.to_string());
     ErrorKind::IdentityInvalid { fact: fact.as_str(), found, detail }
 }
@@ -218,7 +219,7 @@ pub(crate) fn read(
     };
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
-    let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, "", e);
+    let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, &"", &e);
     Ok(Identity {
         tail_number: TailNumber::new(tail).map_err(of(IdentityField::TailNumber))?,
         flight_id: FlightId::new(flight).map_err(of(IdentityField::FlightId))?,
@@ -257,16 +258,16 @@ fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKi
         Ok(h) if fact == IdentityField::FlightHours && h > LONGEST_FLIGHT_H => {
             let detail =
                 format!("no flight takes more than {LONGEST_FLIGHT_H} h: give hours, not minutes or seconds");
-            Err(invalid(fact, text, detail))
+            Err(invalid(fact, &text, &detail))
         }
         Ok(h) if h.is_finite() && h >= 0.0 => Ok(Some(h)),
-        _ => Err(invalid(fact, text, "hours are a number of at least 0")),
+        _ => Err(invalid(fact, &text, &"hours are a number of at least 0")),
     }
 }
 
 /// Reads a departure. A zone or offset in the text wins; else the mapped zone; else it is refused.
 pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, ErrorKind> {
-    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, text, detail);
+    let invalid = |detail: String| invalid(IdentityField::DepartureUtc, &text, &detail);
     let local = match &mapping.departure_format {
         Some(format) => {
             let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
@@ -329,7 +330,7 @@ pub(crate) fn local_to_utc(
 ) -> Result<Option<Timestamp>, ErrorKind> {
     let Some(name) = mapping.time_zone.as_deref() else { return Ok(None) };
     let local = TimeZone::UTC.to_datetime(as_utc);
-    let skipped = |detail: String| invalid(IdentityField::DepartureUtc, local, detail);
+    let skipped = |detail: String| invalid(IdentityField::DepartureUtc, &local, &detail);
     unambiguous(local, name).map(Some).map_err(skipped)
 }
 

@@ -160,15 +160,14 @@ impl Flights {
         }
         let of_tail = self.by_tail.entry(flown.tail_number.to_string()).or_default();
         let same_id = of_tail.by_id.entry(flown.flight_id.to_string()).or_default();
-        if let Some(date) = date {
-            if same_id.iter().any(|&other| {
-                self.rows[other].is_date && self.rows[other].flight.departure_utc == departure_utc
-            }) {
-                let (tail, id) = (&flown.tail_number, &flown.flight_id);
-                let what =
-                    format!("a second flight {id} of {tail} on {date}: give both departures with their time");
-                return Err(table.error(row, departure, what));
-            }
+        let is_same = |&other: &usize| {
+            self.rows[other].is_date && self.rows[other].flight.departure_utc == departure_utc
+        };
+        if let Some(date) = date.filter(|_| same_id.iter().any(is_same)) {
+            let (tail, id) = (&flown.tail_number, &flown.flight_id);
+            let what =
+                format!("a second flight {id} of {tail} on {date}: give both departures with their time");
+            return Err(table.error(row, departure, what));
         }
         of_tail.by_departure.entry((departure_utc, date.is_some())).or_default().push(index);
         same_id.push(index);

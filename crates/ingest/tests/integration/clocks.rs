@@ -198,6 +198,9 @@ fn bits_of_a_status_word_mark_valid_samples() {
     assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
 }
 
+/// A clock, its unit and epoch, the zone of the log, and its first instant.
+type Case = (ArrayRef, Option<TimeUnit>, Epoch, Option<&'static str>, Option<&'static str>);
+
 /// Each kind of clock of 10 ms from 2025-11-19T04:13:00.25Z on, which is 1,763,525,580.25 s after 1970: the step is the
 /// same, and an absolute clock gives its first instant. Istanbul is three hours ahead of UTC; 2026-11-19 is day 46345 of
 /// spreadsheets (as LibreOffice has it).
@@ -220,7 +223,7 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
     let (second, millisecond) = (Some(TimeUnit::Second), Some(TimeUnit::Millisecond));
     let (none, there) = (Epoch::None, Some("Europe/Istanbul"));
     let utc = Some("2025-11-19T04:13:00.25Z");
-    let cases: [(ArrayRef, Option<TimeUnit>, Epoch, Option<&str>, Option<&str>); 15] = [
+    let cases: [Case; 15] = [
         (reals(|t| 10.0 + t), second, none, there, None),
         (reals(|t| 7.0 + t / 60.0), Some(TimeUnit::Minute), none, there, None),
         (whole(FIRST_MS, 10), millisecond, none, there, None),
