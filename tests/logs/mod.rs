@@ -1,6 +1,5 @@
 //! Logs: layouts, corrupt files, reference logs and logs with known gaps.
 
-mod corrupt_logs;
 mod ground_truth;
 mod hostile_names;
 pub(crate) mod layouts;

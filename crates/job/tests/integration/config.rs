@@ -126,6 +126,8 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("unit = \"deg\"", "unit = \"deg\"\ngear_ratio = 1e-30", "out_of_range"),
         ("unit = \"deg\"", "unit = \"deg\"\nscale = 1e99", "out_of_range"),
         ("unit = \"deg\"", "unit = \"deg\"\nlatency_s = -1e5", "out_of_range"),
+        ("[clock]", "[run]\nmax_rows = 0x0\n[clock]", "not_positive"),
+        ("[clock]", "[[override]]\nclock.tick_s = nan\n[clock]", "not_positive"),
     ];
     for (line, by, code) in cases {
         let found = diagnostics(line, by);

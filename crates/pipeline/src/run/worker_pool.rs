@@ -374,19 +374,19 @@ mod tests {
         }
     }
 
-    /// Every sound log of a run is finished beside 20 that never end and use their processor: the largest, the
-    /// smallest or some of both, and others of a share that is gone end the run.
+    /// Every sound log of a run is finished beside 20 that never end and use their processor: the largest, or some of
+    /// the largest and of the smallest. Logs of a share that is gone end the run.
     #[test]
     fn logs_that_never_end_keep_no_other_log_from_its_turn() {
-        let cases: [fn(usize) -> bool; 3] = [|log| log < 20, |log| log >= 30, |log| !(10..40).contains(&log)];
+        let cases: [fn(usize) -> bool; 2] = [|log| log < 20, |log| !(10..40).contains(&log)];
         for is_endless in cases {
             let process = move |log: usize, steps: &StepCount| {
                 let _step = steps.begin();
                 let begun = Instant::now();
-                while is_endless(log) && begun.elapsed() < Duration::from_secs(30) {}
+                while is_endless(log) && begun.elapsed() < Duration::from_secs(20) {}
                 std::thread::sleep(Duration::from_millis(5));
             };
-            assert_eq!(run_pool(50, Duration::from_millis(200), process), (30, 20));
+            assert_eq!(run_pool(50, Duration::from_millis(150), process), (30, 20));
         }
         let (finished, late) = run_pool(100, Duration::from_millis(20), |_, _| {
             loop {
