@@ -128,6 +128,18 @@ pub(crate) fn read_files(
     schema: &SchemaRef,
     conditions: &[Condition],
 ) -> Result<Vec<RecordBatch>, Error> {
+    read_each(files, schema, |file| read_file(file, schema, conditions))
+}
+
+/// What a function reads of each file, in the order of the files, one empty batch where that is nothing.
+///
+/// # Errors
+/// The first of the function's errors.
+pub(crate) fn read_each(
+    files: &[PathBuf],
+    schema: &SchemaRef,
+    read_file: impl Fn(&Path) -> Result<Vec<RecordBatch>, Error> + Sync,
+) -> Result<Vec<RecordBatch>, Error> {
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(files.len());
     let next = AtomicUsize::new(0);
     let read = || {
@@ -137,12 +149,12 @@ pub(crate) fn read_files(
             files.get(at).map(|file| (at, file))
         };
         while let Some((at, file)) = take() {
-            parts.push((at, read_file(file, schema, conditions)?));
+            parts.push((at, read_file(file)?));
         }
         Ok::<_, Error>(parts)
     };
     let mut parts = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(read)).collect();
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(&read)).collect();
         let mut parts = read()?;
         for other in others {
             parts.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);

@@ -67,8 +67,8 @@ impl Selection {
 
     /// The matching rows of all its files, in one batch or more.
     pub(crate) fn read(&self) -> Result<Vec<RecordBatch>, Error> {
-        let rows = scan::read_files(&self.files, &self.read, &self.stored)?;
-        rows.iter().map(|batch| Ok(self.finish(batch)?)).collect()
+        // A joined condition applies to each file as soon as it is read, or all rows of the store would be held.
+        scan::read_each(&self.files, &self.wanted, |path| self.read_file(path))
     }
 
     /// Joins the bookkeeping, and keeps the matching rows and the wanted columns.
