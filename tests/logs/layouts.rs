@@ -159,11 +159,8 @@ fn loads_in_files_of_their_own_find_their_flights() {
         if every == 1 {
             // The fifth column is the flight id.
             let unnamed = |line: String| {
-                line.split(',')
-                    .enumerate()
-                    .filter(|(k, _)| *k != 4)
-                    .map(|(_, cell)| format!("{cell},"))
-                    .collect()
+                let cells: Vec<&str> = line.split(',').collect();
+                [&cells[..4], &cells[5..]].concat().join(",")
             };
             let [found, expected] = [numbers(&fleet), plain()];
             let [found, expected]: [Vec<String>; 2] =

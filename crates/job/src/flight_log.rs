@@ -303,26 +303,26 @@ pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, 
 /// Why no unit has a log's channels. The text is the same for all logs of one cause, so that it is told once.
 fn no_installation(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
     let (tail, at) = (&id.tail_number, id.departure_utc);
-    let named = |near: Option<&str>| near.map(|near| format!("nearest: {near}; ")).unwrap_or_default();
     if !installations.contains_tail(tail) {
-        let near = named(nearest(tail.as_str(), installations.iter().map(|stay| stay.tail_number.as_str())));
+        let near = nearest(tail.as_str(), installations.iter().map(|stay| stay.tail_number.as_str()));
+        let near = near.map(|near| format!("nearest: {near}; ")).unwrap_or_default();
         let hint = format!("{near}compare the spelling in logs and table; then `freeplay run --retry`");
         let what = format!("the installations table does not know tail {tail}");
         return Diagnostic::new("tail_unknown", what).hint(hint);
     }
     let stays = installations.of_position(tail.as_str(), position.as_str());
-    let of_tail = installations.iter().filter(|stay| stay.tail_number == *tail);
-    let near =
-        stays.is_empty().then(|| nearest(position.as_str(), of_tail.map(|stay| stay.position.as_str())));
     let day = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M");
     let before = stays.iter().filter_map(|stay| stay.removed_utc).filter(|removed| *removed <= at).max();
     let after = stays.iter().map(|stay| stay.installed_utc).filter(|installed| *installed > at).min();
     let from = before.map(|removed| format!(" from {}", day(removed))).unwrap_or_default();
     let until = after.map(|installed| format!(" until {}", day(installed))).unwrap_or_default();
     let what = format!("no unit is booked in {position} of {tail}{from}{until}");
+    let of_tail = installations.iter().filter(|stay| stay.tail_number == *tail);
+    let booked: BTreeSet<&str> = of_tail.map(|stay| stay.position.as_str()).collect();
+    let booked: Vec<&str> = booked.into_iter().collect();
     let hint = format!(
-        "{}add its stay to the installations table, then `freeplay run --retry`",
-        named(near.flatten())
+        "the table has {} of {tail}; add the stay to it, then `freeplay run --retry`",
+        booked.join(", ")
     );
     Diagnostic::new("unit_unknown", what).hint(hint)
 }

@@ -156,7 +156,8 @@ impl KnownNames {
         else {
             return format!("no unit{} has flown; {}", selection(ask), self.searched());
         };
-        if !store.distinct("tail_number").is_ok_and(|flown| flown.contains(tail)) {
+        let has_flown = store.distinct("tail_number").is_ok_and(|flown| flown.contains(tail));
+        if !has_flown || ask.as_of_utc.is_some() {
             return format!("no unit{} has flown; {}", selection(ask), self.searched());
         }
         let tails: BTreeSet<&str> = installations.iter().map(|stay| stay.tail_number.as_str()).collect();

@@ -154,7 +154,7 @@ pub(crate) fn read_each(
         Ok::<_, Error>(parts)
     };
     let mut parts = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(&read)).collect();
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(read)).collect();
         let mut parts = read()?;
         for other in others {
             parts.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
