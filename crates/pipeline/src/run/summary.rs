@@ -365,6 +365,11 @@ impl RunSummary {
         logs.len()
     }
 
+    /// Those of the logs in error whose other actuators are stored.
+    pub fn logs_in_part(&self) -> usize {
+        self.logs.values().filter(|log| !log.records.is_empty() && !log.diagnostics.is_empty()).count()
+    }
+
     /// Failed logs of earlier runs that no pattern of `logs.acknowledged_errors` fits.
     pub fn unacknowledged(&self) -> usize {
         self.standing_errors.iter().filter(|error| !error.is_acknowledged).count()

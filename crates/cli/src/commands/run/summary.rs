@@ -145,7 +145,13 @@ fn failures(report: &RunSummary, page: &mut Page) {
     }
     if !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
-        page.line("failed", &format!("{failed} could not be used; all others are stored"));
+        let what = match report.logs_in_part() {
+            0 => "could not be used; all others are stored".to_owned(),
+            part => format!(
+                "in error, {part} of them in part: their other actuators are stored, as all other logs are"
+            ),
+        };
+        page.line("failed", &format!("{failed} {what}"));
         page.list("", causes(report), MAX_FAILURES, IN_JSON);
     }
     if !report.standing_errors.is_empty() {
