@@ -147,9 +147,9 @@ fn failures(report: &RunSummary, page: &mut Page) {
         let failed = count(report.logs_in_error(), "log");
         let what = match report.logs_in_part() {
             0 => "could not be used; all others are stored".to_owned(),
-            part => format!(
-                "in error, {part} of them in part: their other actuators are stored, as all other logs are"
-            ),
+            part => {
+                format!("in error; {part} of them with their other actuators stored, as all other logs are")
+            }
         };
         page.line("failed", &format!("{failed} {what}"));
         page.list("", causes(report), MAX_FAILURES, IN_JSON);
