@@ -64,7 +64,8 @@ const UNIT: [(&str, &str); 6] = [
     (
         STIFFNESS_UNLIKE,
         "check the `unit` of load and positions first (a load in lbf read as N makes it 4.4 times too soft), then set \
-         `stiffness_n_per_m` of the part to what `freeplay check` identifies: the gap is fitted with a stiffness of its own, but `gap_midrange_m`, loads and limits of other quantities assume the configured one",
+         `stiffness_n_per_m` of the part to what `freeplay check` identifies: the gap is fitted with a stiffness of its \
+         own, but `gap_midrange_m`, loads and limits of other quantities assume the configured one",
     ),
 ];
 
