@@ -235,7 +235,7 @@ def normalize(
     >>> log = "sample-data/logs/N412FP/20260828T005251Z_N412FP-0017.parquet"
     >>> files = fp.normalize(log, "normalized")
     >>> files[0]
-    'normalized/N412FP/N412FP-0017/aileron_left.parquet'
+    'normalized/N412FP/20260828T005251Z_N412FP-0017/aileron_left.parquet'
     """
     written, trouble = _freeplay.normalize(_paths(logs), fspath(output), load(config), compatible, jobs)
     return _or_raise([fspath(file) for file in written], trouble)
