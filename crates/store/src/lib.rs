@@ -45,6 +45,7 @@ mod store_dir;
 mod write;
 
 pub use admin::info::Info;
+pub use admin::withdraw::Withdrawal;
 pub use delta::foreign_table::{LiveFile, live_files};
 pub use error::Error;
 pub use handle::Store;

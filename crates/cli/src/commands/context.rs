@@ -152,14 +152,16 @@ impl KnownNames {
 
     /// Why a selection has no unit: the tables have none there now, or none has flown.
     pub(crate) fn why_nothing(&self, ask: &UnitSelection) -> String {
-        let Some((tail, Self::Store(Some(store), installations))) = ask.tail_number.as_ref().zip(Some(self))
-        else {
+        let flown_on = match (self, &ask.tail_number, ask.as_of_utc) {
+            (Self::Store(Some(store), installations), Some(tail), None) => store
+                .distinct("tail_number")
+                .is_ok_and(|flown| flown.contains(tail))
+                .then_some((tail, installations)),
+            _ => None,
+        };
+        let Some((tail, installations)) = flown_on else {
             return format!("no unit{} has flown; {}", selection(ask), self.searched());
         };
-        let has_flown = store.distinct("tail_number").is_ok_and(|flown| flown.contains(tail));
-        if !has_flown || ask.as_of_utc.is_some() {
-            return format!("no unit{} has flown; {}", selection(ask), self.searched());
-        }
         let tails: BTreeSet<&str> = installations.iter().map(|stay| stay.tail_number.as_str()).collect();
         let table = if tails.contains(tail.as_str()) {
             format!("the installations table has none{} now", selection(ask))

@@ -3,10 +3,13 @@
 //! A withdrawn record keeps all its columns except its status, so nothing is lost, and other programs that select by status
 //! leave it out too.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch, StringArray};
 use arrow::compute::and;
+use arrow::datatypes::TimestampMicrosecondType;
 use arrow::error::ArrowError;
 use records::Status;
 
@@ -18,22 +21,44 @@ use crate::write::writer::Writer;
 const COLUMNS: [&str; 7] =
     ["status", "gap_m", "tail_number", "flight_id", "position", "departure_utc", "log_path"];
 
+/// The records that were withdrawn or brought back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Withdrawal {
+    /// Their number.
+    pub records: usize,
+    /// Their flights: tail, and departure in µs since 1970 UTC.
+    pub flights: BTreeSet<(String, i64)>,
+}
+
 impl Writer {
-    /// Withdraws the matching records, or brings withdrawn ones back, in one commit, and returns their number.
+    /// Withdraws the matching records, or brings withdrawn ones back, in one commit.
     ///
     /// A query selects by tail, flight, position and departure, and `log_path` the records of one log.
     ///
     /// # Errors
     /// As [`Writer::rewrite`].
-    pub fn withdraw(&mut self, query: &Query, log_path: Option<&str>, undo: bool) -> Result<usize, Error> {
+    pub fn withdraw(
+        &mut self,
+        query: &Query,
+        log_path: Option<&str>,
+        undo: bool,
+    ) -> Result<Withdrawal, Error> {
         let of_log = log_path.map(|path| Condition::texts("log_path", path, path));
         let conditions: Vec<Condition> = query.conditions().into_iter().chain(of_log).collect();
-        self.rewrite(&COLUMNS, &|batch| with_status(batch, &conditions, undo))
+        let flights = RefCell::new(BTreeSet::new());
+        let change = |batch: &RecordBatch| with_status(batch, &conditions, undo, &mut flights.borrow_mut());
+        let records = self.rewrite(&COLUMNS, &change)?;
+        Ok(Withdrawal { records, flights: flights.into_inner() })
     }
 }
 
-/// A batch of [`COLUMNS`] in which the matching rows have their new status.
-fn with_status(batch: &RecordBatch, conditions: &[Condition], undo: bool) -> Result<RecordBatch, ArrowError> {
+/// A batch of [`COLUMNS`] in which the matching rows have their new status; the flights of those that change are added.
+fn with_status(
+    batch: &RecordBatch,
+    conditions: &[Condition],
+    undo: bool,
+    flights: &mut BTreeSet<(String, i64)>,
+) -> Result<RecordBatch, ArrowError> {
     let mut matches = BooleanArray::from(vec![true; batch.num_rows()]);
     for condition in conditions {
         let column = batch.column(batch.schema_ref().index_of(condition.column)?);
@@ -52,6 +77,10 @@ fn with_status(batch: &RecordBatch, conditions: &[Condition], undo: bool) -> Res
         _ => statuses.value(row),
     };
     let new: StringArray = (0..batch.num_rows()).map(|row| Some(status(row))).collect();
+    let tails = batch.column(2).as_string::<i32>();
+    let departures = batch.column(5).as_primitive::<TimestampMicrosecondType>();
+    let changed = (0..batch.num_rows()).filter(|&row| new.value(row) != statuses.value(row));
+    flights.extend(changed.map(|row| (tails.value(row).to_owned(), departures.value(row))));
     let mut columns: Vec<ArrayRef> = batch.columns().to_vec();
     columns[0] = Arc::new(new);
     RecordBatch::try_new(batch.schema(), columns)

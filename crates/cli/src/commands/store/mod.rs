@@ -12,7 +12,7 @@ use job::Config;
 use records::Diagnostic;
 use records::row_schema::to_batch;
 use serde_json::json;
-use store::{Holder, Info, Query, RunRecord, Store};
+use store::{Holder, Info, Query, RunRecord, Store, Withdrawal};
 
 use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
@@ -203,15 +203,11 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
         let hint = "give `--flight`, `--log`, `--tail`, `--position`, `--since` or `--until`";
         return Err(Failure::usage("nothing_selected", "no record is selected", hint));
     }
-    // Counted before: a flight number may fly every day, on several tails.
-    let mut selected = store.records(&query)?;
-    selected.retain(|record| args.log.as_ref().is_none_or(|log| *log == record.provenance.log_path));
-    let flights: BTreeSet<_> =
-        selected.iter().map(|record| (&record.flight.tail_number, record.flight.departure_utc)).collect();
-    let tails: BTreeSet<_> = flights.iter().map(|(tail, _)| tail).collect();
+    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let Withdrawal { records: changed, flights } = writer.withdraw(&query, args.log.as_deref(), args.undo)?;
+    // A flight number may fly every day, on several tails.
+    let tails: BTreeSet<&String> = flights.iter().map(|(tail, _)| tail).collect();
     let scope = format!("{} of {}", count(flights.len(), "flight"), count(tails.len(), "tail"));
-    let changed =
-        store.lock(&Holder::this_process(), None)?.withdraw(&query, args.log.as_deref(), args.undo)?;
     let records = count(changed, "record");
     output.write_result(&match (changed, args.undo) {
         (0, _) => "no stored record matches\n".to_owned(),
