@@ -6,6 +6,8 @@
 //! blocks below two of its χ² quantiles have the ratio that white noise gives (Wilson and Hilferty 1931,
 //! <https://doi.org/10.1073/pnas.17.12.684>), whatever the share of quiet blocks.
 
+use std::ops::Range;
+
 use crate::channel::stats::range;
 
 /// White noise of a channel and its uncertainty, in the channel's unit.
@@ -31,8 +33,10 @@ const RATIO_SHARE: f64 = 0.9;
 /// Fewest quiet blocks, as a number and as a share of all.
 const MIN_BLOCKS: usize = 40;
 const MIN_SHARE: f64 = 0.02;
-/// Most blocks that are read; a longer channel is subsampled.
-const MAX_BLOCKS: usize = 8000;
+/// Most samples that are read; of a longer channel as many in stretches that are spread over it.
+const MAX_SAMPLES: usize = 1 << 17;
+/// Samples of such a stretch.
+const STRETCH: usize = 1024;
 /// A quantised channel must span this many steps about a block; where it rests on one step, rounding is not white.
 const MIN_STEPS: f64 = 3.0;
 /// Relative uncertainty that remains however many blocks there are.
@@ -43,17 +47,17 @@ const SYSTEMATIC: f64 = 0.03;
 /// Rounding to steps adds step²/12 to the variance and is subtracted. A channel that repeats every value k times, or
 /// holds one in k rows, is taken at its own rate. NaN marks a missing sample.
 pub fn white_noise(values: &[f64], resolution: Option<f64>) -> Option<WhiteNoise> {
-    white_noise_of(values, resolution, MAX_BLOCKS)
+    white_noise_of(values, resolution, MAX_SAMPLES)
 }
 
-/// As [`white_noise`], from at most so many blocks.
+/// As [`white_noise`], from at most so many samples.
 pub(crate) fn white_noise_of(
     values: &[f64],
     resolution: Option<f64>,
-    most_blocks: usize,
+    most_samples: usize,
 ) -> Option<WhiteNoise> {
-    let own = own_samples(values);
-    let blocks = block_variances(own.as_deref().unwrap_or(values), resolution.unwrap_or(0.0), most_blocks);
+    let own = own_samples(values, &stretches(values.len(), most_samples));
+    let blocks = block_variances(&own, resolution.unwrap_or(0.0));
     let levels: Vec<Level> =
         ORDERS.iter().zip(blocks).filter_map(|(order, variances)| quiet_level(*order, variances)).collect();
     let mut best = *levels.first()?;
@@ -81,38 +85,45 @@ struct Level {
     relative: f64,
 }
 
-/// The samples of a channel recorded every k-th row: those that are present, or the first of each k equal ones.
-fn own_samples(values: &[f64]) -> Option<Vec<f64>> {
+/// All of a channel, or stretches that are spread evenly over one of more than `most` samples.
+fn stretches(samples: usize, most: usize) -> Vec<Range<usize>> {
+    if samples <= most {
+        return vec![0..samples];
+    }
+    let count = most / STRETCH;
+    (0..count).map(|k| k * (samples - STRETCH) / count).map(|start| start..start + STRETCH).collect()
+}
+
+/// The samples of these stretches; of a channel recorded every k-th row those that are present, or the first of each k
+/// equal ones.
+fn own_samples(values: &[f64], stretches: &[Range<usize>]) -> Vec<f64> {
     const MAX_INTERVAL: usize = 20;
     const MOST: f64 = 0.95;
-    /// Changes that show the interval: the first ones.
-    const MAX_CHANGES: usize = 4096;
-    let missing = values.iter().filter(|v| v.is_nan()).count();
-    if 5 * missing >= 2 * values.len() {
-        return Some(values.iter().copied().filter(|v| !v.is_nan()).collect());
+    let places = || stretches.iter().cloned().flatten();
+    let samples: Vec<f64> = places().map(|i| values[i]).collect();
+    let missing = samples.iter().filter(|v| v.is_nan()).count();
+    if 5 * missing >= 2 * samples.len() {
+        return samples.into_iter().filter(|v| !v.is_nan()).collect();
     }
-    let changes = || (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits());
-    let count = changes().count();
-    if 3 * count > 2 * values.len() || count < MIN_BLOCKS {
-        return None;
+    let changes: Vec<usize> =
+        places().filter(|&i| i > 0 && values[i].to_bits() != values[i - 1].to_bits()).collect();
+    if 3 * changes.len() > 2 * samples.len() || changes.len() < MIN_BLOCKS {
+        return samples;
     }
-    let changes: Vec<usize> = changes().take(MAX_CHANGES).collect();
     let at_one_phase = |every: usize| {
         let mut counts = vec![0_usize; every];
         changes.iter().for_each(|i| counts[i % every] += 1);
         let phase = (0..every).max_by_key(|&phase| counts[phase])?;
         (counts[phase] as f64 >= MOST * changes.len() as f64).then_some((every, phase))
     };
-    let (every, phase) = (2..=MAX_INTERVAL).rev().find_map(at_one_phase)?;
-    Some(values.iter().skip(phase).step_by(every).copied().collect())
+    let Some((every, phase)) = (2..=MAX_INTERVAL).rev().find_map(at_one_phase) else { return samples };
+    places().filter(|i| i % every == phase).map(|i| values[i]).collect()
 }
 
 /// Noise variances of all blocks, for each order; blocks with a missing sample, or at rest, are left out.
-fn block_variances(values: &[f64], step: f64, most_blocks: usize) -> [Vec<f64>; ORDERS.len()] {
+fn block_variances(values: &[f64], step: f64) -> [Vec<f64>; ORDERS.len()] {
     let mut found: [Vec<f64>; ORDERS.len()] = std::array::from_fn(|_| Vec::new());
-    let count = values.len().saturating_sub(BLOCK) / (BLOCK / 2) + 1;
-    let stride = (BLOCK / 2) * count.div_ceil(most_blocks);
-    for start in (0..(values.len() + 1).saturating_sub(BLOCK)).step_by(stride) {
+    for start in (0..(values.len() + 1).saturating_sub(BLOCK)).step_by(BLOCK / 2) {
         let about = &values[start.saturating_sub(MARGIN)..values.len().min(start + BLOCK + MARGIN)];
         if step > 0.0 && range(about) < MIN_STEPS * step {
             continue;

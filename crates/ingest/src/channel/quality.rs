@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use crate::channel::noise_floor::white_noise_of;
 use crate::channel::stats::{ChannelStats, range};
 use crate::mapping::Role;
@@ -165,29 +167,30 @@ fn spikes(
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
     /// Enough for a threshold: the noise is known to about 3 %.
-    const NOISE_BLOCKS: usize = 1000;
+    const NOISE_SAMPLES: usize = 1 << 14;
     let step = resolution.unwrap_or(0.0);
     if max_second_difference <= 4.0 * step || values.len() < 7 {
         return 0;
     }
-    let noise = white_noise_of(values, resolution, NOISE_BLOCKS)
+    let noise = white_noise_of(values, resolution, NOISE_SAMPLES)
         .map_or(0.0, |noise| noise.rms)
         .hypot(step / 12.0_f64.sqrt());
     let far = (FAR * DIFFERENCE_NOISE * noise).max(4.0 * step);
     if max_second_difference <= far {
         return 0;
     }
-    let height = |i: usize| {
-        let [a, b, c, d, e] = std::array::from_fn(|k| values[i + k - 2]);
-        (a - 4.0 * b + 6.0 * c - 4.0 * d + e) / 6.0
-    };
     // A window across a break in time shows the break.
-    let inner = || segments.iter().flat_map(|s| s.start + 3..s.end.saturating_sub(3));
-    if !inner().any(|i| height(i).abs() > far) {
-        return 0;
-    }
-    let heights: Vec<f64> = inner().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
-    let far = far.max(IMPACTS * recurring_impact(heights, noise, step_s));
+    let inner: Vec<Range<usize>> =
+        segments.iter().map(|s| s.start + 3..s.end.saturating_sub(3)).filter(|s| !s.is_empty()).collect();
+    let places = inner.iter().map(Range::len).sum::<usize>();
+    let rank = ((places as f64 * step_s / EVERY_S) as usize).max(FEWEST_IMPACTS);
+    let explained = explained_height(places as f64 / rank as f64, noise);
+    // The height that recurring impacts must exceed to raise the threshold.
+    let least = (far / IMPACTS).hypot(explained).min(far);
+    let (high, recurring) = highest(values, &inner, least, rank);
+    let impact = (recurring * recurring - explained * explained).max(0.0).sqrt();
+    let far = far.max(IMPACTS * impact);
+    let height = |i: usize| height(values, i);
     let is_outlier = |i: usize| {
         let at = height(i);
         let (before, after) = (height(i - 1) / at, height(i + 1) / at);
@@ -200,25 +203,64 @@ fn spikes(
             && (before - after).abs() < SHAPE_TOLERANCE
             && !around.any(|other| other >= LOCAL_SHARE * at.abs())
     };
-    inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count()
+    high.iter().filter(|(at, i)| *at > far && is_outlier(*i)).count()
 }
+
+/// A height counts as that of recurring impacts where more than one in so many seconds exceed it, and more than so many in
+/// all.
+const EVERY_S: f64 = 6.0;
+const FEWEST_IMPACTS: usize = 20;
 
 /// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
 const DIFFERENCE_NOISE: f64 = 1.394;
 
-/// Height that fourth differences exceed every six seconds, less what white noise explains of it.
-fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
-    const EVERY_S: f64 = 6.0;
-    const LEAST: usize = 20;
+/// Height that white noise of this rms exceeds once in so many places.
+fn explained_height(places: f64, noise: f64) -> f64 {
     /// For the uncertainty of the noise itself.
     const MARGIN: f64 = 1.05;
-    let rank = ((heights.len() as f64 * step_s / EVERY_S) as usize).max(LEAST);
-    let Some(at) = heights.len().checked_sub(rank + 1) else { return 0.0 };
-    let level = *heights.select_nth_unstable_by(at, f64::total_cmp).1;
     // Two-sided tail of the normal distribution, to within 3 % for these ranks.
-    let deviate = (2.0 * (heights.len() as f64 / rank as f64).ln()).sqrt() - 0.35;
-    let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
-    (level * level - explained * explained).max(0.0).sqrt()
+    let deviate = (2.0 * places.ln()).sqrt() - 0.35;
+    MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise
+}
+
+/// The fourth difference over 6 about a sample.
+#[inline]
+fn height(values: &[f64], i: usize) -> f64 {
+    let [a, b, c, d, e] = std::array::from_fn(|k| values[i + k - 2]);
+    (a - 4.0 * b + 6.0 * c - 4.0 * d + e) / 6.0
+}
+
+/// Heights above `least` and their places, and the height that exactly `rank` places exceed; zero where fewer than that lie
+/// above `least`. Where more do, the lowest are left out.
+fn highest(values: &[f64], places: &[Range<usize>], least: f64, rank: usize) -> (Vec<(f64, usize)>, f64) {
+    const BLOCK: usize = 64;
+    let (mut found, mut least) = (Vec::new(), least);
+    for start in places.iter().flat_map(|s| s.clone().step_by(BLOCK).map(|k| k..s.end.min(k + BLOCK))) {
+        if is_higher(&values[start.start - 2..start.end + 2], least) {
+            let heights = start.map(|i| (height(values, i).abs(), i));
+            found.extend(heights.filter(|(at, _)| *at > least));
+        }
+        if found.len() > 2 * rank + BLOCK {
+            least = keep_highest(&mut found, rank);
+        }
+    }
+    let recurring = if found.len() > rank { keep_highest(&mut found, rank) } else { 0.0 };
+    (found, recurring)
+}
+
+/// Keeps the `rank` highest and the next one, whose height it returns.
+fn keep_highest(found: &mut Vec<(f64, usize)>, rank: usize) -> f64 {
+    let level = found.select_nth_unstable_by(rank, |a, b| b.0.total_cmp(&a.0)).1.0;
+    found.truncate(rank + 1);
+    level
+}
+
+/// Whether the fourth difference over 6 exceeds a height at any but the two first and last values.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn is_higher(values: &[f64], height: f64) -> bool {
+    let six = 6.0 * height;
+    let fourth = |[a, b, c, d, e]: &[f64; 5]| (a - 4.0 * b + 6.0 * c - 4.0 * d + e).abs();
+    values.array_windows().fold(false, |is, window| is | (fourth(window) > six))
 }
 
 /// Quality flags of the motor, screw and load channels: stable codes.
