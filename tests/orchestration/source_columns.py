@@ -14,12 +14,13 @@ BEGIN, END = "          # columns of records, from docs/columns.md\n", "        
 def documented() -> str:
     """Columns of the records on the page, as YAML."""
     table = PAGE.read_text(encoding="utf-8").split("<!-- columns of records -->")[1].split("<!-- end -->")[0]
-    rows = re.findall(r"^\| `(\w+)` \| ([^|]+) \| (.+) \|$", table, re.MULTILINE)
+    rows = re.findall(r"^\| (`[^|]+`) \| [^|]+ \| (.+) \|$", table, re.MULTILINE)
+    columns = [(name, meaning) for names, meaning in rows for name in re.findall(r"`(\w+)`", names)]
     text = "".join(
         f"          - name: {name}\n            description: {json.dumps(meaning, ensure_ascii=False)}\n"
-        for name, _, meaning in rows
+        for name, meaning in columns
     )
-    assert len(rows) > 30, f"{PAGE} has {len(rows)} columns of records"
+    assert len(columns) > 30, f"{PAGE} has {len(columns)} columns of records"
     return text
 
 

@@ -1,5 +1,6 @@
 //! Generator of `docs/commands.md` from the argument parser; the test compares the file with it.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -7,12 +8,11 @@ use clap::{Arg, Command, CommandFactory};
 
 use crate::args::Args;
 
-const HEAD: &str = "# Every command\n\nWritten from the program's own parser (`FREEPLAY_BLESS=1 cargo test -p cli \
-                    commands_doc`), and compared with it by a test.\n`freeplay help COMMAND` prints the same \
-                    text. Results go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n\n\
-                    Keys and columns of JSON, JSON lines, CSV and Parquet are stable: one that scripts rely on \
-                    changes only with a\nline in `CHANGELOG.md`. New ones may be added at any time, so \
-                    ignore what you do not know. Tables and sentences for\npeople may change in every release.\n";
+const HEAD: &str = "# Every command\n\nThe text of `freeplay help COMMAND`, written by a test. Results go to stdout, \
+                    progress and diagnostics to stderr; all\ncommands have the same \
+                    [exit codes](columns.md#exit-codes).\n\nKeys and columns of JSON, JSON lines, CSV and Parquet \
+                    are stable; new ones may be added, so ignore those that you do not\nknow. Tables and sentences \
+                    for people may change in every release.\n";
 
 #[test]
 fn the_reference_of_commands_is_what_the_parser_knows() {
@@ -28,52 +28,76 @@ fn the_reference_of_commands_is_what_the_parser_knows() {
     );
 }
 
-/// The page: each command, then what all of them take.
+/// The page: each command, what several of them take, and what all of them take.
 fn page() -> String {
     let mut root = Args::command();
     root.build();
+    let mut rows = BTreeMap::new();
+    count(&root, &mut rows);
+    let common: BTreeSet<String> = rows.into_iter().filter_map(|(row, n)| (n > 2).then_some(row)).collect();
     let mut page = HEAD.to_owned();
     for command in root.get_subcommands().filter(|command| command.get_name() != "help") {
-        section(&mut page, command, "freeplay");
+        section(&mut page, command, "freeplay", &common);
     }
+    let _ = write!(page, "\n## Common options\n{TABLE}{}", common.into_iter().collect::<String>());
     page.push_str("\n## Options of every command\n");
-    table(&mut page, root.get_arguments().filter(|arg| arg.is_global_set()));
+    page.push_str(TABLE);
+    page.extend(root.get_arguments().filter(|arg| arg.is_global_set()).map(row));
     page
 }
 
+/// In how many commands each row occurs.
+fn count(command: &Command, rows: &mut BTreeMap<String, usize>) {
+    for arg in taken(command) {
+        *rows.entry(row(arg)).or_default() += 1;
+    }
+    command.get_subcommands().for_each(|command| count(command, rows));
+}
+
+/// The arguments of a command itself.
+fn taken(command: &Command) -> impl Iterator<Item = &Arg> {
+    command
+        .get_arguments()
+        .filter(|arg| !arg.is_global_set() && !matches!(arg.get_id().as_str(), "help" | "version"))
+}
+
 /// A command's purpose, how it is typed, what it takes, its examples, and its own commands.
-fn section(page: &mut String, command: &Command, above: &str) {
+fn section(page: &mut String, command: &Command, above: &str, common: &BTreeSet<String>) {
     let name = format!("{above} {}", command.get_name());
     let below: Vec<&Command> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
     let about = command.get_about().map(ToString::to_string).unwrap_or_default();
     let _ = write!(page, "\n## `{name}`\n\n{about}.\n");
     let usage = command.clone().render_usage().to_string();
     let _ = write!(page, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim());
-    let taken = |arg: &&Arg| !arg.is_global_set() && !matches!(arg.get_id().as_str(), "help" | "version");
-    if command.get_arguments().any(|arg| taken(&arg)) {
-        table(page, command.get_arguments().filter(taken));
+    let (shared, own): (Vec<&Arg>, Vec<&Arg>) = taken(command).partition(|arg| common.contains(&row(arg)));
+    if !own.is_empty() {
+        page.push_str(TABLE);
+        page.extend(own.into_iter().map(row));
+    }
+    if !shared.is_empty() {
+        let names: Vec<String> = shared.into_iter().map(name_of).collect();
+        let _ = write!(page, "\n[Common options](#common-options): {}.\n", names.join(", "));
     }
     if let Some(examples) = command.get_after_help() {
         let _ = write!(page, "\n```text\n{}\n```\n", examples.to_string().trim());
     }
     for command in below {
-        section(page, command, &name);
+        section(page, command, &name, common);
     }
 }
 
-fn table<'a>(page: &mut String, args: impl Iterator<Item = &'a Arg>) {
-    page.push_str("\n| option | meaning |\n|---|---|\n");
-    for arg in args {
-        let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
-        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-        let _ = writeln!(
-            page,
-            "| {} | {}.{} |",
-            typed(arg),
-            help.trim_end_matches('.').replace('|', "\\|"),
-            notes(arg)
-        );
-    }
+const TABLE: &str = "\n| option | meaning |\n|---|---|\n";
+
+/// A row of a table of options.
+fn row(arg: &Arg) -> String {
+    let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    format!("| {} | {}.{} |\n", typed(arg), help.trim_end_matches('.').replace('|', "\\|"), notes(arg))
+}
+
+/// The long name of an option, or that of its value.
+fn name_of(arg: &Arg) -> String {
+    arg.get_long().map_or_else(|| typed(arg), |long| format!("`--{long}`"))
 }
 
 /// An option as it is typed: `-j`, `--jobs JOBS`, or `LOGS...`.

@@ -12,7 +12,7 @@ stored_row! {
     pub struct Flight {
         /// The aircraft.
         pub tail_number: TailNumber,
-        /// The operator's flight identifier; unique within the tail.
+        /// The operator's flight identifier, unique within the tail.
         pub flight_id: FlightId,
         /// Departure.
         pub departure_utc: Timestamp,

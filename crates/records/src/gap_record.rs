@@ -45,7 +45,7 @@ stored_row! {
         pub config_digest: String,
         /// Version of Freeplay that computed the estimate.
         pub program_version: String,
-        /// The run that computed the estimate. Compare two runs without `run_id`, `processed_utc` and `log_path`.
+        /// The run that computed the estimate.
         pub run_id: String,
         /// Time of computation.
         pub processed_utc: Timestamp,
@@ -66,41 +66,41 @@ stored_row! {
         pub flags: Vec<String>,
         /// ΔS by the configured method, m.
         pub gap_m: Option<f64>,
-        /// Standard error of `gap_m`, m; of the contact regression, none for the mid-range estimate.
+        /// Standard error of `gap_m`, m; null for the mid-range estimate.
         pub gap_se_m: Option<f64>,
-        /// 5 % bound of `gap_m`, m; of the contact regression.
+        /// 5 % and 95 % bound of `gap_m`, m; null for the mid-range estimate.
         pub gap_p05_m: Option<f64>,
-        /// 95 % bound of `gap_m`, m; of the contact regression.
+        /// 5 % and 95 % bound of `gap_m`, m; null for the mid-range estimate.
         pub gap_p95_m: Option<f64>,
         /// ΔS by equations 29–31, m; also present for rejected flights.
         pub gap_midrange_m: Option<f64>,
-        /// Stiffness fitted in this flight, N/m; none where the method fits none.
+        /// Stiffness fitted in this flight, N/m.
         pub stiffness_n_per_m: Option<f64>,
         /// Standard error of `stiffness_n_per_m`, N/m.
         pub stiffness_se_n_per_m: Option<f64>,
-        /// Time skew fitted in this flight, s: delay of the screw channel relative to the motor channel.
+        /// Delay of the screw channel relative to the motor channel, fitted in this flight, s.
         pub skew_s: Option<f64>,
-        /// Width of the loop of relative position against load at zero load, m: gap and friction wind-up together.
+        /// Width of the loop of relative position against load at zero load, m.
         pub loop_width_m: Option<f64>,
         /// Lost motion between plus and minus the part's reference load, m.
         pub lost_motion_m: Option<f64>,
-        /// Reference radius of a rotary part: metres of gap per radian, m/rad.
+        /// Metres of gap per radian of a rotary part, m/rad.
         pub reference_radius_m: Option<f64>,
-        /// Load reversals: from beyond +12 % of the load's 95 % magnitude to beyond −12 %, or back.
+        /// Load reversals.
         pub load_reversals: i64,
         /// Samples used.
         pub samples: i64,
-        /// Samples in the upper set of equation 30.
+        /// Samples in the upper and lower set of equations 30 and 31.
         pub samples_upper: i64,
-        /// Samples in the lower set of equation 31.
+        /// Samples in the upper and lower set of equations 30 and 31.
         pub samples_lower: i64,
-        /// 5 % quantile of the load, N.
+        /// 5 % and 95 % quantile of the load, N.
         pub load_p05_n: Option<f64>,
-        /// 95 % quantile of the load, N.
+        /// 5 % and 95 % quantile of the load, N.
         pub load_p95_n: Option<f64>,
-        /// Mean temperature, °C, where a channel is mapped.
+        /// Mean temperature, °C.
         pub temperature_c: Option<f64>,
-        /// Mean normalised innovation squared (NIS); compare it with the unit's own history only.
+        /// Mean normalised innovation squared.
         pub nis: Option<f64>,
         /// Standard error of `skew_s`, s.
         pub skew_se_s: Option<f64>,
@@ -108,17 +108,17 @@ stored_row! {
         pub loop_width_se_m: Option<f64>,
         /// Standard error of `lost_motion_m`, m.
         pub lost_motion_se_m: Option<f64>,
-        /// Load zero fitted in this flight, N: reading of the load channel under no load.
+        /// Reading of the load channel under no load, fitted in this flight, N.
         pub load_zero_n: Option<f64>,
         /// Standard error of `load_zero_n`, N.
         pub load_zero_se_n: Option<f64>,
-        /// Delay of the load channel relative to the motor channel fitted in this flight, s; a lag included.
+        /// Delay of the load channel, lag included, relative to the motor channel, fitted in this flight, s.
         pub load_delay_s: Option<f64>,
         /// Standard error of `load_delay_s`, s.
         pub load_delay_se_s: Option<f64>,
         /// Friction of the screw in motion at the 95 % load, N.
         pub friction_n: Option<f64>,
-        /// ΔS by equations 29–31 with the stiffness, load zero and delays fitted in this flight, m: a check of `gap_m`.
+        /// `gap_midrange_m` with the fitted stiffness, load zero and delays, m: a check of `gap_m`.
         pub gap_midrange_fitted_m: Option<f64>,
         /// Standard error of `friction_n`, N.
         pub friction_se_n: Option<f64>,
@@ -126,14 +126,13 @@ stored_row! {
         pub friction_dry_n: Option<f64>,
         /// Standard error of `friction_dry_n`, N.
         pub friction_dry_se_n: Option<f64>,
-        /// Share of the load lost to friction fitted in this flight.
+        /// Share of the load that friction takes, fitted in this flight.
         pub friction_load_share: Option<f64>,
         /// Standard error of `friction_load_share`.
         pub friction_load_share_se: Option<f64>,
         /// Standard error of `nis`.
         pub nis_se: Option<f64>,
-        /// Largest gap along the stroke where the gap varies, m, averaged over an eighth of the stroke seen; `gap_m` is
-        /// then the mean over time.
+        /// Largest gap along the stroke, where the gap varies, m.
         pub gap_largest_m: Option<f64>,
         /// Standard error of `gap_largest_m`, m.
         pub gap_largest_se_m: Option<f64>,
@@ -143,11 +142,11 @@ stored_row! {
         pub preload_n: Option<f64>,
         /// Standard error of `preload_n`, N.
         pub preload_se_n: Option<f64>,
-        /// Places along the stroke, where the gap varies along it, as screw positions, m.
+        /// Screw positions of the gap profile, where the gap varies, m.
         pub gap_profile_at_m: Vec<f64>,
         /// Gap at each of `gap_profile_at_m`, m.
         pub gap_profile_m: Vec<f64>,
-        /// Standard error of each of `gap_profile_m`, m.
+        /// Standard error of `gap_profile_m`, m.
         pub gap_profile_se_m: Vec<f64>,
     }
 }

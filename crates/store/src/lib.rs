@@ -18,7 +18,7 @@
 //!
 //! One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
 //! one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
-//! `docs/store.md` explains the choice of Delta Lake, the layout and the guarantees.
+//! `docs/store.md` explains the layout and the guarantees.
 //!
 //! ```
 //! use store::{Holder, LogResult, Query, Store};

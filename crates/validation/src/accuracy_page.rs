@@ -15,7 +15,11 @@ pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchL
     let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
     let visible: Vec<&ErrorStats> = visible(stats).collect();
     text.replace("{{method}}", &job::METHOD_VERSION.to_string())
-        .replace("{{classes}}", &classes(&visible))
+        .replace(
+            "{{classes}}",
+            &classes(&visible.iter().copied().filter(|t| is_notable(t)).collect::<Vec<_>>()),
+        )
+        .replace("{{quiet}}", &visible.iter().filter(|t| !is_notable(t)).count().to_string())
         .replace("{{methods}}", &methods(&visible))
         .replace("{{alarms}}", &alarms(&visible))
         .replace("{{refusals}}", &refusals(stats))
@@ -34,6 +38,12 @@ fn visible(stats: &[ErrorStats]) -> impl Iterator<Item = &ErrorStats> {
     stats.iter().filter(|t| !matches!(t.kind, Kind::Blind(_)))
 }
 
+/// Whether the page lists a class: its P95 error is one per cent or one micrometre, too few intervals hold the true
+/// value, or a flight was refused that shows its gap.
+fn is_notable(t: &ErrorStats) -> bool {
+    t.errors[0].p95 >= 1.0 || t.coverage().0 < 0.9 || t.false_refusals() > 0
+}
+
 /// Contact regression: errors, coverage and refusals of every class.
 fn classes(stats: &[&ErrorStats]) -> String {
     let mut table = "| scenario | unit | median | P95 | worst | 90 % coverage [%] | refused |\n|---|---|---|---|---|---|---|\n".to_owned();
@@ -43,14 +53,13 @@ fn classes(stats: &[&ErrorStats]) -> String {
         let coverage = if t.estimated == 0 { "–".to_owned() } else { format!("{:.0}", 100.0 * share) };
         let _ = writeln!(
             table,
-            "| {} | {} | {} | {} | {} | {coverage} | {} of {} |",
+            "| {} | {} | {} | {} | {} | {coverage} | {} |",
             t.name,
             t.kind.unit(),
             digits(errors.median),
             digits(errors.p95),
             digits(errors.worst),
             t.false_refusals(),
-            t.flights,
         );
     }
     table
@@ -118,8 +127,7 @@ fn methods(stats: &[&ErrorStats]) -> String {
 
 /// Flags raised without cause, over all classes, and the class with the most of them.
 fn alarms(stats: &[&ErrorStats]) -> String {
-    let mut table =
-        "| flag | estimates | false alarms | most in one scenario |\n|---|---|---|---|\n".to_owned();
+    let mut table = "| flag | false alarms | most in one scenario |\n|---|---|---|\n".to_owned();
     let counted = || stats.iter().filter_map(|t| Some((t, t.false_alarms?)));
     let estimates: usize = counted().map(|(t, _)| t.estimated).sum();
     for (k, flag) in FALSE_ALARMS.iter().enumerate() {
@@ -127,21 +135,22 @@ fn alarms(stats: &[&ErrorStats]) -> String {
         let most = counted().max_by_key(|(_, alarms)| alarms[k]).filter(|(_, alarms)| alarms[k] > 0);
         let most = most
             .map_or("–".to_owned(), |(t, alarms)| format!("{} of {}: {}", alarms[k], t.estimated, t.name));
-        let _ = writeln!(table, "| `{flag}` | {estimates} | {all} | {most} |");
+        let _ = writeln!(table, "| `{flag}` | {all} of {estimates} | {most} |");
     }
     table
 }
 
-/// The codes of estimates and refusals, with how often each was given.
-fn flags(stats: &ErrorStats) -> String {
-    let codes: Vec<String> = stats.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
-    if codes.is_empty() { "–".to_owned() } else { codes.join(", ") }
+/// The codes of estimates and refusals, with how often each was given, `expected` first.
+fn flags(stats: &ErrorStats, expected: &str) -> String {
+    let mut codes: Vec<_> = stats.codes.iter().collect();
+    codes.sort_by_key(|(code, _)| code.as_str() != expected);
+    codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect::<Vec<_>>().join(", ")
 }
 
 /// Flights that cannot show a gap with the codes given, and the false refusals of all others.
 fn refusals(stats: &[ErrorStats]) -> String {
     let mut table =
-        "| flights that cannot show a gap | flights | estimated | expected code | codes given |\n|---|---|---|---|---|\n".to_owned();
+        "| flights that cannot show a gap | estimated | codes given, the expected one first |\n|---|---|---|\n".to_owned();
     let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
         stats.iter().partition(|t| t.must_refuse().is_some());
     if blind.is_empty() {
@@ -149,14 +158,8 @@ fn refusals(stats: &[ErrorStats]) -> String {
     }
     for t in &blind {
         let Some(code) = t.must_refuse() else { continue };
-        let _ = writeln!(
-            table,
-            "| {} | {} | {} | `{code}` | {} |",
-            t.name,
-            t.flights,
-            t.missed_refusals(),
-            flags(t)
-        );
+        let _ =
+            writeln!(table, "| {} | {} of {} | {} |", t.name, t.missed_refusals(), t.flights, flags(t, code));
     }
     let sum =
         |of: &[&ErrorStats], count: fn(&ErrorStats) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
@@ -217,6 +220,5 @@ fn gear_bench_table(rows: &[GearBenchLog]) -> String {
             );
         }
     }
-    let _ = writeln!(table, "\n{} logs.", rows.len());
     table
 }

@@ -43,12 +43,11 @@ impl Mapping {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Layout {
-    /// A row holds a sample of one channel, and this column names it; `column` of a channel is then
-    /// such a name.
+    /// The column that names the channel of each row; `column` of a channel is then such a name.
     pub name_column: Option<String>,
-    /// Where the value of such a row stands.
+    /// The column with the value of each row.
     pub value_column: Option<String>,
-    /// Each row belongs to one actuator, and this column names its position.
+    /// The column that names the position of each row.
     pub position_column: Option<String>,
 }
 
@@ -58,13 +57,13 @@ pub struct Layout {
 pub struct GroupMapping {
     /// Patterns of its files, from the folder of the configuration.
     pub files: Vec<String>,
-    /// Its clock; that of the main logs when not given.
+    /// Its clock. Default: that of the main logs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockMapping>,
-    /// Its layout; a row for each sample of every channel when not given.
+    /// Its layout. Default: wide.
     #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
-    /// How its flight is identified; as for the main logs when not given.
+    /// Identity of its flight. Default: as for the main logs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identity: Option<IdentityMapping>,
 }
@@ -76,33 +75,30 @@ pub struct GroupMapping {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
-    /// Key-value metadata of the Parquet footer: fact → key. Fields: `tail_number`, `flight_id`,
-    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
+    /// Key-value metadata of the Parquet footer: field → key. Fields: `tail_number`, `flight_id`, `departure_utc`,
+    /// `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
-    /// Columns that hold one value throughout the log: fact → column.
+    /// Columns with one value throughout the log: field → column.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<IdentityField, String>,
-    /// Whether rows name their flight, so that a file may hold many: each flight, by the columns of tail, flight id and
-    /// departure or landing, is a log of its own. A row without one of them is of no flight.
+    /// Whether each row names its flight, so that a file may hold many. A row that names none is ignored.
     #[serde(default, skip_serializing_if = "is_default")]
     pub by_row: bool,
-    /// A regular expression on the absolute path with named groups, e.g.
-    /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
+    /// A regular expression on the absolute path, with fields as named groups.
     pub path: Option<String>,
-    /// Folders called `name=value`, as Hive partitions are: fact → name.
+    /// Folders called `name=value`: field → name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub folders: BTreeMap<IdentityField, String>,
     /// Values for logs that do not hold them: field → value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
-    /// Registrations of aircraft that loggers call otherwise; the first that fits counts.
+    /// Registrations of aircraft that loggers call otherwise; the first match counts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tail_aliases: Vec<TailAlias>,
-    /// How departures are written, by `strftime` signs; ISO 8601 when not given.
+    /// `strftime` pattern of departures. Default: ISO 8601.
     pub departure_format: Option<String>,
-    /// The zone of departures that do not name one, e.g. `UTC` or `Europe/Istanbul`; without it such
-    /// a departure is refused rather than guessed.
+    /// Time zone of departures that name none, e.g. `UTC`; without it, such a departure is refused.
     pub time_zone: Option<String>,
 }
 
@@ -115,10 +111,10 @@ pub struct TailAlias {
     pub logged: String,
     /// Its registration.
     pub tail_number: String,
-    /// First day of departure, UTC, on which this holds, e.g. `"2026-03-01"`; any earlier one when not given.
+    /// First departure day, UTC, of this name, e.g. `"2026-03-01"`.
     #[schemars(with = "Option<String>")]
     pub from: Option<Date>,
-    /// Last day of departure on which this holds; any later one when not given.
+    /// Last departure day, UTC, of this name.
     #[schemars(with = "Option<String>")]
     pub until: Option<Date>,
 }
@@ -182,25 +178,24 @@ impl IdentityField {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClockMapping {
-    /// The time column. Not needed when `rate_hz` is given and rows are evenly spaced.
+    /// The time column; not needed for evenly spaced rows with `rate_hz`.
     pub column: Option<String>,
-    /// Its unit; not needed for Arrow timestamps and text. `count` is a counter of samples.
+    /// Unit of the column; `count` is a counter of samples. Not needed for Arrow timestamps and text.
     pub unit: Option<TimeUnit>,
-    /// What a column of numbers counts from: nothing that is known, 1970 UTC, midnight of the day of departure, or the
-    /// beginning of 1900 as spreadsheets have it (1899-12-30, local time).
+    /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time.
     #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
-    /// The raw value at which a counter starts again at zero, e.g. 65536.
+    /// The raw value at which a counter starts again at zero.
     pub wraps_at: Option<f64>,
-    /// The rate of the rows, Hz, where it is known better than from the stamps.
+    /// The rate of the rows, Hz, where timestamps are inexact.
     pub rate_hz: Option<f64>,
-    /// How coarsely the clock ticks, s: rows that share a stamp are spread evenly instead of left out.
+    /// Resolution of the clock, s: rows that share a timestamp are spread evenly.
     pub tick_s: Option<f64>,
-    /// How far stamps may fall back and still be put in order, s. Default 1.
+    /// How far timestamps may fall back and still be sorted, s. Default 1.
     pub max_back_s: Option<f64>,
-    /// The longest pause of one flight, s; a longer one separates two flights, and the log is refused. Default 3600.
+    /// The longest pause of one flight, s; a log with a longer one is refused. Default 3600.
     pub max_gap_s: Option<f64>,
-    /// Whether a log whose clock falls further is taken as several recordings, one after the other.
+    /// Whether a log whose clock falls back further holds several recordings.
     #[serde(default, skip_serializing_if = "is_default")]
     pub split_at_jumps: bool,
 }
@@ -225,7 +220,7 @@ pub enum Epoch {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channels {
-    /// Only these positions; all positions found in column names when not given.
+    /// Only these positions. Default: all that column names contain.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub positions: Vec<String>,
     /// Motor position: an angle at the motor, or already a length at the screw.
@@ -234,14 +229,14 @@ pub struct Channels {
     pub screw_position: Option<ChannelMapping>,
     /// Screw minus motor, where it is logged instead of the screw's own position.
     pub relative_position: Option<ChannelMapping>,
-    /// Whether the output moves: `moving` (default), or `locked` where it is fixed and the screw position is constant.
+    /// `moving` (default), or `locked` where the output is fixed and the screw position constant.
     #[serde(default, skip_serializing_if = "is_default")]
     pub output: Output,
     /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
     pub load: ChannelMapping,
     /// Temperature, where logged.
     pub temperature: Option<ChannelMapping>,
-    /// Conditions on other columns under which samples count; all must hold. Every sample when not given.
+    /// Conditions on other columns, which samples must meet.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub when: Vec<SampleFilter>,
 }
@@ -322,11 +317,9 @@ impl Channels {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelMapping {
-    /// The column's name; `{position}` stands for the actuator's place in a log that holds several.
-    /// `record.field` reaches into structs, and lists are read sample by sample.
+    /// The column; `{position}` stands for the actuator's position, `record.field` reaches into structs.
     pub column: String,
-    /// m, mm, um, in, deg, rad, rev for positions; N, kN, daN, lbf or N.m, lbf.in, lbf.ft for loads;
-    /// degC, degF, K for temperatures.
+    /// Unit of the position, load or temperature.
     pub unit: Unit,
     /// 1, or −1 where the log counts the other way.
     #[serde(default = "one_sign", skip_serializing_if = "is_one_sign")]
@@ -337,31 +330,31 @@ pub struct ChannelMapping {
     /// See `scale`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub offset: f64,
-    /// The raw value at which a turning sensor starts again, e.g. 360 in degrees: it is unwrapped.
+    /// The raw value at which a turning sensor starts again, e.g. 360 in degrees.
     pub wraps_at: Option<f64>,
     /// Raw values that mean "no value", e.g. −9999.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<f64>,
-    /// Turns of this sensor to one turn of the screw, where a gear lies between. Default 1.
+    /// Turns of this sensor for one turn of the screw. Default 1.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub gear_ratio: f64,
     /// A column that marks valid samples; `{position}` as in `column`.
     pub valid_column: Option<String>,
-    /// The values of `valid_column` that mean valid: numbers, texts, true or false. Default `[1]`, which is also *true*.
+    /// The values of `valid_column` that mean valid. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub valid_values: Vec<RawValue>,
-    /// Bits of a status word in `valid_column` that are all set in a valid sample, e.g. `0x60`; instead of `valid_values`.
+    /// Bits of `valid_column` that are all set in a valid sample, e.g. `0x60`.
     pub valid_bits: Option<u64>,
-    /// Bits of a status word in `valid_column` that are all clear in a valid sample.
+    /// Bits of `valid_column` that are all clear in a valid sample.
     pub invalid_bits: Option<u64>,
     /// Whether scale, offset and unit in the Arrow metadata of the column are ignored.
     #[serde(default, skip_serializing_if = "is_default")]
     pub ignore_metadata: bool,
-    /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
+    /// The `[group.…]` whose files hold this channel. Default: the main logs.
     pub group: Option<String>,
-    /// The channel's own time column, in the unit of the clock of its file.
+    /// The channel's own time column, in the unit of the clock.
     pub time_column: Option<String>,
-    /// The channel's own rate, Hz, where it is recorded more slowly than its rows.
+    /// The channel's own rate, Hz, where it is slower than its rows.
     pub rate_hz: Option<f64>,
     /// Time from the row's timestamp to the channel's sampling instant, s.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -369,7 +362,7 @@ pub struct ChannelMapping {
     /// Recording delay of the channel, s: logged(t) = true(t − latency).
     #[serde(default, skip_serializing_if = "is_default")]
     pub latency_s: f64,
-    /// Redundant channels, best first: the first usable one is read where this channel is not usable.
+    /// Redundant channels, best first, for logs in which this one is not usable.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ChannelMapping>,
     /// Texts for which the channel is 1, and 0 for every other; of a condition on a column of texts.

@@ -56,9 +56,9 @@ impl RawValue {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFilter {
-    /// The column's name; `{position}` stands for the actuator's place.
+    /// The column; `{position}` stands for the actuator's position.
     pub column: String,
-    /// Raw values that meet the condition: numbers, texts, true or false.
+    /// Raw values that meet the condition.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub equals: Vec<RawValue>,
     /// Lowest raw value that meets the condition.
@@ -67,11 +67,11 @@ pub struct SampleFilter {
     pub at_most: Option<f64>,
     /// Time that is excluded after the condition begins to hold and before it ends, s.
     pub margin_s: Option<f64>,
-    /// The name of the `[group.…]` whose files hold the column; the main logs when not given.
+    /// The `[group.…]` whose files hold the column. Default: the main logs.
     pub group: Option<String>,
     /// The column's own time column.
     pub time_column: Option<String>,
-    /// The column's own rate, Hz, where it is recorded more slowly than its rows.
+    /// The column's own rate, Hz, where it is slower than its rows.
     pub rate_hz: Option<f64>,
 }
 

@@ -31,34 +31,32 @@ pub const NOT_ASSESSED: &str = "not_assessed";
 /// Longest time limit of one message, s: a run waits for it.
 const MAX_TIMEOUT_S: f64 = 600.0;
 
-/// `[alerts.NAME]`: one channel for changes of state. It has one of `command`, `folder` and `url`.
+/// `[alerts.NAME]`: a receiver of changes of state; it has one of `command`, `folder` and `url`.
 #[skip_serializing_none]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AlertChannel {
-    /// Program and arguments, without a shell: it gets the message as JSON on standard input. Exit code 0 means sent.
+    /// Program and arguments, without a shell; it gets the message as JSON on standard input. Exit code 0 means sent.
     pub command: Option<Vec<String>>,
-    /// Variables of the environment that `command` gets in addition to `PATH`, `HOME`, `LANG` and a few others.
+    /// Environment variables that `command` gets in addition to `PATH`, `HOME`, `LANG` and a few others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pass_environment: Vec<String>,
     /// Folder that gets one JSON file per message, named after the alert's `id`.
     pub folder: Option<String>,
-    /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent; redirections are not followed.
+    /// Address that the message is posted to as JSON. An answer of 200 to 299 means sent.
     pub url: Option<String>,
-    /// New states that are sent: of the gap `normal`, `watch`, `unassessed`, `plan`, `act`, and `not_assessed` (removed,
-    /// or unassessed); of other quantities `normal`, `softening`, `friction_rising` and the others in the column `state` of
-    /// `freeplay trend --quantities`. Default: all but `normal` and
-    /// `not_assessed`.
+    /// New states that are sent: of the gap, `not_assessed` (removed, or unassessed), or of other quantities.
+    /// Default: all but `normal` and `not_assessed`.
     pub states: Vec<String>,
-    /// Only these part numbers, `*` and `?` stand for anything; every part when not given.
+    /// Only these part numbers, with `*` and `?`.
     pub parts: Vec<String>,
-    /// Only these tail numbers, in the same way.
+    /// Only these tail numbers, with `*` and `?`.
     pub tails: Vec<String>,
     /// Time limit of one message, s; at most 600. Default 30.
     pub timeout_s: f64,
     /// Whether a message that may have been received is sent again, with the same `id`. Default false.
     pub resend_unconfirmed: bool,
-    /// Whether messages are sent. Set it to false in the configuration of a trial. Default true.
+    /// Whether messages are sent. Default true.
     pub enabled: bool,
 }
 

@@ -74,35 +74,31 @@ pub struct Document {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSettings {
-    /// Patterns of log files, from the folder of this file, or `s3://`, `gs://`, `az://`: `*` within a name,
-    /// `**` across folders.
+    /// Patterns of log files: `*` within a name, `**` across folders.
     pub files: Vec<String>,
-    /// The installations table, CSV or Parquet.
+    /// The installations table.
     pub installations: String,
-    /// Units that were modified or re-identified, CSV or Parquet: `former_serial_number`, `serial_number`; optional
-    /// `former_part_number`, `part_number`. A unit keeps its history under its numbers of today.
+    /// Table of units that were modified or re-identified and keep their history: `former_serial_number`,
+    /// `serial_number`; optional `former_part_number`, `part_number`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aliases: Option<String>,
-    /// The flights table, CSV or Parquet: facts about flights that the logs do not hold.
+    /// The flights table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,
-    /// Tails that logs may be of, by a pattern of their paths from the folder of this file, such as
-    /// `"incoming/supplier/**" = ["N41?FP"]`. A log that names another tail is an error.
+    /// Tails that logs of a path may name, such as `"incoming/supplier/**" = ["N41?FP"]`; another tail is an error.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub tails: BTreeMap<String, Vec<String>>,
-    /// Whether files of one flight are its pieces, one after the other. Without it a second file of the
-    /// same flight is a copy of the first, or an error. `false`: logs with one flight id and different departures are
-    /// flights of their own, also within 12 hours.
+    /// Whether files of one flight are its consecutive pieces. `false`: logs with one flight id and different
+    /// departures are different flights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pieces: Option<bool>,
-    /// Patterns of logs whose errors are known: they are listed, and no longer make the exit code of later runs 1.
+    /// Patterns of logs whose errors are known: they no longer make the exit code of later runs 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub acknowledged_errors: Vec<String>,
-    /// The maintenance table, CSV or Parquet, if there is one.
+    /// The maintenance table.
     #[serde(default)]
     pub maintenance: Option<String>,
-    /// Hangar free-play checks, CSV or Parquet: `serial_number`, `date_utc`, `play_m`; optional
-    /// `part_number`, `instrument`, `force_n`.
+    /// The table of hangar free-play checks.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[serde(default)]
     pub inspections: Option<String>,
@@ -140,11 +136,11 @@ pub struct TableNames {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Override {
-    /// Tail numbers, `*` and `?` stand for anything; every aircraft when not given.
+    /// Tail numbers, with `*` and `?`. Default: all.
     pub tails: Vec<String>,
-    /// Part numbers, in the same way; every part when not given.
+    /// Part numbers, with `*` and `?`. Default: all.
     pub parts: Vec<String>,
-    /// Keys of `[clock]` that differ; not for single parts, since a log has one clock.
+    /// Keys of `[clock]` that differ; not for single parts.
     #[schemars(with = "Option<ClockMapping>")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock: Option<toml::Table>,
@@ -170,7 +166,7 @@ fn require_nothing(schema: &mut serde_json::Value) {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StoreSettings {
-    /// Folder of the results, or `s3://`, `gs://`, `az://` and a prefix. Default `results`.
+    /// Folder, or bucket address and prefix, of the results. Default `results`.
     pub path: String,
 }
 
@@ -184,12 +180,11 @@ impl Default for StoreSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
-    /// Memory limit of all actuators in progress, MiB, at 40 bytes per sample: an actuator waits until its channels
-    /// fit, and one is always admitted. No limit by default.
+    /// Memory of all actuators in progress, MiB. No limit by default.
     pub memory_mib: Option<u64>,
-    /// A log that takes longer than this, s, ends as an error of that log, and the run goes on. Default 600.
+    /// A log that takes longer, s, ends as an error of that log. Default 600.
     pub log_timeout_s: f64,
-    /// A log or a table that claims more rows is refused before it is read. Default 200,000,000.
+    /// A log or table that claims more rows is refused. Default 200,000,000.
     pub max_rows: u64,
 }
 
@@ -203,10 +198,9 @@ impl Default for RunSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectSettings {
-    /// A request without a complete answer is aborted after this time, s, and repeated.
-    /// Default 30.
+    /// A request without a complete answer is repeated after this time, s. Default 30.
     pub timeout_s: f64,
-    /// A request is not repeated after this time, s, and the log fails. Default 180.
+    /// A request is not repeated after this time, s. Default 180.
     pub give_up_s: f64,
 }
 
@@ -261,26 +255,24 @@ pub struct EstimateSettings {
 pub struct TrendSettings {
     /// A limit that may be reached within these flight hours makes state `plan`. Default 500.
     pub planning_horizon_hours: f64,
-    /// A crossing of the limit after more than these flight hours is not reported. Default 20 000.
+    /// A later crossing of the limit is not reported, flight hours. Default 20 000.
     pub horizon_hours: f64,
     /// Days without a sound record after which a unit is `unassessed`. Default 30.
     pub stale_after_days: f64,
-    /// Flight hours until the next check, for the probability of reaching the limit before it. Default 300.
+    /// Flight hours until the next check, for `check_probability`. Default 300.
     pub next_check_hours: f64,
-    /// Without effect since inspection intervals are no longer advised; accepted so that older files still load.
+    /// Without effect; accepted so that older files load.
     #[serde(skip_serializing)]
     pub inspection_risk: Option<f64>,
-    /// Date of assessments without `--as-of`: `now`, the time of the run, or `newest_record`, for data of the past.
-    /// Default `now`.
+    /// Date of assessments without `--as-of`. Default `now`.
     pub as_of: AsOf,
-    /// What wear follows: `hours`, `flights` or `reversals`; by default the one that fits each
-    /// part number's histories best. A part's `axis` takes precedence.
+    /// What wear follows. Default: what fits the histories of each part number best.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
     /// Removal limit of parts without a `limit_m` of their own, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_m: Option<f64>,
-    /// Changes of the other followed quantities from which there is a state.
+    /// Limits of the other followed quantities.
     pub quantity_limits: QuantityLimits,
 }
 

@@ -130,8 +130,8 @@ fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
     let what = format!("`{key}` is {value:e}, outside the plausible range {least:e} to {most:e}");
     Some(Diagnostic::new("out_of_range", what).hint(match key {
         "limit_m" | "watch_m" => "limits are in metres: 150 µm is 150e-6",
-        "stiffness_n_per_m" => "stiffness is in N/m: 50 N/µm is 5e7; ranges are in docs/configuration.md",
-        _ => "check the unit that ends the key's name; ranges are in docs/configuration.md",
+        "stiffness_n_per_m" => "stiffness is in N/m: 50 N/µm is 5e7; ranges are in docs/keys.md",
+        _ => "check the unit that ends the key's name; ranges are in docs/keys.md",
     }))
 }
 

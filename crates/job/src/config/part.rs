@@ -61,10 +61,10 @@ pub enum LimitedGap {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartSettings {
-    /// Whether the values are placeholders: a run refuses the part until they are those of its data sheet.
+    /// Whether the values are placeholders, which a run refuses.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub placeholder: bool,
-    /// `linear` (default) or `rotary`.
+    /// Default `linear`.
     pub kind: Kind,
     /// Linear: axial stiffness K, N/m.
     pub stiffness_n_per_m: Option<f64>,
@@ -72,7 +72,7 @@ pub struct PartSettings {
     pub damping_n_s_per_m: Option<f64>,
     /// Linear: mass of the screw, kg.
     pub screw_mass_kg: Option<f64>,
-    /// Linear: travel for one turn of the motor, m; needed when a channel is an angle or a torque.
+    /// Linear: travel for one turn of the motor, m; needed for an angle or a torque.
     pub lead_m_per_rev: Option<f64>,
     /// Rotary: torsional stiffness, N·m/rad.
     pub stiffness_nm_per_rad: Option<f64>,
@@ -80,12 +80,12 @@ pub struct PartSettings {
     pub damping_nm_s_per_rad: Option<f64>,
     /// Rotary: inertia of the driven side, kg·m².
     pub inertia_kg_m2: Option<f64>,
-    /// Rotary: the radius at which the gap is stated, m: `gap_m` = radius × radians.
+    /// Rotary: radius at which the gap is measured, m.
     pub reference_radius_m: Option<f64>,
-    /// `moving` (default), or `locked` where the output is fixed: the screw position is constant and needs no channel.
+    /// `moving` (default), or `locked` where the output is fixed and the screw position constant.
     #[serde(skip_serializing_if = "Output::is_moving")]
     pub output: Output,
-    /// Load between whose positive and negative value lost motion is stated, N.
+    /// Load, positive and negative, at which lost motion is measured, N.
     pub reference_load_n: Option<f64>,
     /// What the sensors and the model do not know.
     pub noise: Option<NoiseSettings>,
@@ -93,13 +93,13 @@ pub struct PartSettings {
     pub limit_m: Option<f64>,
     /// Alert level, m: state `watch` at or above.
     pub watch_m: Option<f64>,
-    /// The gap that limits, trend and forecast apply to: `mean` over the stroke (default), or `largest` along it.
+    /// Gap that limits, trend and forecast apply to: `mean` over the stroke (default), or the largest along it.
     pub limit_applies_to: Option<LimitedGap>,
-    /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
+    /// What wear follows. Default: that of `[trend]`.
     pub axis: Option<WearAxis>,
-    /// Action in state `act`: `replace` (default) or `inspect`.
+    /// Action in state `act`. Default `replace`.
     pub at_limit: Option<AtLimit>,
-    /// Changes of its other followed quantities from which there is a state, where they differ from those of `[trend]`.
+    /// Limits of its other followed quantities, where they differ from those of `[trend]`.
     pub quantity_limits: Option<QuantityLimits>,
 }
 
@@ -121,7 +121,7 @@ pub enum NoiseModel {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseSettings {
-    /// `sensors` (default), `per_step` or `continuous`.
+    /// Default `sensors`.
     pub model: NoiseModel,
     /// Noise of the screw position, rms, m.
     pub screw_rms_m: Option<f64>,
@@ -131,7 +131,7 @@ pub struct NoiseSettings {
     pub motor_rms_m: Option<f64>,
     /// Its smallest step, m.
     pub motor_resolution_m: Option<f64>,
-    /// Rms of the force the model does not know, mainly friction, N.
+    /// Rms of the force outside the model, mainly friction, N.
     pub unknown_force_n: Option<f64>,
     /// Rotary: noise of the driven angle, rms, rad.
     pub screw_rms_rad: Option<f64>,
@@ -141,9 +141,9 @@ pub struct NoiseSettings {
     pub motor_rms_rad: Option<f64>,
     /// Rotary: its smallest step, rad.
     pub motor_resolution_rad: Option<f64>,
-    /// Rotary: rms of the torque the model does not know, N·m.
+    /// Rotary: rms of the torque outside the model, N·m.
     pub unknown_torque_nm: Option<f64>,
-    /// The bandwidth in which the backlash may move, Hz; 10–20 does well.
+    /// Bandwidth of the backlash, Hz; 10 to 20 is suitable.
     pub bandwidth_hz: Option<f64>,
     /// `per_step`: process noise covariance, states δX, δẊ, S, SI.
     pub w_d: Option<[[f64; 3]; 3]>,
@@ -174,7 +174,7 @@ pub struct Part {
     pub initial: estimator::InitialVariances,
     /// Whether its output is fixed: the relative position is then minus the motor position.
     pub output_locked: bool,
-    /// Load between whose positive and negative value lost motion is stated, N.
+    /// Load, positive and negative, at which lost motion is measured, N.
     pub reference_load_n: Option<f64>,
     /// Removal limit, m.
     pub limit_m: Option<f64>,

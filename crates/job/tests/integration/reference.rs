@@ -5,16 +5,21 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use job::config::Document;
+use job::config::limits::PLAUSIBLE;
 use serde_json::Value;
 
 #[test]
 fn the_reference_of_keys_is_what_the_types_say() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/keys.md");
-    let mut page = "# Every key of `pipeline.toml`\n\nWritten from the types (`FREEPLAY_BLESS=1 cargo test -p job \
-                    reference`), so it cannot drift; a test compares it.\n[configuration.md](configuration.md) \
-                    explains, this page lists.\n"
+    let mut page = "# Every key of `pipeline.toml`\n\nWritten from the types by a test. \
+                    [Configuration](configuration.md) explains; this page lists. A number\noutside its range is \
+                    refused (`out_of_range`): it is usually in another unit. The range of a signed key is that of \
+                    its amount.\n"
         .to_owned();
-    section(&mut page, "", &Document::schema(), &mut Tables::new());
+    let mut tables = Tables::default();
+    section(&mut page, "", "", &Document::schema(), &mut tables);
+    page.push_str("\n## Tables with the keys of another\n\n| table | keys as in |\n|---|---|\n");
+    page.push_str(&tables.repeated);
     if std::env::var_os("FREEPLAY_BLESS").is_some() {
         std::fs::write(&file, &page).unwrap();
     }
@@ -25,15 +30,16 @@ fn the_reference_of_keys_is_what_the_types_say() {
     );
 }
 
-/// Tables so far, and where each is first written: repeated types are written once.
-type Tables = BTreeMap<String, String>;
+/// Tables so far: where each is written, by its rows, and the tables with rows that are written already.
+#[derive(Default)]
+struct Tables {
+    first: BTreeMap<String, String>,
+    repeated: String,
+}
 
-/// A table of the keys of one object, then a section for each object below it.
-fn section(page: &mut String, path: &str, schema: &Value, tables: &mut Tables) {
+/// A table of the keys of one object, then a section for each object below it. `said` is what the table above says of it.
+fn section(page: &mut String, path: &str, said: &str, schema: &Value, tables: &mut Tables) {
     let Some(keys) = schema.get("properties").and_then(Value::as_object) else { return };
-    if !path.is_empty() {
-        let _ = write!(page, "\n## `{path}`\n\n{}\n", text(schema));
-    }
     let required: Vec<&str> =
         schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     let (mut table, mut keys_only) = (String::new(), String::new());
@@ -41,20 +47,33 @@ fn section(page: &mut String, path: &str, schema: &Value, tables: &mut Tables) {
     for (key, value) in keys {
         // Overrides need no key, and their keys are those of the tables that they override.
         let needed = if required.contains(&key.as_str()) { ", needed" } else { "" };
-        let row = |needed: &str| format!("| `{key}` | {}{needed} | {} |\n", kind(value), text(value));
+        let row =
+            |needed: &str| format!("| `{key}` | {}{needed} | {}{} |\n", kind(value), text(value), range(key));
         table.push_str(&row(needed));
         keys_only.push_str(&row(""));
-        below.extend(inner(key, value, path));
+        below.extend(inner(key, value, path).map(|(path, schema)| (path, text(value), schema)));
     }
-    if let Some(first) = tables.get(&keys_only) {
-        let _ = writeln!(page, "\nKeys as in `{first}`.");
+    if let Some(first) = tables.first.get(&keys_only) {
+        let _ = writeln!(tables.repeated, "| `{path}` | `{first}` |");
         return;
     }
-    let _ = write!(page, "\n| key | is | meaning |\n|---|---|---|\n{table}");
-    tables.insert(keys_only, path.to_owned());
-    for (path, schema) in below {
-        section(page, &path, schema, tables);
+    if !path.is_empty() {
+        let _ = write!(page, "\n## `{path}`\n");
+        if text(schema) != said {
+            let _ = write!(page, "\n{}\n", text(schema));
+        }
     }
+    let _ = write!(page, "\n| key | is | meaning |\n|---|---|---|\n{table}");
+    tables.first.insert(keys_only, path.to_owned());
+    for (path, said, schema) in below {
+        section(page, &path, &said, schema, tables);
+    }
+}
+
+/// The plausible range of a number.
+fn range(key: &str) -> String {
+    let listed = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
+    listed.map_or_else(String::new, |(_, least, most)| format!(" Range {least:e} to {most:e}."))
 }
 
 /// The object in a value, and what its table is called; alternatives of a channel are channels again.

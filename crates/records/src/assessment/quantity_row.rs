@@ -154,32 +154,31 @@ row! {
         pub part_number: Option<String>,
         /// Serial number of the unit.
         pub serial_number: String,
-        /// Tail of the unit's last flight.
+        /// Tail and position of the unit's last flight.
         pub tail_number: Option<String>,
-        /// Position of the unit's last flight.
+        /// Tail and position of the unit's last flight.
         pub position: Option<String>,
-        /// Date of the assessment.
+        /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
         /// Column of the records that is followed: `stiffness_n_per_m`, `friction_n`, …
         pub quantity: &'static str,
-        /// Flights used: at most three years, since the last recorded maintenance; of load zero and NIS, since the unit
-        /// is at its position; of delays, all flights at the position.
+        /// Flights used, since the last recorded maintenance and for three years at most.
         pub flights: i64,
         /// Flights excluded as outliers.
         pub outliers: i64,
-        /// Departure of the first of them.
+        /// Departure of the first flight used.
         pub since_utc: Option<Timestamp>,
-        /// Fitted value at the first flight, at the part's usual temperature and load.
+        /// Value at the first flight, at the part's usual temperature and load.
         pub baseline: Option<f64>,
-        /// Fitted value now, without what the units of the part share from week to week.
+        /// Level now, without what the units of the part share.
         pub level: Option<f64>,
         /// Standard error of `level`.
         pub level_se: Option<f64>,
-        /// `level` less `baseline`; zero where nothing changed significantly, and without the steps of tail or part.
+        /// `level` less `baseline`, without the steps of tail or part; zero where no change is significant.
         pub change: Option<f64>,
         /// Standard error of `change`.
         pub change_se: Option<f64>,
-        /// Rate of change without the steps, per flight hour; null for delays, which are those of a position.
+        /// Rate of change without the steps, per flight hour; null for delays.
         pub rate_per_hour: Option<f64>,
         /// Standard error of `rate_per_hour`.
         pub rate_se_per_hour: Option<f64>,
@@ -212,11 +211,11 @@ row! {
         pub scope: &'static str,
         /// `step` or `drift`.
         pub kind: &'static str,
-        /// The part; of a tail's change, none.
+        /// The part; null for a change of a tail.
         pub part_number: Option<String>,
-        /// The tail; of a part's change, none.
+        /// The tail; null for a change of a part.
         pub tail_number: Option<String>,
-        /// The unit; of a tail's or part's change, none.
+        /// The unit; null for a change of a tail or part.
         pub serial_number: Option<String>,
         /// Positions that changed.
         pub positions: Vec<String>,
@@ -224,18 +223,18 @@ row! {
         pub units: i64,
         /// Units with flights enough to show it.
         pub units_able: i64,
-        /// First flight of the new level; of a drift, the flight at which it passed half of its size.
+        /// First flight of the new level; for a drift, that at half of its size.
         pub since_utc: Timestamp,
-        /// Value before; of several units, their median.
+        /// Value before and after; of several units, the median.
         pub from: f64,
-        /// Value after.
+        /// Value before and after; of several units, the median.
         pub to: f64,
-        /// Standard error of the change; of several units, of the first of them.
+        /// Standard error of the change; of several units, that of the first.
         pub change_se: f64,
-        /// State that follows from it: of a tail `recorder_moved`, of a part `settings_moved`, of a unit as in the quantity
-        /// table; or null.
+        /// State that follows: `recorder_moved` for a tail, `settings_moved` for a part, for a unit as in the
+        /// quantities table.
         pub state: Option<&'static str>,
-        /// What changed, by how much, and why it is theirs, in words.
+        /// What changed, by how much, and why it is attributed to this scope, in words.
         pub evidence: String,
     }
 }

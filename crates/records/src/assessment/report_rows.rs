@@ -23,19 +23,19 @@ row! {
         pub departure_utc: Timestamp,
         /// The unit's hours after this flight.
         pub unit_hours: Option<f64>,
-        /// Gap, m; null where the flight is rejected.
+        /// Gap, m; null for a rejected flight.
         pub gap_m: Option<f64>,
-        /// 5 % bound of the gap, m.
+        /// 5 % and 95 % bound of the gap, m.
         pub gap_p05_m: Option<f64>,
-        /// 95 % bound of the gap, m.
+        /// 5 % and 95 % bound of the gap, m.
         pub gap_p95_m: Option<f64>,
         /// Gap by the published statistic (equations 29–31), m.
         pub gap_midrange_m: Option<f64>,
         /// Load reversals.
         pub load_reversals: Option<i64>,
-        /// 5 % quantile of the load, N.
+        /// 5 % and 95 % quantile of the load, N.
         pub load_p05_n: Option<f64>,
-        /// 95 % quantile of the load, N.
+        /// 5 % and 95 % quantile of the load, N.
         pub load_p95_n: Option<f64>,
         /// Rejection reason or quality flags.
         pub remarks: String,
@@ -56,9 +56,9 @@ row! {
         pub at_utc: Timestamp,
         /// Gap, m: median.
         pub gap_m: f64,
-        /// 5 % bound, m.
+        /// 5 % and 95 % bound, m.
         pub gap_p05_m: f64,
-        /// 95 % bound, m.
+        /// 5 % and 95 % bound, m.
         pub gap_p95_m: f64,
     }
 }
@@ -114,7 +114,7 @@ row! {
         pub date_utc: Timestamp,
         /// Measured play, m.
         pub play_m: f64,
-        /// Median of the last estimates before it, m; null where none is recent.
+        /// Median of the last estimates before the inspection, m.
         pub estimate_m: Option<f64>,
         /// Number of these estimates.
         pub estimates: i64,
@@ -151,10 +151,10 @@ row! {
         /// Forecast for the date of the report, m: median.
         #[serde(rename = "foreseen_m")]
         pub predicted_m: f64,
-        /// Its 5 % bound, m.
+        /// 5 % and 95 % bound, m.
         #[serde(rename = "foreseen_low_m")]
         pub predicted_p05_m: f64,
-        /// Its 95 % bound, m.
+        /// 5 % and 95 % bound, m.
         #[serde(rename = "foreseen_high_m")]
         pub predicted_p95_m: f64,
         /// Gap found on the date of the report, m.
@@ -177,9 +177,9 @@ row! {
         pub month: String,
         /// Expected number of units that reach their limit.
         pub expected: f64,
-        /// 5 % bound of that number.
+        /// 5 % and 95 % bound of `expected`.
         pub low: f64,
-        /// 95 % bound of that number.
+        /// 5 % and 95 % bound of `expected`.
         pub high: f64,
     }
 }

@@ -36,19 +36,19 @@ row! {
         pub part_number: Option<String>,
         /// Serial number of the unit.
         pub serial_number: String,
-        /// Tail of the unit's last flight.
+        /// Tail and position of the unit's last flight.
         pub tail_number: Option<String>,
-        /// Position of the unit's last flight.
+        /// Tail and position of the unit's last flight.
         pub position: Option<String>,
-        /// Date of the assessment: the time of the run, unless `--as-of` or `trend.as_of` sets it. Later data are ignored.
+        /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
         /// Flights.
         pub flights: i64,
         /// The unit's hours.
         pub unit_hours: Option<f64>,
-        /// Measured level of the gap at the last record of the installation, m.
+        /// Level of the gap at the last record of the installation, m.
         pub gap_m: Option<f64>,
-        /// Standard error of `gap_m`, from the errors and the scatter of its records, m.
+        /// Standard error of `gap_m`, m.
         pub gap_se_m: Option<f64>,
         /// Records that `gap_m` rests on.
         pub gap_records: Option<i64>,
@@ -56,9 +56,9 @@ row! {
         pub latest_utc: Option<Timestamp>,
         /// Gap of the latest record, m.
         pub latest_gap_m: Option<f64>,
-        /// Standard error of `latest_gap_m`, with the scatter found between flights, m.
+        /// Standard error of `latest_gap_m`, m.
         pub latest_gap_se_m: Option<f64>,
-        /// Spread of what an installation adds to every gap measured in it, m; no part of `gap_se_m`.
+        /// Spread of the bias that an installation adds to its gaps, m; not part of `gap_se_m`.
         pub installation_sd_m: Option<f64>,
         /// Flights with a gap.
         pub estimates: i64,
@@ -68,12 +68,11 @@ row! {
         pub noise_factor: f64,
         /// Growth rate, m per flight hour.
         pub rate_m_per_hour: Option<f64>,
-        /// 5 % bound of the growth rate, m per flight hour.
+        /// 5 % and 95 % bound of the growth rate, m per flight hour.
         pub rate_p05_m_per_hour: Option<f64>,
-        /// 95 % bound of the growth rate, m per flight hour.
+        /// 5 % and 95 % bound of the growth rate, m per flight hour.
         pub rate_p95_m_per_hour: Option<f64>,
-        /// `wearing` (growth probability above 95 %), `steady` (below one half), `unknown` (between, or too few
-        /// estimates).
+        /// `wearing`, `steady` or `unknown`, by `growth_probability`.
         pub trend: &'static str,
         /// Probability of growth of 2 % of the limit or more.
         pub growth_probability: Option<f64>,
@@ -81,42 +80,43 @@ row! {
         pub wear_law: Option<String>,
         /// Probability of `wear_law`.
         pub wear_law_probability: Option<f64>,
-        /// Measure that the wear of the part number follows, as found or configured: `flight_hours`, `flights` or
-        /// `load_reversals`.
+        /// What the wear of the part number follows: `flight_hours`, `flights` or `load_reversals`.
         pub usage_axis: Option<String>,
-        /// Null: the Mann–Kendall test is no longer made. The column stays for scripts that select it.
+        /// Always null; kept for scripts that select it.
         pub trend_p_value: Option<f64>,
         /// Change points: `departure_utc`, `flight_id`, `kind`, `step_m`, `step_se_m`, `certainty`, `tail_wide`.
         pub change_points: Vec<ChangePoint>,
         /// Act limit, m.
         pub limit_m: Option<f64>,
-        /// Flight hours to `limit_m`, earliest (5 %); null beyond the horizon, 0 at or above the limit.
+        /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
+        /// the limit.
         pub crossing_hours_p05: Option<f64>,
-        /// Flight hours to `limit_m`, median.
+        /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
+        /// the limit.
         pub crossing_hours_p50: Option<f64>,
-        /// Flight hours to `limit_m`, latest (95 %).
+        /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
+        /// the limit.
         pub crossing_hours_p95: Option<f64>,
-        /// Flights to `limit_m`, earliest (5 %), at the unit's utilisation of the last ninety days.
+        /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p05: Option<f64>,
-        /// Flights to `limit_m`, median.
+        /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p50: Option<f64>,
-        /// Flights to `limit_m`, latest (95 %).
+        /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p95: Option<f64>,
-        /// Date on which `limit_m` is reached, earliest (5 %): from the last flight on, at `hours_per_day`. It does not move
-        /// with `as_of_utc`, and may have passed.
+        /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub not_before_utc: Option<Timestamp>,
-        /// Date on which `limit_m` is reached, median.
+        /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub likely_utc: Option<Timestamp>,
-        /// Date on which `limit_m` is reached, latest (95 %).
+        /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub not_after_utc: Option<Timestamp>,
-        /// What the crossing follows from: `measured` (at the limit), `fleet` (wear laws by the part's fleet), `single_unit`
-        /// (wear laws by the unit alone), `line` (the last records).
+        /// Source of the crossing: `measured` (at the limit), `fleet` or `single_unit` (wear laws with or without the
+        /// fleet prior), `line` (the last records).
         pub forecast_method: Option<&'static str>,
-        /// Probability of reaching the limit within `next_check_hours`, from the curves alone.
+        /// Probability of reaching the limit within `next_check_hours`.
         pub check_probability: Option<f64>,
         /// Probability that the gap is at or above `limit_m` on `as_of_utc`.
         pub over_limit_probability: Option<f64>,
-        /// Flight hours per day in the last ninety days; dates, the report's chart and its removals use it.
+        /// Flight hours per day in the last ninety days.
         pub hours_per_day: Option<f64>,
         /// Standard error of `hours_per_day`.
         pub hours_per_day_se: Option<f64>,
@@ -124,12 +124,11 @@ row! {
         pub flights_per_day: Option<f64>,
         /// Flight hours per flight in the last ninety days.
         pub hours_per_flight: Option<f64>,
-        /// Source of the hours: `flights_table`, `tail_hours` or `logged_flights` (flights without a log are then
-        /// missing).
+        /// Source of the hours: `flights_table`, `tail_hours` or `logged_flights`.
         pub usage_source: Option<String>,
         /// Days since the last sound record, when more than `stale_after_days`.
         pub stale_days: Option<f64>,
-        /// Removal date of a unit that is installed nowhere on `as_of_utc`; it has no state and no dates.
+        /// Date of the removal, if the unit is installed nowhere on `as_of_utc`.
         pub removed_utc: Option<Timestamp>,
         /// `normal`, `watch`, `unassessed`, `plan`, `act`, from least to most urgent; null for a removed unit.
         pub state: Option<&'static str>,
@@ -139,17 +138,13 @@ row! {
         pub reason_code: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,
-        /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
-        /// quantities table.
+        /// States of the unit's other followed quantities.
         pub conditions: Vec<String>,
-        /// What the state asks for: `replace` (state `act`, or `inspect` where the part's `at_limit` asks for it), `inspect`
-        /// (`plan`, `watch`, or another quantity changed), `check_logs` or `set_limit` (`unassessed`), or null.
+        /// `replace`, `inspect`, `check_logs`, `set_limit` or null.
         pub action: Option<&'static str>,
-        /// Date until when: `as_of_utc` to replace, or to inspect after a jump; `not_before_utc` to inspect; null where it
-        /// is not known.
+        /// Date by which the action is due; null where it is not known.
         pub due_utc: Option<Timestamp>,
-        /// Gap that `limit_m`, and every gap of this row, is about: `mean` over the stroke, or `largest` along it (the part's
-        /// `limit_applies_to`); null without a limit.
+        /// Gap that the row is about: `mean` or `largest` (the part's `limit_applies_to`); null without a limit.
         pub limit_applies_to: Option<&'static str>,
         /// Flight hours since the last flight, at the unit's own rate.
         #[serde(skip)]

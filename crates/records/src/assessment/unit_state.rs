@@ -25,7 +25,7 @@ stored_row! {
         pub settings_digest: Option<String>,
         /// Change points of the gap: kind and departure of the first flight after it.
         pub change_points: Vec<String>,
-        /// Date of the assessment.
+        /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
         /// The run.
         pub run_id: String,

@@ -42,15 +42,15 @@ stored_row! {
     /// One change of state, or its message in one channel.
     #[derive(Debug, Clone, PartialEq)]
     pub struct AlertRecord {
-        /// Identifier of the change, part of every message about it. With `channel` the key of the row: the newest row counts.
+        /// Identifier of the change. Of the rows with one `alert_id` and `channel`, the newest counts.
         pub alert_id: String,
-        /// Channel of the message, as named under `[alerts]`; empty in the row of the change itself.
+        /// Channel of the message, as named under `[alerts]`; empty in the row of the change.
         pub channel: String,
         /// `change`, or `baseline` for the states that were known when alerts began.
         pub kind: String,
         /// Part number of the unit, or the part that changed.
         pub part_number: Option<String>,
-        /// Serial number of the unit; empty for a tail or a part, and in the summary of a baseline.
+        /// Serial number of the unit; empty for a tail, a part or a baseline.
         pub serial_number: Option<String>,
         /// The aircraft of its latest flight, or the one that changed.
         pub tail_number: Option<String>,
@@ -60,15 +60,15 @@ stored_row! {
         pub quantity: String,
         /// Number of the change of this unit and quantity, from 0 for the baseline.
         pub change_number: i64,
-        /// State before the change; empty when none was known.
+        /// State before and after the change; empty when there is none.
         pub from_state: Option<String>,
-        /// State after the change; empty when the unit is not assessed.
+        /// State before and after the change; empty when there is none.
         pub to_state: Option<String>,
-        /// First flight of a change that a tail or a part made; empty for a unit's state.
+        /// First flight of a change of a tail or part.
         pub since_utc: Option<Timestamp>,
-        /// Date of the assessment.
+        /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
-        /// The message, JSON: what is sent in every attempt.
+        /// The message that is sent, JSON.
         pub message: Option<String>,
         /// `recorded`, `pending`, `sending`, `sent`, `unconfirmed` or `dropped`.
         pub status: AlertStatus,

@@ -26,21 +26,21 @@ row! {
         pub quantity: String,
         /// Reason of the latest known state.
         pub finding: Option<String>,
-        /// Date until when, of the present assessment of an open request: `due_utc` of the trend.
+        /// Due date in the latest assessment, `due_utc` of the trend.
         pub due_utc: Option<Timestamp>,
         /// Date of the assessment that opened the request.
         pub opened_utc: Timestamp,
-        /// Who acknowledged, deferred or closed it last; `freeplay` when a table closed it.
+        /// Who decided last; `freeplay` when a table closed the request.
         pub by: Option<String>,
         /// Their reason.
         pub reason: Option<String>,
-        /// Of a deferred request: until when.
+        /// End of a deferral.
         pub until_utc: Option<Timestamp>,
         /// Date of the latest event.
         pub changed_utc: Timestamp,
-        /// What closed it: `removed`, `maintained` or `closed` by a person.
+        /// `removed`, `maintained` or, by a person, `closed`.
         pub closed_by: Option<String>,
-        /// Date of the removal, the repair or the command that closed it.
+        /// Date of the removal, maintenance or command.
         pub closed_utc: Option<Timestamp>,
     }
 }

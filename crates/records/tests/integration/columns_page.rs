@@ -15,21 +15,21 @@ use records::{AlertRecord, GapRecord, QuantityChange, QuantityRow, TrendRow, Wor
 fn the_page_lists_every_column_with_its_type_and_meaning() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/columns.md");
     let page = std::fs::read_to_string(&file).unwrap();
-    let mut expected = page.clone();
+    let (mut expected, mut former) = (page.clone(), Vec::new());
     for (name, table) in [
-        ("records", table::<GapRecord>()),
-        ("trends", table::<TrendRow>()),
-        ("quantities", table::<QuantityRow>()),
-        ("changes", table::<QuantityChange>()),
-        ("work requests", table::<WorkRequest>()),
-        ("alerts", table::<AlertRecord>()),
-        ("report flights", table::<ReportFlightRow>()),
-        ("report gaps", table::<ReportGapRow>()),
-        ("report past forecasts", table::<ReportPastForecastRow>()),
-        ("report inspections", table::<ReportInspectionRow>()),
-        ("report removals", table::<ReportRemovalsRow>()),
-        ("report tails", table::<ReportTailRow>()),
-        ("report log errors", table::<ReportLogErrorRow>()),
+        ("records", table::<GapRecord>(&mut former)),
+        ("trends", table::<TrendRow>(&mut former)),
+        ("quantities", table::<QuantityRow>(&mut former)),
+        ("changes", table::<QuantityChange>(&mut former)),
+        ("work requests", table::<WorkRequest>(&mut former)),
+        ("alerts", table::<AlertRecord>(&mut former)),
+        ("report flights", table::<ReportFlightRow>(&mut former)),
+        ("report gaps", table::<ReportGapRow>(&mut former)),
+        ("report past forecasts", table::<ReportPastForecastRow>(&mut former)),
+        ("report inspections", table::<ReportInspectionRow>(&mut former)),
+        ("report removals", table::<ReportRemovalsRow>(&mut former)),
+        ("report tails", table::<ReportTailRow>(&mut former)),
+        ("report log errors", table::<ReportLogErrorRow>(&mut former)),
     ] {
         let (begin, end) = (format!("<!-- columns of {name} -->\n"), "<!-- end -->");
         let (before, rest) = expected.split_once(&begin).unwrap();
@@ -42,13 +42,41 @@ fn the_page_lists_every_column_with_its_type_and_meaning() {
     assert_eq!(std::fs::read_to_string(&file).unwrap(), expected);
 }
 
-fn table<R: Row>() -> String {
-    let mut table = "| column | type | meaning |\n|---|---|---|\n".to_owned();
-    for column in row_schema::columns::<R>() {
+/// A row for each column; columns with one meaning share a row, and a standard error that of its column. Below the
+/// table, the columns of a former table.
+fn table<R: Row>(former: &mut Vec<Column>) -> String {
+    let (known, new): (Vec<Column>, Vec<Column>) =
+        row_schema::columns::<R>().into_iter().partition(|column| former.contains(column));
+    let mut rows: Vec<(Vec<Column>, String)> = Vec::new();
+    for column in &new {
         assert!(!column.doc.is_empty(), "{} has no documentation", column.name);
-        writeln!(table, "| `{}` | {} | {} |", column.name, type_name(&column), column.doc).unwrap();
+        let of = column.doc.strip_prefix("Standard error of `").and_then(|rest| rest.split('`').next());
+        let is_alike = |other: &Column| type_name(other) == type_name(column);
+        let shared = rows.iter_mut().find(|(columns, doc)| {
+            is_alike(&columns[0]) && (*doc == column.doc || columns.iter().any(|c| Some(c.name) == of))
+        });
+        match shared {
+            Some((columns, doc)) if of.is_some() => {
+                columns.push(column.clone());
+                *doc = format!("{}, and its standard error.", doc.trim_end_matches('.'));
+            }
+            Some((columns, _)) => columns.push(column.clone()),
+            None => rows.push((vec![column.clone()], column.doc.to_owned())),
+        }
     }
+    let mut table = "| column | type | meaning |\n|---|---|---|\n".to_owned();
+    for (columns, doc) in rows {
+        writeln!(table, "| {} | {} | {doc} |", names(&columns), type_name(&columns[0])).unwrap();
+    }
+    if !known.is_empty() {
+        write!(table, "\nAlso, as in a table above: {}.\n", names(&known)).unwrap();
+    }
+    former.extend(new);
     table
+}
+
+fn names(columns: &[Column]) -> String {
+    columns.iter().map(|column| format!("`{}`", column.name)).collect::<Vec<_>>().join(", ")
 }
 
 fn type_name(column: &Column) -> String {
@@ -56,12 +84,12 @@ fn type_name(column: &Column) -> String {
         DataType::Utf8 => "text",
         DataType::Float64 => "f64",
         DataType::Int64 => "i64",
-        DataType::Timestamp(..) => "timestamp µs UTC",
+        DataType::Timestamp(..) => "timestamp",
         DataType::List(element) if element.data_type() == &DataType::Utf8 => "list of text",
         DataType::List(element) if element.data_type() == &DataType::Float64 => "list of f64",
         DataType::List(_) => "list of struct",
         DataType::Boolean => "bool",
         other => panic!("{other} has no name on the page"),
     };
-    if column.nullable { format!("{name}, null") } else { name.to_owned() }
+    if column.nullable { format!("{name}?") } else { name.to_owned() }
 }
