@@ -120,8 +120,15 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     if longest_run < LEAST_RUN {
         return 0;
     }
-    let is_rail = |run: &Range<usize>| [min, max].contains(&values[run.start]);
-    let at_rails: Vec<Range<usize>> = runs(values, LEAST_RUN).filter(is_rail).collect();
+    let (mut at_rails, mut from) = (Vec::new(), 0);
+    // Few samples are at a rail: only there a run is followed to its end.
+    while let Some(after) = values[from..].iter().position(|v| *v == min || *v == max) {
+        let start = from + after;
+        from = start + values[start..].iter().take_while(|v| **v == values[start]).count();
+        if from - start >= LEAST_RUN {
+            at_rails.push(start..from);
+        }
+    }
     if at_rails.is_empty() {
         return 0;
     }
