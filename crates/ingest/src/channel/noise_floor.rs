@@ -56,7 +56,7 @@ pub(crate) fn white_noise_of(
     resolution: Option<f64>,
     most_samples: usize,
 ) -> Option<WhiteNoise> {
-    let own = own_samples(values, &stretches(values.len(), most_samples));
+    let own = own_samples(values, most_samples);
     let blocks = block_variances(&own, resolution.unwrap_or(0.0));
     let levels: Vec<Level> =
         ORDERS.iter().zip(blocks).filter_map(|(order, variances)| quiet_level(*order, variances)).collect();
@@ -85,21 +85,18 @@ struct Level {
     relative: f64,
 }
 
-/// All of a channel, or stretches that are spread evenly over one of more than `most` samples.
-fn stretches(samples: usize, most: usize) -> Vec<Range<usize>> {
-    if samples <= most {
-        return vec![0..samples];
-    }
-    let count = most / STRETCH;
-    (0..count).map(|k| k * (samples - STRETCH) / count).map(|start| start..start + STRETCH).collect()
+/// All of a channel as one stretch, or stretches that are spread evenly over one of more than `most` samples.
+fn stretches(samples: usize, most: usize) -> impl Iterator<Item = Range<usize>> {
+    let (count, length) = if samples <= most { (1, samples) } else { (most / STRETCH, STRETCH) };
+    (0..count).map(move |k| k * (samples - length) / count).map(move |start| start..start + length)
 }
 
-/// The samples of these stretches; of a channel recorded every k-th row those that are present, or the first of each k
+/// At most so many samples of a channel; of one recorded every k-th row those that are present, or the first of each k
 /// equal ones.
-fn own_samples(values: &[f64], stretches: &[Range<usize>]) -> Vec<f64> {
+fn own_samples(values: &[f64], most: usize) -> Vec<f64> {
     const MAX_INTERVAL: usize = 20;
     const MOST: f64 = 0.95;
-    let places = || stretches.iter().cloned().flatten();
+    let places = || stretches(values.len(), most).flatten();
     let samples: Vec<f64> = places().map(|i| values[i]).collect();
     let missing = samples.iter().filter(|v| v.is_nan()).count();
     if 5 * missing >= 2 * samples.len() {
@@ -191,12 +188,8 @@ mod tests {
 
     /// White noise of a given rms: sums of twelve uniform numbers, the same in every run.
     fn noise(count: usize, rms: f64) -> Vec<f64> {
-        let mut state = 42_u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..count).map(|_| rms * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0)).collect()
+        let mut random = fastrand::Rng::with_seed(42);
+        (0..count).map(|_| rms * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0)).collect()
     }
 
     fn near(values: &[f64], resolution: Option<f64>, wanted: f64) {

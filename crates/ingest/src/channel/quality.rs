@@ -97,17 +97,11 @@ fn resolution(values: &[f64], seen: &ChannelStats) -> Option<f64> {
 /// Stretches of at least so many samples that repeat one value.
 #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
 fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
-    let mut start = 0;
-    let mut ends = (1..=values.len()).filter(|&i| i == values.len() || values[i] != values[i - 1]);
-    std::iter::from_fn(move || {
-        for end in ends.by_ref() {
-            let run = start..end;
-            start = end;
-            if run.len() >= least {
-                return Some(run);
-            }
-        }
-        None
+    let mut end = 0;
+    values.chunk_by(|a, b| a == b).filter_map(move |run| {
+        let start = end;
+        end += run.len();
+        (run.len() >= least).then_some(start..end)
     })
 }
 
@@ -173,6 +167,12 @@ fn spikes(
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
+    /// A height counts as that of recurring impacts where more than one in so many seconds exceed it, and more than so
+    /// many in all.
+    const EVERY_S: f64 = 6.0;
+    const FEWEST_IMPACTS: usize = 20;
+    /// For the uncertainty of the noise itself.
+    const NOISE_MARGIN: f64 = 1.05;
     /// Enough for a threshold: the noise is known to about 3 %.
     const NOISE_SAMPLES: usize = 1 << 14;
     let step = resolution.unwrap_or(0.0);
@@ -191,7 +191,9 @@ fn spikes(
         segments.iter().map(|s| s.start + 3..s.end.saturating_sub(3)).filter(|s| !s.is_empty()).collect();
     let places = inner.iter().map(Range::len).sum::<usize>();
     let rank = ((places as f64 * step_s / EVERY_S) as usize).max(FEWEST_IMPACTS);
-    let explained = explained_height(places as f64 / rank as f64, noise);
+    // Two-sided tail of the normal distribution, to within 3 % for these ranks.
+    let deviate = (2.0 * (places as f64 / rank as f64).ln()).sqrt() - 0.35;
+    let explained = NOISE_MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
     // The height that recurring impacts must exceed to raise the threshold.
     let least = (far / IMPACTS).hypot(explained).min(far);
     let (high, recurring) = highest(values, &inner, least, rank);
@@ -213,22 +215,8 @@ fn spikes(
     high.iter().filter(|(at, i)| *at > far && is_outlier(*i)).count()
 }
 
-/// A height counts as that of recurring impacts where more than one in so many seconds exceed it, and more than so many in
-/// all.
-const EVERY_S: f64 = 6.0;
-const FEWEST_IMPACTS: usize = 20;
-
 /// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
 const DIFFERENCE_NOISE: f64 = 1.394;
-
-/// Height that white noise of this rms exceeds once in so many places.
-fn explained_height(places: f64, noise: f64) -> f64 {
-    /// For the uncertainty of the noise itself.
-    const MARGIN: f64 = 1.05;
-    // Two-sided tail of the normal distribution, to within 3 % for these ranks.
-    let deviate = (2.0 * places.ln()).sqrt() - 0.35;
-    MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise
-}
 
 /// The fourth difference over 6 about a sample.
 #[inline]

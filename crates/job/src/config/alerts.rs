@@ -45,8 +45,8 @@ pub struct AlertChannel {
     pub folder: Option<String>,
     /// Address that the message is posted to as JSON. An answer of 200 to 299 means sent.
     pub url: Option<String>,
-    /// New states that are sent: of the gap, `not_assessed` (removed, or unassessed), or of other quantities.
-    /// Default: all but `normal` and `not_assessed`.
+    /// New states that are sent: those of the gap and of other quantities, and `not_assessed` (removed, or
+    /// unassessed). Default: all but `normal` and `not_assessed`.
     pub states: Vec<String>,
     /// Only these part numbers, with `*` and `?`.
     pub parts: Vec<String>,

@@ -74,7 +74,7 @@ pub struct Document {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSettings {
-    /// Patterns of log files: `*` within a name, `**` across folders.
+    /// Patterns of log files, in folders or buckets (`s3://`): `*` within a name, `**` across folders.
     pub files: Vec<String>,
     /// The installations table.
     pub installations: String,
@@ -82,14 +82,14 @@ pub struct LogSettings {
     /// `serial_number`; optional `former_part_number`, `part_number`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aliases: Option<String>,
-    /// The flights table.
+    /// The flights table: facts that the logs do not hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,
     /// Tails that logs of a path may name, such as `"incoming/supplier/**" = ["N41?FP"]`; another tail is an error.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub tails: BTreeMap<String, Vec<String>>,
-    /// Whether files of one flight are its consecutive pieces. `false`: logs with one flight id and different
-    /// departures are different flights.
+    /// Whether files of one flight are its consecutive pieces. Without it, a second file is a copy or an error.
+    /// `false`: logs with one flight id and different departures are different flights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pieces: Option<bool>,
     /// Patterns of logs whose errors are known: they no longer make the exit code of later runs 1.
