@@ -39,11 +39,8 @@ fn page() -> String {
     for command in root.get_subcommands().filter(|command| command.get_name() != "help") {
         section(&mut page, command, "freeplay", &common);
     }
-    let _ = write!(page, "\n## Common options\n{TABLE}{}", common.into_iter().collect::<String>());
-    page.push_str("\n## Options of every command\n");
-    page.push_str(TABLE);
-    page.extend(root.get_arguments().filter(|arg| arg.is_global_set()).map(row));
-    page
+    let global = root.get_arguments().filter(|arg| arg.is_global_set()).map(row);
+    page + "\n## Common options\n" + &table(common) + "\n## Options of every command\n" + &table(global)
 }
 
 /// In how many commands each row occurs.
@@ -71,8 +68,7 @@ fn section(page: &mut String, command: &Command, above: &str, common: &BTreeSet<
     let _ = write!(page, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim());
     let (shared, own): (Vec<&Arg>, Vec<&Arg>) = taken(command).partition(|arg| common.contains(&row(arg)));
     if !own.is_empty() {
-        page.push_str(TABLE);
-        page.extend(own.into_iter().map(row));
+        page.push_str(&table(own.into_iter().map(row)));
     }
     if !shared.is_empty() {
         let names: Vec<String> = shared.into_iter().map(name_of).collect();
@@ -86,7 +82,9 @@ fn section(page: &mut String, command: &Command, above: &str, common: &BTreeSet<
     }
 }
 
-const TABLE: &str = "\n| option | meaning |\n|---|---|\n";
+fn table(rows: impl IntoIterator<Item = String>) -> String {
+    "\n| option | meaning |\n|---|---|\n".to_owned() + &rows.into_iter().collect::<String>()
+}
 
 /// A row of a table of options.
 fn row(arg: &Arg) -> String {

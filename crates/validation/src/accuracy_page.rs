@@ -14,12 +14,10 @@ pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchL
     let text = include_str!("../accuracy.md.in");
     let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
     let visible: Vec<&ErrorStats> = visible(stats).collect();
+    let (notable, quiet): (Vec<_>, Vec<_>) = visible.iter().partition(|t| is_notable(t));
     text.replace("{{method}}", &job::METHOD_VERSION.to_string())
-        .replace(
-            "{{classes}}",
-            &classes(&visible.iter().copied().filter(|t| is_notable(t)).collect::<Vec<_>>()),
-        )
-        .replace("{{quiet}}", &visible.iter().filter(|t| !is_notable(t)).count().to_string())
+        .replace("{{classes}}", &classes(&notable))
+        .replace("{{quiet}}", &quiet.len().to_string())
         .replace("{{methods}}", &methods(&visible))
         .replace("{{alarms}}", &alarms(&visible))
         .replace("{{refusals}}", &refusals(stats))
@@ -38,8 +36,8 @@ fn visible(stats: &[ErrorStats]) -> impl Iterator<Item = &ErrorStats> {
     stats.iter().filter(|t| !matches!(t.kind, Kind::Blind(_)))
 }
 
-/// Whether the page lists a class: its P95 error is one per cent or one micrometre, too few intervals hold the true
-/// value, or a flight was refused that shows its gap.
+/// Whether the page lists a class: its P95 error is at least one per cent or one micrometre, fewer than 90 % of its
+/// intervals hold the true value, or a flight was refused that shows its gap.
 fn is_notable(t: &ErrorStats) -> bool {
     t.errors[0].p95 >= 1.0 || t.coverage().0 < 0.9 || t.false_refusals() > 0
 }

@@ -50,7 +50,7 @@ pub fn white_noise(values: &[f64], resolution: Option<f64>) -> Option<WhiteNoise
     white_noise_of(values, resolution, MAX_SAMPLES)
 }
 
-/// As [`white_noise`], from at most so many samples.
+/// As [`white_noise`], from at most `most_samples` samples.
 pub(crate) fn white_noise_of(
     values: &[f64],
     resolution: Option<f64>,
@@ -91,20 +91,23 @@ fn stretches(samples: usize, most: usize) -> impl Iterator<Item = Range<usize>> 
     (0..count).map(move |k| k * (samples - length) / count).map(move |start| start..start + length)
 }
 
-/// At most so many samples of a channel; of one recorded every k-th row those that are present, or the first of each k
-/// equal ones.
+/// At most `most` samples of a channel. Of one recorded every k-th row, those that are present, or the first of each k equal
+/// ones.
 fn own_samples(values: &[f64], most: usize) -> Vec<f64> {
     const MAX_INTERVAL: usize = 20;
     const MOST: f64 = 0.95;
+    /// Changes that show the interval: the first ones, since a lost row moves all later ones.
+    const MAX_CHANGES: usize = 4096;
     let places = || stretches(values.len(), most).flatten();
     let samples: Vec<f64> = places().map(|i| values[i]).collect();
     let missing = samples.iter().filter(|v| v.is_nan()).count();
     if 5 * missing >= 2 * samples.len() {
         return samples.into_iter().filter(|v| !v.is_nan()).collect();
     }
-    let changes: Vec<usize> =
-        places().filter(|&i| i > 0 && values[i].to_bits() != values[i - 1].to_bits()).collect();
-    if 3 * changes.len() > 2 * samples.len() || changes.len() < MIN_BLOCKS {
+    let changes = (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits());
+    let changes: Vec<usize> = changes.take(MAX_CHANGES).collect();
+    let rows = changes.last().map_or(0, |last| last + 1);
+    if 3 * changes.len() > 2 * rows || changes.len() < MIN_BLOCKS {
         return samples;
     }
     let at_one_phase = |every: usize| {
@@ -226,6 +229,18 @@ mod tests {
         near(&held, None, 5e-6);
         let sparse: Vec<f64> = own.iter().flat_map(|v| [*v, f64::NAN, f64::NAN, f64::NAN]).collect();
         near(&sparse, None, 5e-6);
+    }
+
+    /// Every value four times, with a row lost now and then: the later ones change at another row of four.
+    #[test]
+    fn a_slow_channel_that_loses_rows_is_taken_at_its_own_rate() {
+        let mut held: Vec<f64> = noise(100_000, 5e-6).iter().flat_map(|v| [*v; 4]).collect();
+        for lost in [310_001, 190_002, 90_003, 50_001] {
+            held.remove(lost);
+        }
+        near(&held, None, 5e-6);
+        let excerpt = white_noise_of(&held, None, 1 << 14).unwrap();
+        assert!((excerpt.rms / 5e-6 - 1.0).abs() < 0.1, "{excerpt:?}");
     }
 
     #[test]

@@ -167,8 +167,7 @@ fn spikes(
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
-    /// A height counts as that of recurring impacts where more than one in so many seconds exceed it, and more than so
-    /// many in all.
+    /// Impacts recur where at least twenty are higher than some height, and one in every six seconds.
     const EVERY_S: f64 = 6.0;
     const FEWEST_IMPACTS: usize = 20;
     /// For the uncertainty of the noise itself.
@@ -219,22 +218,26 @@ fn spikes(
 const DIFFERENCE_NOISE: f64 = 1.394;
 
 /// The fourth difference over 6 about a sample.
-#[inline]
 fn height(values: &[f64], i: usize) -> f64 {
-    let [a, b, c, d, e] = std::array::from_fn(|k| values[i + k - 2]);
-    (a - 4.0 * b + 6.0 * c - 4.0 * d + e) / 6.0
+    fourth_difference(&std::array::from_fn(|k| values[i + k - 2])) / 6.0
 }
 
-/// Heights above `least` and their places, and the height that exactly `rank` places exceed; zero where fewer than that lie
-/// above `least`. Where more do, the lowest are left out.
-fn highest(values: &[f64], places: &[Range<usize>], least: f64, rank: usize) -> (Vec<(f64, usize)>, f64) {
+#[inline]
+fn fourth_difference([a, b, c, d, e]: &[f64; 5]) -> f64 {
+    a - 4.0 * b + 6.0 * c - 4.0 * d + e
+}
+
+/// Heights above `least` and their places, at most the `rank` + 1 highest where more than `rank` lie there. With them the
+/// height that `rank` places exceed, zero where no more than `rank` lie above `least`.
+fn highest(values: &[f64], places: &[Range<usize>], mut least: f64, rank: usize) -> (Vec<(f64, usize)>, f64) {
     const BLOCK: usize = 64;
-    let (mut found, mut least) = (Vec::new(), least);
-    for start in places.iter().flat_map(|s| s.clone().step_by(BLOCK).map(|k| k..s.end.min(k + BLOCK))) {
-        if is_higher(&values[start.start - 2..start.end + 2], least) {
-            let heights = start.map(|i| (height(values, i).abs(), i));
+    let mut found = Vec::new();
+    for block in places.iter().flat_map(|s| s.clone().step_by(BLOCK).map(|k| k..s.end.min(k + BLOCK))) {
+        if is_higher(&values[block.start - 2..block.end + 2], least) {
+            let heights = block.map(|i| (height(values, i).abs(), i));
             found.extend(heights.filter(|(at, _)| *at > least));
         }
+        // Kept short, however many of a long log are high.
         if found.len() > 2 * rank + BLOCK {
             least = keep_highest(&mut found, rank);
         }
@@ -253,9 +256,8 @@ fn keep_highest(found: &mut Vec<(f64, usize)>, rank: usize) -> f64 {
 /// Whether the fourth difference over 6 exceeds a height at any but the two first and last values.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn is_higher(values: &[f64], height: f64) -> bool {
-    let six = 6.0 * height;
-    let fourth = |[a, b, c, d, e]: &[f64; 5]| (a - 4.0 * b + 6.0 * c - 4.0 * d + e).abs();
-    values.array_windows().fold(false, |is, window| is | (fourth(window) > six))
+    let least = 6.0 * height;
+    values.array_windows().fold(false, |is, window| is | (fourth_difference(window).abs() > least))
 }
 
 /// Quality flags of the motor, screw and load channels: stable codes.
@@ -347,6 +349,8 @@ pub(crate) fn load_frozen(
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -365,6 +369,26 @@ mod tests {
         let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| described(values, 0.004, 0));
         assert_eq!(coarse_resolution(&channels, range(&wave(5e-5))), ["screw_coarse"]);
         assert!(coarse_resolution(&channels, range(&wave(5e-4))).is_empty());
+    }
+
+    proptest! {
+        /// Against a list of all heights in order.
+        #[test]
+        fn the_highest_are_those_of_the_whole_order(
+            values in proptest::collection::vec(prop_oneof![9 => -9.0..9.0, 1 => Just(f64::NAN)], 8..2000),
+            middle in 0.0..1.0, least in 0.0..30.0, rank in 1_usize..40,
+        ) {
+            let middle = 2 + (middle * (values.len() - 4) as f64) as usize;
+            let places = [2..middle, middle..values.len() - 2];
+            let all = places.iter().cloned().flatten().map(|i| height(&values, i).abs());
+            let mut all: Vec<f64> = all.filter(|at| *at > least).collect();
+            all.sort_by(|a, b| b.total_cmp(a));
+            let (found, recurring) = highest(&values, &places, least, rank);
+            let mut found: Vec<f64> = found.into_iter().map(|(at, _)| at).collect();
+            found.sort_by(|a, b| b.total_cmp(a));
+            prop_assert_eq!(recurring.to_bits(), all.get(rank).copied().unwrap_or(0.0).to_bits());
+            prop_assert_eq!(found, all[..all.len().min(rank + 1)].to_vec());
+        }
     }
 
     fn described(values: &[f64], step_s: f64, apart: usize) -> Quality {
