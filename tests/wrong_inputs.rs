@@ -75,6 +75,7 @@ fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_pa
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.err.contains("no unit is booked in elevator_right of N412FP"), "{}", run.err);
+    assert!(!run.err.contains("nearest"), "the table has this tail: {}", run.err);
 }
 
 #[test]

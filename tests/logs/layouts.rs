@@ -510,6 +510,32 @@ fn check_names_the_rate_of_a_slower_screw() {
     assert!(!text.contains("rate_hz"), "{text}");
 }
 
+/// A motor position of one value throughout: `check` names the column that is read in its place.
+#[test]
+fn check_names_the_redundant_column_that_is_read() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
+    let log = &logs(&fleet)[0];
+    let table = Table::read(log);
+    let is_copied = |name: &String| name == "aileron_left_motor_deg";
+    let copy = table
+        .names()
+        .into_iter()
+        .filter(is_copied)
+        .map(|name| ("aileron_left_motor_b".to_owned(), table.numbers(&name)));
+    let columns = table.names().into_iter().map(|name| {
+        let values = table.numbers(&name);
+        let values = if is_copied(&name) { vec![1.0; values.len()] } else { values };
+        (name, values)
+    });
+    let columns: Vec<_> = columns.chain(copy).map(|(name, values)| (name, Column::Real(values))).collect();
+    write_parquet(log, &columns, &facts(log)).unwrap();
+    let other = "unit = \"deg\"\nalternatives = [{ column = \"{position}_motor_b\", unit = \"deg\" }]";
+    fleet.configure("unit = \"deg\"", other);
+    let text = fleet.run_ok(&["check", log.to_str().unwrap()]);
+    assert!(text.contains("aileron_left_motor_b") && !text.contains("aileron_left_motor_deg"), "{text}");
+}
+
 /// A clock that starts again: the error names both settings, and neither drops samples in silence.
 #[test]
 fn a_clock_that_restarts_names_its_settings() {

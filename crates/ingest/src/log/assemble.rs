@@ -44,6 +44,7 @@ pub(crate) fn assemble(
         let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
         Quality::seen((&read.values, &segments), &seen, line.step_s, apart)
     });
+    let columns = [motor.column, screw.column, load.column];
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::quality_flags(&quality, line.step_s));
     if !is_relative && !output_locked {
@@ -76,6 +77,7 @@ pub(crate) fn assemble(
         segments,
         breaks: line.breaks.clone(),
         temperature_c,
+        columns,
         quality,
         flags,
         repairs: line.repairs,

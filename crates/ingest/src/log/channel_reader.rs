@@ -37,11 +37,13 @@ pub(crate) struct Channel {
     pub(crate) seen: Option<ChannelStats>,
     /// One turn of a wrapped sensor, m at the screw.
     pub(crate) turn_m: Option<f64>,
+    /// Its column, where a log has one.
+    pub(crate) column: Option<String>,
 }
 
 impl From<Vec<f64>> for Channel {
     fn from(values: Vec<f64>) -> Self {
-        Self { values, seen: None, turn_m: None }
+        Self { values, seen: None, turn_m: None, column: None }
     }
 }
 
@@ -230,7 +232,7 @@ impl<'s> ChannelSampling<'s> {
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = seen.filter(|_| self.line.kept.is_none());
-            return Ok(Channel { values: kept(values), seen, turn_m: None });
+            return Ok(Channel { seen, ..kept(values).into() });
         }
         let read =
             if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
@@ -249,7 +251,7 @@ impl<'s> ChannelSampling<'s> {
             unwrap_turns(&mut values, turn);
         }
         si.apply_to_all(&mut values);
-        Ok(Channel { values, seen: None, turn_m: map.wraps_at.map(|turn| si.length(turn)) })
+        Ok(Channel { turn_m: map.wraps_at.map(|turn| si.length(turn)), ..values.into() })
     }
 
     /// 1 where a sample is valid, any other number or NaN where it is not.
@@ -357,7 +359,7 @@ pub(crate) fn follow(
     let is_slow = own.line.step_s * own.every as f64 > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
     let values = own.placed(&own_s, &values, &at_s, between);
-    Ok(Channel { values, seen: None, turn_m })
+    Ok(Channel { turn_m, ..values.into() })
 }
 
 /// A nanosecond is no shift.

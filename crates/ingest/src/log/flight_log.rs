@@ -588,7 +588,7 @@ impl Log {
                 break;
             }
         }
-        let Some((channel, apart, rest, k)) = found else {
+        let Some((mut channel, apart, rest, k)) = found else {
             let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
             return Err(self.sheet(map).unwrap_or(self.main()).lacks(&name));
         };
@@ -597,6 +597,7 @@ impl Log {
             let (column, rows) = (choices[k].1.clone(), counted as u64);
             return Err(self.main().error(ErrorKind::AllMissing { column, rows }));
         }
+        channel.column = Some(choices[k].1.clone());
         let flags = if k == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] };
         Ok((channel, rest, flags))
     }

@@ -115,6 +115,7 @@ impl Normalized {
             apart: self.apart,
             output_locked: self.output_locked,
             missing_share: quality[1].missing_share,
+            columns: std::array::from_fn(|k| Some(Self::COLUMNS[k].to_owned())),
             quality,
             motor_m,
             dx_m,

@@ -68,6 +68,8 @@ pub struct ActuatorChannels {
     pub apart: usize,
     /// Share of the other samples without δX.
     pub missing_share: f64,
+    /// The columns of motor, screw and load that were read: of redundant ones the first that is alive.
+    pub columns: [Option<String>; 3],
     /// What each channel looked like before anything was made of it: motor, screw, load.
     pub quality: [Quality; 3],
     /// Quality flags of the channels: stable codes.

@@ -100,14 +100,14 @@ pub(super) fn actuator(
 ) -> Result<ActuatorCheck, Diagnostic> {
     let id = &opened.identity;
     let (installation, part) = opened.unit(at, config, installations)?;
-    let base = |channel: &'static str, column: &Option<String>, unit: &'static str| ChannelCheck {
+    let base = |channel: &'static str, column: Option<&String>, unit: &'static str| ChannelCheck {
         log: name.to_owned(),
         tail_number: id.tail_number.to_string(),
         flight_id: id.flight_id.to_string(),
         position: at.position.to_string(),
         serial_number: Some(installation.serial_number.to_string()),
         channel,
-        column: column.clone().unwrap_or_default(),
+        column: column.cloned().unwrap_or_default(),
         unit,
         samples: 0,
         missing_share: None,
@@ -121,7 +121,6 @@ pub(super) fn actuator(
         note: None,
         remedy: None,
     };
-    let [motor, screw, load, _] = &at.columns;
     if !at.lacking.is_empty() {
         let note =
             Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
@@ -129,7 +128,7 @@ pub(super) fn actuator(
             found: vec![ChannelCheck {
                 note,
                 remedy: rejection::remedy("channel_unmapped"),
-                ..base("all", motor, "")
+                ..base("all", at.columns[0].as_ref(), "")
             }],
             clock: None,
             identified: None,
@@ -142,6 +141,8 @@ pub(super) fn actuator(
     } else {
         position_ratio(&a.motor_m, &a.dx_m, &a.load_n).map(slope_note)
     };
+    // A locked output has no screw column that is read.
+    let [motor, screw, load] = [0, 1, 2].map(|k| a.columns[k].as_ref().or(at.columns[k].as_ref()));
     let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![
         describe(base("motor_position", motor, "m"), motor_seen, &channel_flags(&a, "motor")),
