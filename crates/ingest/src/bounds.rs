@@ -38,15 +38,15 @@ pub fn set_max_rows(rows: u64) {
 /// A claim of a file beyond a bound.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the file claims {found} {what}, more than the limit of {most}")]
-pub struct Excess {
+pub(crate) struct Excess {
     /// What is counted.
-    pub what: &'static str,
+    pub(crate) what: &'static str,
     /// How many the file claims.
-    pub found: u64,
+    pub(crate) found: u64,
     /// How many are read.
-    pub most: u64,
+    pub(crate) most: u64,
     /// The key that raises the bound.
-    pub key: Option<&'static str>,
+    pub(crate) key: Option<&'static str>,
 }
 
 /// Compares a claim with its bound.

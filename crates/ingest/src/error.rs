@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
+use strum::EnumMessage;
 
 use crate::bounds::Excess;
 use crate::io::transient;
@@ -26,15 +27,16 @@ pub fn is_passing(code: &str) -> bool {
     is_transient(code) || code == UNREADABLE
 }
 
+/// Remedy of a name that the log does not have.
+const NAMES_ARE_MAPPED: &str = "names are mapped under `[channel]`, `[clock]` and `[identity]`";
+
 /// One file's trouble.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {kind}", file.display())]
 pub struct Error {
-    /// The file.
-    pub file: PathBuf,
-    /// What is wrong with it.
+    file: PathBuf,
     #[source]
-    pub kind: Box<ErrorKind>,
+    pub(crate) kind: Box<ErrorKind>,
 }
 
 impl Error {
@@ -51,110 +53,137 @@ impl Error {
 }
 
 /// What can be wrong: one variant for each thing its owner would do differently.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "each field is named for what it holds; rows count from 0")]
-pub enum ErrorKind {
-    /// The file cannot be opened or read at all.
+///
+/// The name of a variant is its code where no other is given; its message is the remedy. Rows count from 0.
+#[derive(Debug, thiserror::Error, strum::IntoStaticStr, strum::EnumMessage)]
+#[strum(serialize_all = "snake_case")]
+pub(crate) enum ErrorKind {
     #[error("{}", unreadable(source))]
     Unreadable {
         #[source]
         source: io::Error,
     },
-    /// The object store does not return it.
     #[error(transparent)]
     Object(#[from] object_io::Error),
-    /// It has no bytes, or no rows.
     #[error("the log has no rows")]
+    #[strum(
+        serialize = "empty_log",
+        message = "file is empty; delete it or ignore it. It is skipped until it changes"
+    )]
     Empty,
-    /// It is not Parquet, or its footer is truncated.
     #[error("cannot read as Parquet: {detail}")]
+    #[strum(message = "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`")]
     NotParquet { detail: String },
-    /// It is a file of another format.
     #[error("this is {format}, not a Parquet file")]
+    #[strum(
+        serialize = "not_parquet",
+        message = "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
+    )]
     ForeignFormat { format: &'static str },
-    /// It claims more than is read, or than it can hold.
     #[error("{_0}")]
+    #[strum(
+        message = "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
+    )]
     BeyondLimit(Excess),
-    /// It, or a column of it, is encrypted.
     #[error("{}", match column { Some(column) => format!("column `{column}` is encrypted"), None => "the file is encrypted".into() })]
+    #[strum(
+        message = "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"
+    )]
     Encrypted { column: Option<String> },
-    /// Its numbers are written in an encoding that this release does not read.
     #[error("the file uses the encoding {encoding}, which is not supported")]
+    #[strum(
+        message = "have the recorder write PLAIN, BYTE_STREAM_SPLIT or dictionary encoding, or rewrite the file with the tool that wrote it"
+    )]
     EncodingUnsupported { encoding: String },
-    /// Several columns have the name that is mapped.
     #[error("the log has {count} columns called `{column}`")]
+    #[strum(message = "give each column a name of its own where the file is written, or map another column")]
     DuplicateColumn { column: String, count: usize },
-    /// The footer is sound, a page is not.
     #[error("a column cannot be decoded: {detail}")]
+    #[strum(serialize = "decode_failed")]
     Decode { column: String, row_group: Option<u64>, detail: String },
-    /// A column holds another number of rows than the footer declares.
     #[error("the column holds {found} rows where the footer declares {declared}")]
+    #[strum(serialize = "row_count_differs")]
     RowCount { column: String, found: u64, declared: u64 },
-    /// A mapped column is not in the file.
     #[error("the log has no column `{column}`")]
     ColumnMissing { column: String, nearest: Option<String> },
-    /// A channel is mapped to a group of files, and no file of that group belongs to this flight.
     #[error("no file of group `{group}` belongs to this flight")]
+    #[strum(
+        message = "check that the file has arrived and has the same tail and flight (see `freeplay check`)"
+    )]
     GroupMissing { group: String },
-    /// Two lists that should hold the samples of one row side by side do not.
     #[error("the lists in `{column}` and `{other}` differ in length")]
+    #[strum(
+        message = "if the channel has timestamps of its own, name them in its `time_column`; else all lists of a row must hold as many samples"
+    )]
     ListLengths { column: String, other: String },
-    /// Two clocks of one log share no zero.
     #[error("the clocks `{column}` and `{other}` cannot be brought together")]
+    #[strum(
+        message = "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
+    )]
     ClocksDiffer { column: String, other: String },
-    /// A log that Freeplay normalized does not fit the settings any more.
     #[error("normalized log was written with other settings: {detail}")]
+    #[strum(
+        serialize = "normalized_otherwise",
+        message = "write it again from the recorded log: `freeplay normalize`"
+    )]
     Normalized { detail: String },
-    /// The Arrow metadata of a column notes another scale, offset or unit than the mapping.
     #[error("the file notes {key} {noted} for column `{column}`, and the mapping has {known}")]
     MetadataContradicts { column: String, key: &'static str, noted: String, known: String },
-    /// A column is there, but its type holds no numbers.
     #[error("column `{column}` holds {found}, not {wanted}")]
+    #[strum(message = "map another column, or have the recorder write numbers")]
     ColumnType { column: String, found: String, wanted: &'static str },
-    /// No column fits the `{position}` patterns.
     #[error("no column matches `{pattern}`")]
     NoPosition { pattern: String, columns: Vec<String> },
-    /// The time column needs a unit, or has one that contradicts it.
     #[error("the unit of the time column `{column}` is not known")]
+    #[strum(serialize = "time_unit_unknown", message = "set `clock.unit` to s, ms, us or ns")]
     TimeUnit { column: String, found: String },
-    /// Neither a time column nor a rate.
     #[error("the log has no clock: neither `clock.column` nor `clock.rate_hz` is given")]
+    #[strum(message = "name the time column, or give the rate when rows are evenly spaced")]
     NoClock,
-    /// Stamps fall further than allowed.
     #[error("time runs backwards")]
+    #[strum(
+        message = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
+    )]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
-    /// The clock pauses for longer than within one flight.
     #[error("the log seems to hold two flights")]
+    #[strum(
+        message = "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`"
+    )]
     SeveralFlights { column: String, row: u64, before_s: f64, after_s: f64, end_s: f64, max_gap_s: f64 },
-    /// The timestamps give another rate than the declared one.
     #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
+    #[strum(message = "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
-    /// The clock gives a first stamp or a step that no recorder has.
     #[error("the clock is not plausible: {what} is {value_s:e} s")]
+    #[strum(message = "check `clock.column` and `clock.unit`, and that the file is intact")]
     TimeImplausible { column: String, what: &'static str, value_s: f64, least_s: f64, most_s: f64 },
-    /// No two stamps differ.
     #[error("time does not advance")]
+    #[strum(message = "map the column with the time, or give only `clock.rate_hz`")]
     TimeStandsStill { column: String, rows: u64 },
-    /// A channel has no value at all.
     #[error("column `{column}` holds no value in {rows} rows")]
+    #[strum(serialize = "channel_empty", message = "check the sensor, or map the redundant channel")]
     AllMissing { column: String, rows: u64 },
-    /// A length was mapped for a part that turns, or an angle for a part whose lead is not given.
     #[error("column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part")]
+    #[strum(message = "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`")]
     UnitForPart { column: String, unit: &'static str, wanted: &'static str },
-    /// No source states a fact that is needed.
     #[error("cannot determine {fact} for this log")]
+    #[strum(message = "set its source under `[identity]`: `metadata`, `columns` or `path`")]
     IdentityMissing { fact: &'static str, looked: Vec<String> },
-    /// A fact that cannot be read.
     #[error("`{found}` is no {fact}: {detail}")]
+    #[strum(message = "see `identity.departure_format` and `identity.time_zone`")]
     IdentityInvalid { fact: &'static str, found: String, detail: String },
-    /// A column that should be constant is not.
     #[error("column `{column}` should hold one {fact}, but changes")]
+    #[strum(
+        message = "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight"
+    )]
     IdentityChanges { fact: &'static str, column: String, row: u64, found: String, before: String },
-    /// A column of a table is not there.
     #[error("the table has no column `{column}`")]
+    #[strum(
+        serialize = "bad_table",
+        message = "map the column names under `[columns]` (docs/configuration.md)"
+    )]
     TableColumn { column: String, nearest: Option<String>, has_semicolons: bool },
-    /// A table cannot be used.
     #[error("the table cannot be used: {detail}")]
+    #[strum(serialize = "bad_table", message = "columns and formats are in docs/configuration.md")]
     Table { row: Option<u64>, column: Option<String>, detail: String },
 }
 
@@ -172,40 +201,11 @@ impl From<Excess> for ErrorKind {
 
 impl ErrorKind {
     /// The stable code; `docs/errors.md` has a paragraph for each.
-    pub fn code(&self) -> &'static str {
+    fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { source } if transient::is_transient(source) => READ_FAILED,
-            Self::Unreadable { .. } => UNREADABLE,
             Self::Object(source) => source.code(),
-            Self::Empty => "empty_log",
-            Self::NotParquet { .. } | Self::ForeignFormat { .. } => "not_parquet",
-            Self::BeyondLimit(_) => "beyond_limit",
-            Self::Encrypted { .. } => "encrypted",
-            Self::EncodingUnsupported { .. } => "encoding_unsupported",
-            Self::DuplicateColumn { .. } => "duplicate_column",
-            Self::Decode { .. } => "decode_failed",
-            Self::RowCount { .. } => "row_count_differs",
-            Self::ColumnMissing { .. } => "column_missing",
-            Self::MetadataContradicts { .. } => "metadata_contradicts",
-            Self::ColumnType { .. } => "column_type",
-            Self::GroupMissing { .. } => "group_missing",
-            Self::ListLengths { .. } => "list_lengths",
-            Self::ClocksDiffer { .. } => "clocks_differ",
-            Self::Normalized { .. } => "normalized_otherwise",
-            Self::NoPosition { .. } => "no_position",
-            Self::TimeUnit { .. } => "time_unit_unknown",
-            Self::NoClock => "no_clock",
-            Self::TimeGoesBack { .. } => "time_goes_back",
-            Self::SeveralFlights { .. } => "several_flights",
-            Self::RateContradicts { .. } => "rate_contradicts",
-            Self::TimeImplausible { .. } => "time_implausible",
-            Self::TimeStandsStill { .. } => "time_stands_still",
-            Self::AllMissing { .. } => "channel_empty",
-            Self::UnitForPart { .. } => "unit_for_part",
-            Self::IdentityMissing { .. } => "identity_missing",
-            Self::IdentityInvalid { .. } => "identity_invalid",
-            Self::IdentityChanges { .. } => "identity_changes",
-            Self::TableColumn { .. } | Self::Table { .. } => "bad_table",
+            other => other.into(),
         }
     }
 
@@ -293,10 +293,10 @@ impl ErrorKind {
     }
 
     fn remedy(&self) -> String {
-        self.named_remedy().unwrap_or_else(|| self.usual_remedy().into())
+        self.named_remedy().or_else(|| self.get_message().map(str::to_owned)).unwrap_or_default()
     }
 
-    /// A remedy that names a key, a column or a value of this log.
+    /// A remedy that depends on what was found, or that several errors share.
     fn named_remedy(&self) -> Option<String> {
         Some(match self {
             Self::Unreadable { source } => missing_remedy(source),
@@ -321,95 +321,30 @@ impl ErrorKind {
                 format!("the placeholder of the position is {PLACEHOLDER}")
             }
             Self::NoPosition { pattern, columns } => {
-                let near = closest_to_pattern(pattern, columns)?;
+                let Some(near) = closest_to_pattern(pattern, columns) else {
+                    return Some(NAMES_ARE_MAPPED.into());
+                };
                 let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
                 let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
                 format!(
                     "closest column: `{near}`.{hidden} Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
                 )
             }
-            _ => return None,
-        })
-    }
-
-    fn usual_remedy(&self) -> &'static str {
-        match self {
-            // Each of these names its own remedy.
-            Self::Unreadable { .. } | Self::Object(_) | Self::MetadataContradicts { .. } => "",
-            Self::Empty => "file is empty; delete it or ignore it. It is skipped until it changes",
-            Self::NotParquet { .. } => {
-                "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`"
-            }
-            Self::ForeignFormat { .. } => {
-                "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
-            }
-            Self::BeyondLimit(_) => {
-                "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
-            }
-            Self::Encrypted { .. } => {
-                "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"
-            }
-            Self::EncodingUnsupported { .. } => {
-                "have the recorder write PLAIN, BYTE_STREAM_SPLIT or dictionary encoding, or rewrite the file with the tool that wrote it"
-            }
-            Self::DuplicateColumn { .. } => {
-                "give each column a name of its own where the file is written, or map another column"
-            }
             Self::Decode { .. } | Self::RowCount { .. } => {
-                "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`"
+                "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`".into()
             }
             Self::TableColumn { has_semicolons: true, .. } => {
-                "the fields are separated by `;`: save the table with commas, and numbers with a point"
+                "the fields are separated by `;`: save the table with commas, and numbers with a point".into()
             }
-            Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
-            Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
-                "names are mapped under `[channel]`, `[clock]` and `[identity]`"
-            }
-            Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
-            Self::GroupMissing { .. } => {
-                "check that the file has arrived and has the same tail and flight (see `freeplay check`)"
-            }
-            Self::ListLengths { .. } => {
-                "if the channel has timestamps of its own, name them in its `time_column`; else all lists of a row must hold as many samples"
-            }
-            Self::ClocksDiffer { .. } => {
-                "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
-            }
-            Self::Normalized { .. } => "write it again from the recorded log: `freeplay normalize`",
-            Self::TimeUnit { .. } => "set `clock.unit` to s, ms, us or ns",
-            Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
-            Self::TimeGoesBack { .. } => {
-                "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
-            }
-            Self::SeveralFlights { .. } => {
-                "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`"
-            }
-            Self::RateContradicts { .. } => {
-                "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"
-            }
-            Self::TimeImplausible { .. } => {
-                "check `clock.column` and `clock.unit`, and that the file is intact"
-            }
-            Self::TimeStandsStill { .. } => "map the column with the time, or give only `clock.rate_hz`",
-            Self::AllMissing { .. } => "check the sensor, or map the redundant channel",
-            Self::UnitForPart { .. } => {
-                "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`"
-            }
-            Self::IdentityMissing { .. } => {
-                "set its source under `[identity]`: `metadata`, `columns` or `path`"
-            }
-            Self::IdentityInvalid { .. } => "see `identity.departure_format` and `identity.time_zone`",
-            Self::IdentityChanges { .. } => {
-                "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight"
-            }
+            Self::ColumnMissing { .. } => NAMES_ARE_MAPPED.into(),
             Self::Table { detail, .. } if detail.contains("is not a UTC date") => {
-                "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z"
+                "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z".into()
             }
             Self::Table { detail, .. } if detail.contains(',') && detail.ends_with("is not a number") => {
-                "write decimals with a point, such as 1168.5"
+                "write decimals with a point, such as 1168.5".into()
             }
-            Self::Table { .. } => "columns and formats are in docs/configuration.md",
-        }
+            _ => return None,
+        })
     }
 }
 

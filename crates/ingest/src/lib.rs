@@ -52,18 +52,18 @@
 
 pub mod bounds;
 pub mod channel;
-pub mod error;
+mod error;
 pub mod infer;
 mod io;
 pub mod log;
 pub mod mapping;
 pub mod parquet;
 pub mod tables;
-pub mod time;
+mod time;
 
 pub use channel::quality::Quality;
 pub use channel::si_conversion::Geometry;
-pub use error::{Error, ErrorKind, is_passing, is_transient};
+pub use error::{Error, is_passing, is_transient};
 pub use log::identity::Identity;
 pub use log::{ActuatorChannels, ActuatorColumns, Log, LogFiles};
 pub use mapping::{
@@ -71,4 +71,3 @@ pub use mapping::{
     SampleFilter,
 };
 pub use tables::flights::Flights;
-pub use time::clock::TimeBase;

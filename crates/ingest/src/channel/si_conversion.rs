@@ -80,9 +80,6 @@ fn apply_to_all(line: SiConversion, values: &mut [f64]) {
 }
 
 /// The line of a channel on a part.
-///
-/// # Errors
-/// [`ErrorKind::UnitForPart`] when the part cannot be brought to the screw from that unit.
 pub(crate) fn to_si(
     column: &str,
     map: &ChannelMapping,

@@ -26,9 +26,6 @@ impl Digest {
     }
 
     /// Adds a stretch of a file; an empty one adds nothing.
-    ///
-    /// # Errors
-    /// When it cannot be read, or the file ends before.
     pub(crate) fn take(&mut self, file: &File, stretch: Range<u64>) -> io::Result<()> {
         let (mut at, mut left) = (stretch.start, stretch.end.saturating_sub(stretch.start));
         while left > 0 {

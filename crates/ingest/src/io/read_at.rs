@@ -20,9 +20,6 @@ pub(crate) fn file_length(file: &File) -> io::Result<u64> {
 }
 
 /// Fills the buffer from some byte on.
-///
-/// # Errors
-/// When the file ends before, or cannot be read.
 pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io::Result<()> {
     while !buffer.is_empty() {
         match read_at(file, buffer, at) {

@@ -73,9 +73,6 @@ pub(crate) struct ChannelSampling<'s> {
 
 impl<'s> ChannelSampling<'s> {
     /// Puts the rows of a channel on one clock.
-    ///
-    /// # Errors
-    /// When there is no clock, or it cannot be repaired.
     pub(crate) fn new(
         sheet: &'s RowTable,
         map: &ChannelMapping,
@@ -132,9 +129,6 @@ impl<'s> ChannelSampling<'s> {
 
     /// Whether its rows hold lists of another length than those of another channel, which `error` found: its samples have
     /// instants of their own, which begin with the stamp of the row.
-    ///
-    /// # Errors
-    /// [`ErrorKind::ListLengths`] where only the rate of the rows is declared, which is that of one of them.
     fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
         let own = &self.samples.leaf;
         if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.sheet.is_listed(own) {
@@ -282,9 +276,6 @@ impl<'s> ChannelSampling<'s> {
     }
 
     /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
-    ///
-    /// # Errors
-    /// When a column is missing, holds no numbers, cannot be decoded or is in an impossible unit.
     pub(crate) fn own(
         &self,
         map: &ChannelMapping,
@@ -324,9 +315,6 @@ pub(crate) struct FollowerChannel<'s, 'c> {
 }
 
 /// Reads a channel in SI at the instants of the motor position; those that are not wanted may be missing.
-///
-/// # Errors
-/// As [`ChannelSampling::own`]; [`ErrorKind::ClocksDiffer`] when its clock and the motor's share no zero.
 pub(crate) fn follow(
     master: &ChannelSampling<'_>,
     motor: &ChannelMapping,

@@ -42,9 +42,6 @@ pub(crate) struct ClockSpan {
 
 impl ClockSpan {
     /// The earliest instant; `None` where the clock has none, or a local one without a mapped zone.
-    ///
-    /// # Errors
-    /// [`ErrorKind::IdentityInvalid`] for a local time that the zone skips or repeats.
     pub(crate) fn start(&self, mapping: &IdentityMapping) -> Option<Result<Timestamp, ErrorKind>> {
         match self.origin {
             TimeOrigin::Utc(first) => Some(Ok(first.checked_add(duration(self.earliest_s)).ok()?)),
@@ -73,9 +70,6 @@ pub(crate) fn date_alone(text: &str, mapping: &IdentityMapping) -> Option<civil:
 }
 
 /// A departure of which the log names the date: by its absolute clock, or by one that counts from midnight.
-///
-/// # Errors
-/// [`ErrorKind::IdentityInvalid`] where the clock lies on another day, or has no time of the day.
 pub(crate) fn departure_on(
     date: civil::Date,
     absolute: Option<Timestamp>,
@@ -104,9 +98,6 @@ pub(crate) fn departure_on(
 }
 
 /// The departure that lies the flight hours, or else the length of the log, before the landing.
-///
-/// # Errors
-/// [`ErrorKind::IdentityInvalid`] for a landing that cannot be read, or that nothing leads back from.
 pub(crate) fn departure_before(
     landing: &str,
     facts: &IdentityFields,
@@ -134,9 +125,6 @@ fn invalid(fact: IdentityField, found: &dyn Display, detail: &dyn Display) -> Er
 pub type IdentityFields = BTreeMap<IdentityField, String>;
 
 /// The facts that the path's named groups hold.
-///
-/// # Errors
-/// [`ErrorKind::IdentityInvalid`] when the expression itself cannot be read.
 pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields, ErrorKind> {
     let regex = regex::Regex::new(expression).map_err(|e| ErrorKind::IdentityInvalid {
         fact: "path expression",
@@ -201,10 +189,6 @@ pub(crate) fn registered(
 }
 
 /// Reads the facts; what the log leaves open comes from its absolute clock.
-///
-/// # Errors
-/// [`ErrorKind::IdentityMissing`] for a tail or departure that stands nowhere, [`ErrorKind::IdentityInvalid`]
-/// for a fact that cannot be read.
 pub(crate) fn read(
     facts: &IdentityFields,
     mapping: &IdentityMapping,
@@ -321,9 +305,6 @@ pub fn zone(name: &str) -> Result<TimeZone, String> {
 }
 
 /// The instant of a local time that was read as if it were UTC; nothing when no zone is mapped.
-///
-/// # Errors
-/// [`ErrorKind::IdentityInvalid`] for a time that the zone skips or repeats.
 pub(crate) fn local_to_utc(
     as_utc: Timestamp,
     mapping: &IdentityMapping,

@@ -47,9 +47,6 @@ impl Normalized {
     pub(crate) const COLUMNS: [&'static str; 4] = ["motor_m", "dx_m", "load_n", "temperature_c"];
 
     /// The footer content of a file, if Freeplay normalized it.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Normalized`] when it was written by a version that this one does not know.
     pub(crate) fn of(file: &LogFile) -> Result<Option<Self>, Error> {
         let Some(version) = file.metadata(KEY) else { return Ok(None) };
         let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
@@ -79,9 +76,6 @@ impl Normalized {
     }
 
     /// The channels as they were written.
-    ///
-    /// # Errors
-    /// When a column cannot be read, or the part's geometry is another one now.
     pub(crate) fn read_actuator(
         &self,
         file: &LogFile,

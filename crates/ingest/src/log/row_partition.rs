@@ -89,9 +89,6 @@ impl Partition {
     }
 
     /// One leaf of the samples meant, in batches.
-    ///
-    /// # Errors
-    /// When a column is missing or cannot be decoded.
     pub(crate) fn samples(
         &self,
         files: &[LogFile],
@@ -207,9 +204,6 @@ pub(crate) struct DistinctTexts {
 
 impl DistinctTexts {
     /// Looks at a file; a row group that holds but one combination, by its statistics, is not read.
-    ///
-    /// # Errors
-    /// When a column is missing or cannot be decoded.
     pub(crate) fn take_file(&mut self, file: &LogFile, names: &[&str]) -> Result<(), Error> {
         let only = |group: usize| -> Option<Vec<String>> {
             names.iter().map(|name| Some(file.text_bounds(name, group)?.only()?.to_owned())).collect()
@@ -221,9 +215,6 @@ impl DistinctTexts {
     }
 
     /// Looks at a batch.
-    ///
-    /// # Errors
-    /// When a column has no text form, or the combinations are too many.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
         self.combinations.of_rows(names, arrays, true).map(drop)
     }

@@ -84,9 +84,6 @@ impl RowTable {
     }
 
     /// What channels may be called here.
-    ///
-    /// # Errors
-    /// When channels are named by a column, and it cannot be read.
     pub(crate) fn names(&self) -> Result<Arc<BTreeSet<String>>, Error> {
         if let Some(column) = &self.layout.name_column {
             return self.texts(column);
@@ -96,9 +93,6 @@ impl RowTable {
     }
 
     /// The positions in the position column, if the layout has one.
-    ///
-    /// # Errors
-    /// When that column cannot be read.
     pub(crate) fn row_positions(&self) -> Result<Option<BTreeSet<String>>, Error> {
         let column = self.layout.position_column.as_deref();
         column.map(|column| self.texts(column).map(|texts| texts.as_ref().clone())).transpose()
@@ -122,9 +116,6 @@ impl RowTable {
 
     /// As numbers, raw or brought to SI, and what was seen of them where all are wanted in SI; a null is NaN. Where a
     /// sample is a row, so may be those that are not wanted.
-    ///
-    /// # Errors
-    /// When a leaf is missing, holds no numbers, or cannot be decoded.
     pub(crate) fn numbers(
         &self,
         samples: &SampleSelector,
@@ -150,9 +141,6 @@ impl RowTable {
     }
 
     /// 1 where a sample is one of these texts, 0 where it is another, NaN where it is missing.
-    ///
-    /// # Errors
-    /// When a leaf is missing, has no text form, or cannot be decoded.
     pub(crate) fn matches(&self, samples: &SampleSelector, texts: &[String]) -> Result<Vec<f64>, Error> {
         let mut marks = Vec::new();
         self.each(samples, &samples.leaf, |array| {
@@ -167,9 +155,6 @@ impl RowTable {
 
     /// 1 where all bits of `set` are set and all of `clear` are clear in the word of a sample, 0 elsewhere, NaN where it is
     /// missing.
-    ///
-    /// # Errors
-    /// When a leaf is missing, holds no whole numbers, or cannot be decoded.
     pub(crate) fn bit_marks(
         &self,
         samples: &SampleSelector,
@@ -196,9 +181,6 @@ impl RowTable {
     }
 
     /// Scale and offset of a channel: those of its mapping, or those in the Arrow metadata of its column.
-    ///
-    /// # Errors
-    /// [`ErrorKind::MetadataContradicts`] where the mapping, or another file, has another scale, offset or unit.
     pub(crate) fn scale_and_offset(&self, leaf: &str, map: &ChannelMapping) -> Result<(f64, f64), Error> {
         let mut noted = None;
         for file in self.files.iter().filter(|file| file.has(leaf)) {
@@ -326,9 +308,6 @@ impl RowTable {
     }
 
     /// The stamps of those samples, from the sheet's time column or the channel's own.
-    ///
-    /// # Errors
-    /// When there is no clock, its unit is not known, or it cannot be read.
     pub(crate) fn stamps(&self, samples: &SampleSelector, own: Option<&str>) -> Result<Timestamps, Error> {
         let Some(column) = own.or(self.clock.column.as_deref()) else {
             let rate_hz = self.clock.rate_hz.ok_or_else(|| self.error(ErrorKind::NoClock))?;
@@ -386,9 +365,6 @@ impl RowTable {
     }
 
     /// How many samples those are.
-    ///
-    /// # Errors
-    /// When they cannot be read.
     pub(crate) fn count(&self, samples: &SampleSelector) -> Result<usize, Error> {
         if self.holds_all(samples) && !self.is_listed(&samples.leaf) {
             return Ok(self.rows());

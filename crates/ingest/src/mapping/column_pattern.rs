@@ -9,7 +9,7 @@ pub const PLACEHOLDER: &str = "{position}";
 
 /// A column name, with at most one `{position}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ColumnPattern<'a> {
+pub(crate) struct ColumnPattern<'a> {
     before: Cow<'a, str>,
     after: Option<Cow<'a, str>>,
 }
@@ -21,7 +21,7 @@ pub(crate) fn composed(name: &str) -> Cow<'_, str> {
 
 impl<'a> ColumnPattern<'a> {
     /// Splits the name at its first placeholder.
-    pub fn new(column: &'a str) -> Self {
+    pub(crate) fn new(column: &'a str) -> Self {
         match column.split_once(PLACEHOLDER) {
             Some((before, after)) => Self { before: composed(before), after: Some(composed(after)) },
             None => Self { before: composed(column), after: None },
@@ -29,18 +29,18 @@ impl<'a> ColumnPattern<'a> {
     }
 
     /// Whether the name holds the placeholder.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.after.is_some()
     }
 
     /// The position a column's name speaks of, if it fits.
-    pub fn position_in<'c>(&self, column: &'c str) -> Option<&'c str> {
+    pub(crate) fn position_in<'c>(&self, column: &'c str) -> Option<&'c str> {
         let middle = column.strip_prefix(&*self.before)?.strip_suffix(self.after.as_deref()?)?;
         (!middle.is_empty()).then_some(middle)
     }
 
     /// The column that holds this channel of that position.
-    pub fn column_for(&self, position: &str) -> String {
+    pub(crate) fn column_for(&self, position: &str) -> String {
         match &self.after {
             Some(after) => [&self.before, position, after].concat(),
             None => self.before.clone().into_owned(),

@@ -34,9 +34,6 @@ impl FieldMetadata {
     }
 
     /// Scale and offset of the channel: those of the mapping, or those that are noted where it leaves both open.
-    ///
-    /// # Errors
-    /// [`ErrorKind::MetadataContradicts`] where both are given and differ, or the noted unit is not the mapped one.
     pub(crate) fn line(&self, column: &str, map: &ChannelMapping) -> Result<(f64, f64), ErrorKind> {
         let mapped = Self { scale: map.scale, offset: map.offset, unit: Some(map.unit) };
         let is_open = |line: &Self| Self { unit: None, ..*line } == Self::NONE;
@@ -48,9 +45,6 @@ impl FieldMetadata {
     }
 
     /// Whether all that is noted here agrees with what is known of the column.
-    ///
-    /// # Errors
-    /// [`ErrorKind::MetadataContradicts`] for the first that differs.
     pub(crate) fn check(&self, column: &str, known: &Self) -> Result<(), ErrorKind> {
         let differs = |noted: f64, known: f64| {
             ((noted - known).abs() > 1e-9 * known.abs()).then(|| (noted.to_string(), known.to_string()))

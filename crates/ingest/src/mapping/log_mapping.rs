@@ -307,7 +307,7 @@ impl Channels {
     }
 
     /// Whether δX is logged itself.
-    pub fn is_relative(&self) -> bool {
+    pub(crate) fn is_relative(&self) -> bool {
         self.screw_position.is_none() && !self.output.is_locked()
     }
 }

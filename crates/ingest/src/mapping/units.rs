@@ -97,7 +97,7 @@ impl Unit {
 
     /// Factor and offset of `SI = value · factor + offset`; temperatures are converted to °C. Factors are exact by
     /// definition (NIST SP 811, 2008, appendix B: 1 in = 25.4 mm, 1 lbf = 4.448 221 615 260 5 N).
-    pub fn to_si(self) -> (f64, f64) {
+    pub(crate) fn to_si(self) -> (f64, f64) {
         let (_, _, factor, offset) = self.entry();
         (factor, offset)
     }
@@ -139,7 +139,7 @@ pub enum TimeUnit {
 
 impl TimeUnit {
     /// Units per second; `None` for a counter, whose rate is a separate key.
-    pub fn per_second(self) -> Option<f64> {
+    pub(crate) fn per_second(self) -> Option<f64> {
         Some(match self {
             Self::Count => return None,
             Self::Second => 1.0,

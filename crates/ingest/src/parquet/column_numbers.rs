@@ -25,9 +25,6 @@ pub(crate) fn is_plain(chunk: &ColumnChunkMetaData) -> bool {
 
 /// Appends the values of a chunk, page by page; a null is NaN, and so is all of a page of which nothing is wanted: it is
 /// not unpacked.
-///
-/// # Errors
-/// What the parquet crate cannot decode; on some inconsistent pages it panics instead. Rows may be missing then.
 pub(crate) fn append(
     pages: Pages,
     chunk: &ColumnChunkMetaData,

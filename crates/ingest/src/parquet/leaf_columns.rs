@@ -132,9 +132,6 @@ fn lengths_per_outer_row(outer: Option<Vec<usize>>, inner: &[usize]) -> Vec<usiz
 
 /// Brings leaves of one batch to the same number of samples: where one of them is a list, a value that
 /// stands once for its row is repeated for every sample in it.
-///
-/// # Errors
-/// [`ErrorKind::ListLengths`] when two lists of one row differ in length.
 pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<ArrayRef>, ErrorKind> {
     let Some(listed) = flats.iter().position(|flat| flat.lengths.is_some()) else {
         return Ok(flats.into_iter().map(|flat| flat.values).collect());

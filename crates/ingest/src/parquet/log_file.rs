@@ -240,10 +240,6 @@ impl LogFile {
     }
 
     /// Passes the values of some leaves, batch by batch and aligned by sample, to `take`.
-    ///
-    /// # Errors
-    /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, the number of rows
-    /// differs from the declared one, or `take` fails.
     pub(crate) fn scan(
         &self,
         names: &[&str],
@@ -300,9 +296,6 @@ impl LogFile {
 
     /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
     /// of which nothing is wanted are not unpacked. Of a leaf whose rows hold lists all must be wanted.
-    ///
-    /// # Errors
-    /// As [`LogFile::scan`], and when the leaf holds no numbers.
     pub(crate) fn append_numbers(
         &self,
         name: &str,
@@ -410,9 +403,6 @@ impl LogFile {
     }
 
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
-    ///
-    /// # Errors
-    /// When they do not, or the leaf is missing.
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
@@ -531,9 +521,6 @@ impl TextBounds<'_> {
 type BatchIter = ParquetRecordBatchReader;
 
 /// A footer by which text columns of these names are read as codes of their dictionary.
-///
-/// # Errors
-/// Where the reader refuses it.
 pub(crate) fn with_codes(
     footer: &ArrowReaderMetadata,
     is_coded: impl Fn(&str) -> bool,

@@ -31,9 +31,6 @@ pub(crate) fn wrong_type(column: &str, array: &ArrayRef, wanted: &'static str) -
 }
 
 /// A column as text.
-///
-/// # Errors
-/// [`ErrorKind::ColumnType`] when its type has no text form.
 pub(crate) fn as_text(column: &str, array: &ArrayRef) -> Result<ArrayRef, ErrorKind> {
     cast(array, &DataType::Utf8).map_err(|_| wrong_type(column, array, "text or numbers"))
 }

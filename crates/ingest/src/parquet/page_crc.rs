@@ -18,9 +18,6 @@ use crate::parquet::page_header::Pages;
 const MAGIC: &[u8; 4] = b"PAR1";
 
 /// Copies a Parquet file page by page, each with its checksum.
-///
-/// # Errors
-/// When the file cannot be read or written.
 pub(crate) fn copy(from: &File, to: &mut File) -> Result<(), ParquetError> {
     let footer = ParquetMetaDataReader::new().parse_and_finish(from)?;
     let mut sink = CountingWriter { writer: BufWriter::with_capacity(1 << 20, to), written: 0 };

@@ -78,9 +78,6 @@ impl<'f> Pages<'f> {
 }
 
 /// The pages of a chunk.
-///
-/// # Errors
-/// What a header claims that cannot be.
 pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<Vec<Page>, String> {
     let (start, bytes) = chunk.byte_range();
     let length = read_at::file_length(file).map_err(|e| e.to_string())?;

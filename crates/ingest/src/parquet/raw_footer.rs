@@ -39,9 +39,6 @@ pub(crate) struct Footer {
 
 /// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
 /// `want` fetches bytes before they are read.
-///
-/// # Errors
-/// [`ErrorKind::NotParquet`] without a whole footer; [`ErrorKind::BeyondLimit`] where it claims too much.
 pub(crate) fn read(
     file: &File,
     want: impl Fn(Range<u64>) -> Result<(), ErrorKind>,

@@ -81,10 +81,7 @@ pub fn write_parquet(
 }
 
 /// Writes columns of one length as a Parquet file with key-value metadata.
-///
-/// # Errors
-/// [`ErrorKind::Unreadable`] when the file cannot be written; [`ErrorKind::Table`] when the columns differ in length.
-pub fn write_encoded(
+pub(crate) fn write_encoded(
     file: &Path,
     columns: &[(String, Column)],
     metadata: &[(String, String)],

@@ -66,7 +66,7 @@ pub fn number(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// When it is none.
-pub fn not_negative(text: &str) -> Result<f64, String> {
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     number(text)
         .and_then(|value| if value < 0.0 { Err(format!("`{text}` is below zero")) } else { Ok(value) })
 }

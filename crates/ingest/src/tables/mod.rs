@@ -3,7 +3,7 @@
 //! A small table is read whole as text ([`Table`]), a long one in batches with typed columns ([`TableBatch`]).
 
 mod aliases;
-pub mod cell;
+pub(crate) mod cell;
 mod column_batches;
 pub mod flights;
 mod installations;

@@ -41,19 +41,19 @@ const TICK_FOLLOW_S: f64 = 10.0;
 
 /// The rows of a log on one clock.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TimeBase {
+pub(crate) struct TimeBase {
     /// The declared rate's step, else the usual step, s.
-    pub step_s: f64,
+    pub(crate) step_s: f64,
     /// Rows there are.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// The rows that count, in order of time; none when every row counts as it stands.
-    pub kept: Option<Vec<u32>>,
+    pub(crate) kept: Option<Vec<u32>>,
     /// Unbroken stretches, in kept rows.
-    pub segments: Vec<Range<usize>>,
+    pub(crate) segments: Vec<Range<usize>>,
     /// The first row after each break, and its time since the first row by the stamps, s.
-    pub breaks: Vec<(usize, f64)>,
+    pub(crate) breaks: Vec<(usize, f64)>,
     /// Repairs made.
-    pub repairs: TimestampRepairs,
+    pub(crate) repairs: TimestampRepairs,
 }
 
 /// Repairs that were needed to put a log on one clock.
@@ -71,10 +71,6 @@ pub struct TimestampRepairs {
 
 impl TimeBase {
     /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
-    ///
-    /// # Errors
-    /// [`ErrorKind::SeveralFlights`] where the clock pauses for more than `clock.max_gap_s` between two recordings of a
-    /// minute or more.
     pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), ErrorKind> {
         let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
         let rows = self.segments.last().map_or(0, |last| last.end);
@@ -96,7 +92,7 @@ impl TimeBase {
 
 /// What the first stamp of a clock means.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum TimeOrigin {
+pub(crate) enum TimeOrigin {
     /// Where the log begins: rows without stamps.
     Start,
     /// Seconds on a zero of the clock's own, which all clocks of a log share.
@@ -111,7 +107,7 @@ pub enum TimeOrigin {
 
 impl TimeOrigin {
     /// Seconds from another clock's origin to this one, where both mean the same kind of time.
-    pub fn since(self, other: Self) -> Option<f64> {
+    pub(crate) fn since(self, other: Self) -> Option<f64> {
         match (self, other) {
             (Self::Start, _) | (_, Self::Start) => Some(0.0),
             (Self::Counted(a), Self::Counted(b)) => Some(a - b),
@@ -127,24 +123,24 @@ impl TimeOrigin {
 
 /// The stamps of some rows: seconds since the first one; NaN where a row has none.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Timestamps {
+pub(crate) struct Timestamps {
     /// The column they come from, for diagnostics.
-    pub column: String,
+    pub(crate) column: String,
     /// Seconds since the first stamp.
-    pub seconds: Vec<f64>,
+    pub(crate) seconds: Vec<f64>,
     /// What the first stamp means.
-    pub origin: TimeOrigin,
+    pub(crate) origin: TimeOrigin,
 }
 
 impl Timestamps {
     /// Evenly spaced stamps, for rows that have none.
-    pub fn uniform(rows: usize, rate_hz: f64) -> Self {
+    pub(crate) fn uniform(rows: usize, rate_hz: f64) -> Self {
         let seconds = (0..rows).map(|k| k as f64 / rate_hz).collect();
         Self { column: "clock.rate_hz".into(), seconds, origin: TimeOrigin::Start }
     }
 
     /// The instants of a timeline's rows, s since the first stamp.
-    pub fn of(&self, line: &TimeBase) -> Vec<f64> {
+    pub(crate) fn of(&self, line: &TimeBase) -> Vec<f64> {
         match &line.kept {
             None => self.seconds.clone(),
             Some(kept) => kept.iter().map(|&row| self.seconds[row as usize]).collect(),
@@ -153,7 +149,7 @@ impl Timestamps {
 }
 
 /// Evenly spaced rows at a declared rate, when a log has no stamps.
-pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
+pub(crate) fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
     TimeBase {
         step_s: rate_hz.recip(),
         rows,
@@ -165,12 +161,7 @@ pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
 }
 
 /// Puts timestamped rows on one clock, and repairs the timestamps where the mapping defines how.
-///
-/// # Errors
-/// [`ErrorKind::TimeGoesBack`] when stamps fall by more than `max_back_s` and the log is not to be split
-/// there; [`ErrorKind::TimeStandsStill`] when fewer than two differ; [`ErrorKind::RateContradicts`] when they
-/// give another rate than the declared one; [`ErrorKind::TimeImplausible`] when the first stamp or the step cannot be.
-pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
     if let TimeOrigin::Counted(first_s) = stamps.origin {
         plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
     }

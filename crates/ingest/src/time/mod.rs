@@ -1,6 +1,8 @@
 //! Time bases of logs: timestamps, their repair, and bringing channels to a common clock.
 
-pub mod clock;
+pub(crate) mod clock;
+#[cfg(test)]
+mod fuzz;
 pub(crate) mod resample;
 pub(crate) mod slow_channel;
 pub(crate) mod timestamps;

@@ -44,10 +44,6 @@ impl AwsProfileSource {
     }
 
     /// Supported settings of the profile; empty when no profile is selected and there is no default.
-    ///
-    /// # Errors
-    /// As text: the selected profile does not exist, a file cannot be read, or the credential source of the profile
-    /// is not supported.
     pub(crate) fn read(&self) -> Result<Vec<(Key, String)>, String> {
         let name = self.profile.as_deref().unwrap_or("default");
         let section = if name == "default" { name.to_owned() } else { format!("profile {name}") };
