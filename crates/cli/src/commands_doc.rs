@@ -10,9 +10,8 @@ use crate::args::Args;
 
 const HEAD: &str = "# Every command\n\nThe text of `freeplay help COMMAND`, written by a test. Results go to stdout, \
                     progress and diagnostics to stderr; all\ncommands have the same \
-                    [exit codes](columns.md#exit-codes).\n\nKeys and columns of JSON, JSON lines, CSV and Parquet \
-                    are stable; new ones may be added, so ignore those that you do not\nknow. Tables and sentences \
-                    for people may change in every release.\n";
+                    [exit codes](columns.md#exit-codes). Keys and columns of JSON, JSON lines, CSV and Parquet\nare \
+                    stable; ignore new ones that you do not know. Text for people may change in every release.\n";
 
 #[test]
 fn the_reference_of_commands_is_what_the_parser_knows() {
@@ -37,7 +36,7 @@ fn page() -> String {
     let common: BTreeSet<String> = rows.into_iter().filter_map(|(row, n)| (n > 2).then_some(row)).collect();
     let mut page = HEAD.to_owned();
     for command in root.get_subcommands().filter(|command| command.get_name() != "help") {
-        section(&mut page, command, "freeplay", &common);
+        section(&mut page, command, &common);
     }
     let global = root.get_arguments().filter(|arg| arg.is_global_set()).map(row);
     page + "\n## Common options\n" + &table(common) + "\n## Options of every command\n" + &table(global)
@@ -58,14 +57,11 @@ fn taken(command: &Command) -> impl Iterator<Item = &Arg> {
         .filter(|arg| !arg.is_global_set() && !matches!(arg.get_id().as_str(), "help" | "version"))
 }
 
-/// A command's purpose, how it is typed, what it takes, its examples, and its own commands.
-fn section(page: &mut String, command: &Command, above: &str, common: &BTreeSet<String>) {
-    let name = format!("{above} {}", command.get_name());
-    let below: Vec<&Command> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
+/// How a command is typed, its purpose, what it takes, its examples, and its own commands.
+fn section(page: &mut String, command: &Command, common: &BTreeSet<String>) {
+    let usage = command.clone().render_usage().to_string().replace(" [OPTIONS]", "");
     let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-    let _ = write!(page, "\n## `{name}`\n\n{about}.\n");
-    let usage = command.clone().render_usage().to_string();
-    let _ = write!(page, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim());
+    let _ = write!(page, "\n## `{}`\n\n{about}.\n", usage.trim_start_matches("Usage: ").trim());
     let (shared, own): (Vec<&Arg>, Vec<&Arg>) = taken(command).partition(|arg| common.contains(&row(arg)));
     if !own.is_empty() {
         page.push_str(&table(own.into_iter().map(row)));
@@ -77,8 +73,8 @@ fn section(page: &mut String, command: &Command, above: &str, common: &BTreeSet<
     if let Some(examples) = command.get_after_help() {
         let _ = write!(page, "\n```text\n{}\n```\n", examples.to_string().trim());
     }
-    for command in below {
-        section(page, command, &name, common);
+    for command in command.get_subcommands().filter(|command| command.get_name() != "help") {
+        section(page, command, common);
     }
 }
 

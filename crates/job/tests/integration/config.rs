@@ -150,7 +150,7 @@ fn a_value_out_of_range_is_refused_with_key_value_and_range() {
 fn the_documentation_lists_every_range() {
     let page = include_str!("../../../../docs/keys.md");
     for (key, least, most) in job::config::limits::PLAUSIBLE {
-        let range = format!(" Range {least:e} to {most:e}. |");
+        let range = format!(" Range {least:e}…{most:e}. |");
         let is_listed = page.lines().any(|l| l.starts_with(&format!("| `{key}` |")) && l.ends_with(&range));
         assert!(is_listed, "docs/keys.md lacks the range of {key}");
     }

@@ -73,7 +73,7 @@ fn section(page: &mut String, path: &str, said: &str, schema: &Value, tables: &m
 /// The plausible range of a number.
 fn range(key: &str) -> String {
     let listed = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
-    listed.map_or_else(String::new, |(_, least, most)| format!(" Range {least:e} to {most:e}."))
+    listed.map_or_else(String::new, |(_, least, most)| format!(" Range {least:e}…{most:e}."))
 }
 
 /// The object in a value, and what its table is called; alternatives of a channel are channels again.
