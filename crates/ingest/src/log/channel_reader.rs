@@ -60,11 +60,11 @@ pub(crate) struct TimeBaseKey {
 /// How the samples of a channel lie in time.
 #[derive(Debug)]
 pub(crate) struct ChannelSampling<'s> {
-    sheet: &'s RowTable,
+    pub(crate) sheet: &'s RowTable,
+    pub(crate) map: &'s ChannelMapping,
     samples: SampleSelector,
     time_column: Option<String>,
     valid: Option<SampleSelector>,
-    shift_s: f64,
     /// Rows between samples where the channel is slower than its rows; else 1.
     every: usize,
     /// Its rows on one clock.
@@ -72,41 +72,36 @@ pub(crate) struct ChannelSampling<'s> {
 }
 
 impl<'s> ChannelSampling<'s> {
-    /// Puts the rows of a channel on one clock.
-    pub(crate) fn new(
-        sheet: &'s RowTable,
-        map: &ChannelMapping,
-        name: &str,
-        position: &str,
-    ) -> Result<Self, Error> {
-        let mut sampling = Self::unread(sheet, map, name, position);
-        sampling.line = sampling.line_of(map)?;
-        sampling.every = sampling.rows_between(map);
-        Ok(sampling)
-    }
-
-    fn unread(sheet: &'s RowTable, map: &ChannelMapping, name: &str, position: &str) -> Self {
+    /// A channel of a position, whose clock is not read yet.
+    pub(crate) fn new(sheet: &'s RowTable, map: &'s ChannelMapping, name: &str, position: &str) -> Self {
         let named = |column: &String| ColumnPattern::new(column).column_for(position);
         Self {
             sheet,
+            map,
             samples: sheet.samples(name, position),
             time_column: map.time_column.as_ref().map(named),
             valid: map.valid_column.as_ref().map(|column| sheet.samples(&named(column), position)),
-            shift_s: map.shift_s(),
             every: 1,
             line: clock::uniform(0, 1.0),
         }
     }
 
+    /// The same with its rows on one clock.
+    pub(crate) fn with_clock(mut self) -> Result<Self, Error> {
+        self.line = self.line_of()?;
+        self.every = self.rows_between();
+        Ok(self)
+    }
+
     /// What its clock depends on, within its sheet.
-    pub(crate) fn clock_key(&self, map: &ChannelMapping) -> TimeBaseKey {
+    pub(crate) fn clock_key(&self) -> TimeBaseKey {
         let SampleSelector { leaf, rows } = &self.samples;
         TimeBaseKey {
             listed_leaf: self.sheet.is_listed(leaf).then(|| leaf.clone()),
             rows: rows.clone(),
             time_column: self.time_column.clone(),
-            shift_s: self.shift_s,
-            rate_hz: map.rate_hz,
+            shift_s: self.map.shift_s(),
+            rate_hz: self.map.rate_hz,
         }
     }
 
@@ -146,33 +141,33 @@ impl<'s> ChannelSampling<'s> {
     }
 
     /// A channel with rows of its own has a rate of its own.
-    fn clock(&self, map: &ChannelMapping) -> Cow<'s, ClockMapping> {
-        if !self.is_apart() || self.sheet.clock.rate_hz == map.rate_hz {
+    fn clock(&self) -> Cow<'s, ClockMapping> {
+        if !self.is_apart() || self.sheet.clock.rate_hz == self.map.rate_hz {
             return Cow::Borrowed(&self.sheet.clock);
         }
         let shared = if self.time_column.is_some() { None } else { self.sheet.clock.rate_hz };
-        Cow::Owned(ClockMapping { rate_hz: map.rate_hz.or(shared), ..self.sheet.clock.clone() })
+        Cow::Owned(ClockMapping { rate_hz: self.map.rate_hz.or(shared), ..self.sheet.clock.clone() })
     }
 
     /// The clock of its rows; that of a sheet's own rows is read once for all its channels.
-    fn line_of(&self, map: &ChannelMapping) -> Result<TimeBase, Error> {
+    fn line_of(&self) -> Result<TimeBase, Error> {
         let of_sheet = self.time_column.is_none()
             && self.samples.rows.is_empty()
-            && matches!(self.clock(map), Cow::Borrowed(_))
+            && matches!(self.clock(), Cow::Borrowed(_))
             && !self.sheet.is_listed(&self.samples.leaf);
         if !of_sheet {
-            return Ok(self.read_line(map)?.1);
+            return Ok(self.read_line()?.1);
         }
         if let Some(known) = self.sheet.line.get() {
             return Ok(known.clone());
         }
-        let (stamps, line) = self.read_line(map)?;
+        let (stamps, line) = self.read_line()?;
         buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
         Ok(self.sheet.line.get_or_init(|| line).clone())
     }
 
-    fn read_line(&self, map: &ChannelMapping) -> Result<(Option<Timestamps>, TimeBase), Error> {
-        let clock = self.clock(map);
+    fn read_line(&self) -> Result<(Option<Timestamps>, TimeBase), Error> {
+        let clock = self.clock();
         if let (None, None, Some(rate_hz), true) =
             (&clock.column, &self.time_column, clock.rate_hz, self.samples.rows.is_empty())
         {
@@ -184,8 +179,8 @@ impl<'s> ChannelSampling<'s> {
         Ok((Some(stamps), line))
     }
 
-    fn rows_between(&self, map: &ChannelMapping) -> usize {
-        match map.rate_hz {
+    fn rows_between(&self) -> usize {
+        match self.map.rate_hz {
             Some(rate_hz) if !self.is_apart() => {
                 ((self.line.step_s * rate_hz).recip().round() as usize).max(1)
             }
@@ -194,21 +189,17 @@ impl<'s> ChannelSampling<'s> {
     }
 
     /// The stamps of the rows that count, and their instants, shifted to when the channel was true.
-    fn instants(&self, map: &ChannelMapping) -> Result<(Timestamps, Vec<f64>), Error> {
-        let (stamps, line) = self.read_line(map)?;
+    fn instants(&self) -> Result<(Timestamps, Vec<f64>), Error> {
+        let (stamps, line) = self.read_line()?;
         let stamps = stamps.unwrap_or_else(|| Timestamps::uniform(line.rows, line.step_s.recip()));
         let mut instants = stamps.of(&self.line);
-        instants.iter_mut().for_each(|t| *t += self.shift_s);
+        instants.iter_mut().for_each(|t| *t += self.map.shift_s());
         Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
     }
 
     /// The channel in SI at its own rows; those that are not wanted may be missing.
-    fn readings(
-        &self,
-        map: &ChannelMapping,
-        geometry: Geometry,
-        wanted: RowSelection<'_>,
-    ) -> Result<Channel, Error> {
+    fn readings(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
+        let map = self.map;
         let mut si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
         if !map.ignore_metadata && self.sheet.layout.name_column.is_none() {
             let (scale, offset) = self.sheet.scale_and_offset(&self.samples.leaf, map)?;
@@ -236,7 +227,7 @@ impl<'s> ChannelSampling<'s> {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let marks = self.valid_marks(valid, map)?;
+            let marks = self.valid_marks(valid)?;
             self.same_count(marks.len(), &valid.leaf)?;
             let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
             values.iter_mut().zip(kept(marks)).filter(|(_, m)| is_bad(*m)).for_each(|(v, _)| *v = f64::NAN);
@@ -249,7 +240,8 @@ impl<'s> ChannelSampling<'s> {
     }
 
     /// 1 where a sample is valid, any other number or NaN where it is not.
-    fn valid_marks(&self, valid: &SampleSelector, map: &ChannelMapping) -> Result<Vec<f64>, Error> {
+    fn valid_marks(&self, valid: &SampleSelector) -> Result<Vec<f64>, Error> {
+        let map = self.map;
         if let Some((set, clear)) = map.status_bits() {
             return self.sheet.bit_marks(valid, set, clear);
         }
@@ -276,17 +268,12 @@ impl<'s> ChannelSampling<'s> {
     }
 
     /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
-    pub(crate) fn own(
-        &self,
-        map: &ChannelMapping,
-        geometry: Geometry,
-        wanted: RowSelection<'_>,
-    ) -> Result<Channel, Error> {
+    pub(crate) fn own(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
         if self.every == 1 {
-            return self.readings(map, geometry, wanted);
+            return self.readings(geometry, wanted);
         }
-        let read = self.readings(map, geometry, RowSelection::ALL)?;
-        let (_, instants) = self.instants(map)?;
+        let read = self.readings(geometry, RowSelection::ALL)?;
+        let (_, instants) = self.instants()?;
         let values = self.placed(&instants, &read.values, &instants, Interpolation::Line);
         Ok(Channel { values, seen: None, ..read })
     }
@@ -300,57 +287,39 @@ impl<'s> ChannelSampling<'s> {
     }
 }
 
-/// The channel of an actuator that is to be brought to the motor's clock.
-pub(crate) struct FollowerChannel<'s, 'c> {
-    /// Its files.
-    pub(crate) sheet: &'s RowTable,
-    /// How it is read.
-    pub(crate) map: &'c ChannelMapping,
-    /// What it is called there.
-    pub(crate) name: &'c str,
-    /// Whose it is.
-    pub(crate) position: &'c str,
-    /// What it measures.
-    pub(crate) role: Role,
-}
-
-/// Reads a channel in SI at the instants of the motor position; those that are not wanted may be missing.
+/// Reads a channel, whose clock is not read yet, in SI at the instants of the motor position `master`; those that are not
+/// wanted may be missing.
 pub(crate) fn follow(
     master: &ChannelSampling<'_>,
-    motor: &ChannelMapping,
-    channel: &FollowerChannel<'_, '_>,
+    mut own: ChannelSampling<'_>,
+    role: Role,
     geometry: Geometry,
     wanted: RowSelection<'_>,
 ) -> Result<Channel, Error> {
-    let &FollowerChannel { sheet, map, name, position, role } = channel;
-    let mut own = ChannelSampling::unread(sheet, map, name, position);
     let shared = own.shares_rows(master);
-    own.line = if shared { master.line.clone() } else { own.line_of(map)? };
-    own.every = own.rows_between(map);
+    own.line = if shared { master.line.clone() } else { own.line_of()? };
+    own.every = own.rows_between();
     let is_slow_load = role == Role::Load && own.every > 1;
-    let is_direct = shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load);
-    let read = own.readings(map, geometry, if is_direct { wanted } else { RowSelection::ALL });
+    // A nanosecond is no shift.
+    let is_shifted = (own.map.shift_s() - master.map.shift_s()).abs() >= 1e-9;
+    let is_direct = shared && !is_shifted && (own.every == 1 || is_slow_load);
+    let read = own.readings(geometry, if is_direct { wanted } else { RowSelection::ALL });
     let Channel { values, turn_m, .. } = match read {
         Ok(read) if is_direct => return Ok(read),
         Err(error) if shared && own.has_own_list(master, &error)? => {
-            own.line = own.line_of(map)?;
-            own.readings(map, geometry, RowSelection::ALL)?
+            own.line = own.line_of()?;
+            own.readings(geometry, RowSelection::ALL)?
         }
         read => read?,
     };
-    let (stamps, own_s) = own.instants(map)?;
-    let (lead, mut at_s) = master.instants(motor)?;
+    let (stamps, own_s) = own.instants()?;
+    let (lead, mut at_s) = master.instants()?;
     let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
-        sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
+        own.sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
     })?;
     at_s.iter_mut().for_each(|t| *t += apart_s);
     let is_slow = own.line.step_s * own.every as f64 > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
     let values = own.placed(&own_s, &values, &at_s, between);
     Ok(Channel { turn_m, ..values.into() })
-}
-
-/// A nanosecond is no shift.
-fn same_instants(a_s: f64, b_s: f64) -> bool {
-    (a_s - b_s).abs() < 1e-9
 }

@@ -12,7 +12,7 @@ use crate::channel::si_conversion::Geometry;
 use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
-use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
+use crate::log::channel_reader::{self, Channel, ChannelSampling, TimeBaseKey};
 use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized::Normalized;
@@ -451,24 +451,24 @@ impl Log {
         };
         let (load, load_flags) = read(Role::Load, &selection)?;
         // The mean of the flight, whatever counts of it.
-        let whole = SampleSelection::whole(&master.0.line);
+        let whole = SampleSelection::whole(&master.line);
         let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
         flags.extend(screw_flags.into_iter().chain(load_flags));
         let read =
             RawChannels { motor, screw, load, is_relative: channels.is_relative(), output_locked, selection };
         let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
-        Ok(assemble(at.position.clone(), read, &master.0.line, temperature_c, flags))
+        Ok(assemble(at.position.clone(), read, &master.line, temperature_c, flags))
     }
 
     /// The segments of the motor's clock in which every sample filter holds; cached for equal keys.
     fn selected(
         &self,
         sought: ChannelRequest<'_>,
-        master: &ReferenceClock<'_, '_>,
+        master: &ChannelSampling<'_>,
     ) -> Result<SampleSelection, Error> {
         let ChannelRequest { at, channels, .. } = sought;
         if channels.when.is_empty() {
-            return Ok(SampleSelection::whole(&master.0.line));
+            return Ok(SampleSelection::whole(&master.line));
         }
         let position = at.position.as_str();
         let named = |column: &String| ColumnPattern::new(column).column_for(position);
@@ -479,8 +479,8 @@ impl Log {
         let asked = SelectionKey {
             when: channels.when.clone(),
             of: channels.when.iter().map(of).collect::<Result<_, Error>>()?,
-            group: master.1.group.clone(),
-            clock: master.0.clock_key(master.1),
+            group: master.map.group.clone(),
+            clock: master.clock_key(),
         };
         let mut before = self.selected.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == asked) {
@@ -494,10 +494,10 @@ impl Log {
     fn select(
         &self,
         sought: ChannelRequest<'_>,
-        master: &ReferenceClock<'_, '_>,
+        master: &ChannelSampling<'_>,
     ) -> Result<SampleSelection, Error> {
         let ChannelRequest { at, channels, geometry } = sought;
-        let line = &master.0.line;
+        let line = &master.line;
         let mut segments = line.segments.clone();
         for condition in &channels.when {
             let map = ChannelMapping::from(condition);
@@ -508,9 +508,9 @@ impl Log {
             }
             // A state stands until the next one comes, as a slow load does.
             let position = at.position.as_str();
-            let one = FollowerChannel { sheet, map: &map, name: &name, position, role: Role::Load };
+            let own = ChannelSampling::new(sheet, &map, &name, position);
             let Channel { mut values, .. } =
-                channel_reader::follow(&master.0, master.1, &one, geometry, RowSelection::ALL)?;
+                channel_reader::follow(master, own, Role::Load, geometry, RowSelection::ALL)?;
             zero_order_hold(&mut values, &line.segments, line.step_s);
             segments = condition.within(&values, &segments, line.step_s);
         }
@@ -518,16 +518,17 @@ impl Log {
     }
 
     /// The motor position, whose clock all other channels follow.
-    fn motor<'c>(&self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'_, 'c>, Error> {
+    fn motor<'c>(&'c self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'c>, Error> {
         let ChannelRequest { at, channels, geometry } = sought;
         let read = |map: &'c ChannelMapping, name: &str| {
-            let master = (ChannelSampling::new(self.sheet_of(map)?, map, name, at.position.as_str())?, map);
+            let sheet = self.sheet_of(map)?;
+            let master = ChannelSampling::new(sheet, map, name, at.position.as_str()).with_clock()?;
             if !channels.when.is_empty() {
                 // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
-                master.0.check_rows()?;
+                master.check_rows()?;
             }
             let selection = self.selected(sought, &master)?;
-            let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
+            let read = selection.cut(master.own(geometry, selection.wanted())?);
             Ok((read, selection.apart, (master, selection)))
         };
         let (channel, (master, selection), flags) = self.first_alive(Role::Motor, sought, read)?;
@@ -536,14 +537,14 @@ impl Log {
     }
 
     /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
-    fn check_one_flight(&self, (sampling, map): &ReferenceClock<'_, '_>) -> Result<(), Error> {
+    fn check_one_flight(&self, sampling: &ChannelSampling<'_>) -> Result<(), Error> {
         let identity = &self.mapping.identity;
         let fields = [IdentityField::FlightId, IdentityField::DepartureUtc];
         // Where a file holds many flights, a flight number may come again on another day.
         if !identity.by_row && fields.iter().any(|field| identity.columns.contains_key(field)) {
             return Ok(());
         }
-        let sheet = self.sheet_of(map)?;
+        let (sheet, map) = (sampling.sheet, sampling.map);
         let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
         sampling.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
     }
@@ -553,14 +554,12 @@ impl Log {
         &self,
         role: Role,
         sought: ChannelRequest<'_>,
-        master: &ReferenceClock<'_, '_>,
+        master: &ChannelSampling<'_>,
         selection: &SampleSelection,
     ) -> Result<(Channel, Vec<String>), Error> {
         let read = |map: &ChannelMapping, name: &str| {
-            let sheet = self.sheet_of(map)?;
-            let one = FollowerChannel { sheet, map, name, position: sought.at.position.as_str(), role };
-            let read =
-                channel_reader::follow(&master.0, master.1, &one, sought.geometry, selection.wanted())?;
+            let own = ChannelSampling::new(self.sheet_of(map)?, map, name, sought.at.position.as_str());
+            let read = channel_reader::follow(master, own, role, sought.geometry, selection.wanted())?;
             Ok((selection.cut(read), selection.apart, ()))
         };
         self.first_alive(role, sought, read).map(|(channel, (), flags)| (channel, flags))
@@ -617,13 +616,10 @@ struct ChannelRequest<'c> {
     geometry: Geometry,
 }
 
-/// Sampling of the motor position, and the mapping of its channel.
-type ReferenceClock<'s, 'c> = (ChannelSampling<'s>, &'c ChannelMapping);
-
 /// The motor position's values, their sampling, the selected samples, and quality flags.
-struct ReferenceChannel<'s, 'c> {
+struct ReferenceChannel<'c> {
     channel: Channel,
-    master: ReferenceClock<'s, 'c>,
+    master: ChannelSampling<'c>,
     selection: SampleSelection,
     flags: Vec<String>,
 }

@@ -416,12 +416,4 @@ mod tests {
         let path = "path by `(?<flight_id>x)`, which has no group `tail_number`";
         assert_eq!(looked, ["metadata `ac_reg`", path]);
     }
-
-    #[test]
-    fn an_absolute_clock_stands_in_for_departure_and_flight() {
-        let facts = IdentityFields::from([(IdentityField::TailNumber, "N1".into())]);
-        let start: Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
-        let identity = read(&facts, &mapping(None, None), Some(start)).unwrap();
-        assert_eq!(identity.flight_id.as_str(), "20261119T041300Z");
-    }
 }

@@ -7,6 +7,7 @@ use jiff::civil::Date;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
+use strum::{IntoStaticStr, VariantArray};
 
 use crate::mapping::units::{TimeUnit, Unit};
 
@@ -128,8 +129,22 @@ impl TailAlias {
 }
 
 /// A fact about a flight that a log may state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum IdentityField {
     /// The aircraft.
     TailNumber,
@@ -149,27 +164,11 @@ pub enum IdentityField {
 
 impl IdentityField {
     /// All fields, in the order in which they are read.
-    pub const ALL: [Self; 7] = [
-        Self::TailNumber,
-        Self::FlightId,
-        Self::DepartureUtc,
-        Self::Position,
-        Self::FlightHours,
-        Self::TailHoursEnd,
-        Self::LandingUtc,
-    ];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// The key as configuration spells it.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::TailNumber => "tail_number",
-            Self::FlightId => "flight_id",
-            Self::DepartureUtc => "departure_utc",
-            Self::Position => "position",
-            Self::FlightHours => "flight_hours",
-            Self::TailHoursEnd => "tail_hours_end",
-            Self::LandingUtc => "landing_utc",
-        }
+        self.into()
     }
 }
 
@@ -265,7 +264,8 @@ impl Output {
 }
 
 /// A channel of an actuator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Role {
     /// Motor position.
     Motor,
@@ -285,12 +285,7 @@ impl Role {
 
     /// The word in codes: `motor_frozen`.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Motor => "motor",
-            Self::Screw => "screw",
-            Self::Load => "load",
-            Self::Temperature => "temperature",
-        }
+        self.into()
     }
 }
 

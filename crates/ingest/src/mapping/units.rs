@@ -16,7 +16,8 @@ const LBF_N: f64 = 4.448_221_615_260_5;
 const INCH_M: f64 = 0.0254;
 
 /// What a unit measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Dimension {
     /// SI: m.
     Length,
@@ -33,13 +34,7 @@ pub enum Dimension {
 impl Dimension {
     /// The word for a person.
     pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Length => "length",
-            Self::Angle => "angle",
-            Self::Force => "force",
-            Self::Torque => "torque",
-            Self::Temperature => "temperature",
-        }
+        self.into()
     }
 }
 

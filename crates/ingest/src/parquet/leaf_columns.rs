@@ -165,21 +165,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn leaves_are_named_through_structs_and_lists() {
-        let point = DataType::Struct(Fields::from(vec![
-            Field::new("t", DataType::Float64, true),
-            Field::new("x", DataType::Float32, true),
-        ]));
-        let fields = Fields::from(vec![
-            Field::new("a.b", DataType::Float64, true),
-            Field::new("s", DataType::List(Arc::new(Field::new("element", point, true))), true),
-        ]);
-        let found = leaves(&fields);
-        let told: Vec<_> = found.iter().map(|l| (l.name.as_str(), l.index, l.root, l.is_listed)).collect();
-        assert_eq!(told, [("a.b", 0, 0, false), ("s.t", 1, 1, true), ("s.x", 2, 1, true)]);
-    }
-
-    #[test]
     fn a_value_beside_lists_is_repeated_for_each_of_their_samples() {
         let list = ListArray::from_iter_primitive::<Float64Type, _, _>([
             Some(vec![Some(1.0), Some(2.0)]),
@@ -193,18 +178,6 @@ mod tests {
         let arrays = align_lengths(&["id", "x"], flats).unwrap();
         assert_eq!(arrays[0].as_primitive::<Int32Type>().values(), &[7, 7, 9]);
         assert_eq!(arrays[1].as_primitive::<Float64Type>().values(), &[1.0, 2.0, 3.0]);
-    }
-
-    #[test]
-    fn lists_of_other_lengths_in_one_row_are_refused() {
-        let list = |n: usize| {
-            let values = ListArray::from_iter_primitive::<Float64Type, _, _>([Some(vec![Some(1.0); n])]);
-            flatten(&(Arc::new(values) as ArrayRef))
-        };
-        assert!(matches!(
-            align_lengths(&["a", "b"], vec![list(2), list(3)]),
-            Err(ErrorKind::ListLengths { .. })
-        ));
     }
 
     #[test]

@@ -380,16 +380,6 @@ mod tests {
     }
 
     #[test]
-    fn an_even_clock_passes_untouched() {
-        let t: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.01).collect();
-        let line = line(&t, &usual()).unwrap();
-        assert_eq!(line.kept, None);
-        assert_eq!(line.segments, split_at(100, &[]));
-        assert!((line.step_s - 0.01).abs() < 1e-15);
-        assert_eq!(line.repairs, TimestampRepairs::default());
-    }
-
-    #[test]
     fn a_pause_cuts_the_log_in_two() {
         let line = line(&[0.0, 0.1, 0.2, 5.0, 5.1, 5.2], &usual()).unwrap();
         assert_eq!(line.segments, [0..3, 3..6]);
