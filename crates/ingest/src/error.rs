@@ -58,7 +58,7 @@ impl Error {
 #[derive(Debug, thiserror::Error, strum::IntoStaticStr, strum::EnumMessage)]
 #[strum(serialize_all = "snake_case")]
 pub(crate) enum ErrorKind {
-    #[error("{}", unreadable(source))]
+    #[error("{}", unreadable(source).0)]
     Unreadable {
         #[source]
         source: io::Error,
@@ -299,7 +299,7 @@ impl ErrorKind {
     /// A remedy that depends on what was found, or that several errors share.
     fn named_remedy(&self) -> Option<String> {
         Some(match self {
-            Self::Unreadable { source } => missing_remedy(source),
+            Self::Unreadable { source } => unreadable(source).1.into(),
             Self::Object(source) => source.remedy().into(),
             Self::BeyondLimit(Excess { key: Some(key), .. }) => {
                 format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits")
@@ -364,29 +364,24 @@ fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c St
     columns.iter().max_by(by_score)
 }
 
-/// Message of the operating system, reworded for the two most common cases.
-fn unreadable(source: &io::Error) -> String {
-    match source.kind() {
-        io::ErrorKind::NotFound => "no such file".into(),
-        io::ErrorKind::PermissionDenied => "permission denied".into(),
-        io::ErrorKind::IsADirectory => "this is a folder, not a file".into(),
-        _ => format!("the file cannot be read: {source}"),
-    }
-}
-
-fn missing_remedy(source: &io::Error) -> String {
-    match source.kind() {
-        io::ErrorKind::NotFound => "check the name, and that the disk or share is mounted",
-        io::ErrorKind::PermissionDenied => {
-            "run as a user with read access, or change the file mode; the next run tries again"
+/// Message of the operating system, reworded for the usual cases, and the remedy.
+fn unreadable(source: &io::Error) -> (String, &'static str) {
+    let (message, remedy) = match source.kind() {
+        io::ErrorKind::NotFound => ("no such file", "check the name, and that the disk or share is mounted"),
+        io::ErrorKind::PermissionDenied => (
+            "permission denied",
+            "run as a user with read access, or change the file mode; the next run tries again",
+        ),
+        io::ErrorKind::IsADirectory => {
+            ("this is a folder, not a file", "name the file, or the files in it: `FOLDER/*.parquet`")
         }
-        io::ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
         _ if transient::is_file_limit(source) => {
-            "allow more open files (`ulimit -n 4096`); the next run tries again"
+            ("", "allow more open files (`ulimit -n 4096`); the next run tries again")
         }
-        _ => "check the disk or share; the next run tries again",
-    }
-    .into()
+        _ => ("", "check the disk or share; the next run tries again"),
+    };
+    let other = || format!("the file cannot be read: {source}");
+    (if message.is_empty() { other() } else { message.to_owned() }, remedy)
 }
 
 /// How the type of a column of structs begins.

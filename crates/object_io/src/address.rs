@@ -56,8 +56,7 @@ impl Address {
             }
             let (before, rest) = text.split_once(":/").unwrap_or((text, ""));
             let whole = format!("{before}://{}", rest.trim_start_matches('/'));
-            let detail = "it begins with none of s3://, gs:// and az://".to_owned();
-            return Err(Error::Address { text: without_credentials(&whole).unwrap_or(whole), detail });
+            return Err(Error::no_scheme(without_credentials(&whole).unwrap_or(whole)));
         };
         if let Some(text) = without_credentials(text) {
             let detail = "it contains credentials: set them as variables or in a profile (docs/objects.md)";
@@ -76,11 +75,7 @@ impl Address {
     /// [`Error::Address`] when it is not an address or names no bucket.
     pub fn parse_required(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let none = || Error::Address {
-            text: path.display().to_string(),
-            detail: "it begins with none of s3://, gs:// and az://".to_owned(),
-        };
-        Self::parse(path)?.ok_or_else(none)
+        Self::parse(path)?.ok_or_else(|| Error::no_scheme(path.display().to_string()))
     }
 
     /// The key: the text after the bucket, without a trailing slash.

@@ -36,6 +36,10 @@ pub enum Error {
 }
 
 impl Error {
+    pub(crate) fn no_scheme(text: String) -> Self {
+        Self::Address { text, detail: "it begins with none of s3://, gs:// and az://".to_owned() }
+    }
+
     /// Stable error code, documented in `docs/errors.md`.
     pub fn code(&self) -> &'static str {
         match self {

@@ -17,12 +17,6 @@ impl Settings {
     pub const DEFAULT: Self = Self { timeout: Duration::from_secs(30), give_up: Duration::from_mins(3) };
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 static SETTINGS: RwLock<Settings> = RwLock::new(Settings::DEFAULT);
 
 /// Sets the timeouts of clients that are created from now on.

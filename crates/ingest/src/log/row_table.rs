@@ -379,7 +379,7 @@ impl RowTable {
 
     /// What the numbers of a time column are.
     fn ticks(&self, column: &str) -> Result<TickFormat, Error> {
-        let kind = self.files[0].kind(column)?.clone();
+        let kind = self.files[0].leaf(column)?.kind.clone();
         let unit = match (&kind, self.clock.unit) {
             (DataType::Timestamp(unit, zone), _) => {
                 return Ok(TickFormat::of_timestamp(*unit, zone.is_none()));

@@ -317,10 +317,10 @@ pub struct ChannelMapping {
     /// Unit of the position, load or temperature.
     pub unit: Unit,
     /// 1, or −1 where the log counts the other way.
-    #[serde(default = "one_sign", skip_serializing_if = "is_one_sign")]
+    #[serde(default = "one::<i8>", skip_serializing_if = "is_one")]
     pub sign: i8,
     /// `unit = raw · scale + offset`, for counts.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "one::<f64>", skip_serializing_if = "is_one")]
     pub scale: f64,
     /// See `scale`.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -331,7 +331,7 @@ pub struct ChannelMapping {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<f64>,
     /// Turns of this sensor for one turn of the screw. Default 1.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "one::<f64>", skip_serializing_if = "is_one")]
     pub gear_ratio: f64,
     /// A column that marks valid samples; `{position}` as in `column`.
     pub valid_column: Option<String>,
@@ -435,28 +435,14 @@ fn is_yes(values: &[RawValue]) -> bool {
     values == [RawValue::Number(1.0)]
 }
 
-fn one() -> f64 {
-    1.0
+fn one<T: From<i8>>() -> T {
+    1.into()
 }
 
-fn one_sign() -> i8 {
-    1
-}
-
-#[expect(
-    clippy::float_cmp,
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde hands over a reference to the default itself"
-)]
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
+fn is_one<T: From<i8> + PartialEq>(value: &T) -> bool {
+    *value == one()
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-fn is_one_sign(sign: &i8) -> bool {
-    *sign == 1
 }

@@ -190,11 +190,6 @@ impl LogFile {
         }
     }
 
-    /// The type of a leaf's values.
-    pub(crate) fn kind(&self, name: &str) -> Result<&DataType, Error> {
-        self.leaf(name).map(|leaf| &leaf.kind)
-    }
-
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
         match self.noted_field(name)?.data_type() {
@@ -257,7 +252,7 @@ impl LogFile {
         mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        let groups = 0..self.footer.metadata().num_row_groups();
+        let groups = self.groups();
         let wanted: Vec<bool> = groups.clone().map(scan.wants_group).collect();
         let chunks = groups.clone().filter(|group| wanted[*group]);
         let chunks = chunks.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
@@ -305,7 +300,7 @@ impl LogFile {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
         let mut rows = 0;
-        for group in 0..self.footer.metadata().num_row_groups() {
+        for group in self.groups() {
             let (declared, wanted) = (self.rows_of(group), wanted.offset(rows));
             if !wanted.intersects(0..declared) {
                 if declared > self.rows().saturating_sub(rows) {
@@ -406,9 +401,11 @@ impl LogFile {
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
-        let groups = 0..self.footer.metadata().num_row_groups();
-        let rows = groups.clone().fold(0_usize, |rows, group| rows.saturating_add(self.rows_of(group)));
-        groups.into_iter().try_for_each(|group| self.pages(group, leaf).map(drop))?;
+        let mut rows = 0_usize;
+        for group in self.groups() {
+            self.pages(group, leaf)?;
+            rows = rows.saturating_add(self.rows_of(group));
+        }
         self.all_rows(rows, name)
     }
 
@@ -433,7 +430,7 @@ impl LogFile {
     pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         self.want(&leaves)?;
-        for group in 0..self.footer.metadata().num_row_groups() {
+        for group in self.groups() {
             for leaf in &leaves {
                 if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
                     return Ok(false);
@@ -449,7 +446,7 @@ impl LogFile {
 
     /// Fetches every chunk of these leaves.
     fn want(&self, leaves: &[&LeafColumn]) -> Result<(), Error> {
-        let groups = 0..self.footer.metadata().num_row_groups();
+        let groups = self.groups();
         let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
         self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
     }
@@ -482,7 +479,7 @@ impl LogFile {
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted)?;
-        for group in 0..self.footer.metadata().num_row_groups() {
+        for group in self.groups() {
             for leaf in &wanted {
                 let (start, bytes) = self.chunk(group, leaf).byte_range();
                 let end = length.min(start.saturating_add(bytes));

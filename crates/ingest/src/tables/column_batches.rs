@@ -76,10 +76,6 @@ impl TableBatch {
         Self { file: name.to_owned(), header, batch, before }
     }
 
-    pub(super) fn into_rows(self) -> RecordBatch {
-        self.batch
-    }
-
     /// Rows in it.
     pub fn len(&self) -> usize {
         self.batch.num_rows()

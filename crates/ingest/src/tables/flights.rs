@@ -74,11 +74,7 @@ impl Flights {
     /// Every cell that cannot be read, and a second flight of one id on one date without a time.
     pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
         let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
-        let wanted = ["tail_number", "flight_id", "departure_utc"].map(|name| table.column(&[name]));
-        if wanted.iter().any(Result::is_err) {
-            return Err(wanted.into_iter().filter_map(Result::err).collect());
-        }
-        let needed = wanted.map(Result::unwrap_or_default);
+        let needed = table.columns(["tail_number", "flight_id", "departure_utc"])?;
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
         let (mut flights, mut errors) = (Self::default(), Vec::new());
         for row in 0..table.len() {

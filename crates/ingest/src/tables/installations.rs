@@ -44,11 +44,7 @@ struct InstallationColumns {
 impl InstallationColumns {
     fn find(table: &Table) -> Result<Self, Vec<Error>> {
         let wanted = ["tail_number", "position", "part_number", "serial_number", "installed_utc"];
-        let found = wanted.map(|name| table.column(&[name]));
-        if found.iter().any(Result::is_err) {
-            return Err(found.into_iter().filter_map(Result::err).collect());
-        }
-        let names = found.map(Result::unwrap_or_default);
+        let names = table.columns(wanted)?;
         let hours = ["unit_hours_at_install", "tail_hours_at_install"].map(|name| table.find(&[name]));
         Ok(Self { names, removed: table.find(&["removed_utc"]), hours })
     }

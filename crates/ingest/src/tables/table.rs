@@ -1,7 +1,7 @@
 //! Tables read whole, every cell as text.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use arrow::array::RecordBatch;
 
@@ -12,7 +12,7 @@ use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 /// A table, every cell text; an empty cell is none.
 #[derive(Debug, Clone)]
 pub struct Table {
-    file: std::path::PathBuf,
+    file: PathBuf,
     header: Vec<String>,
     columns: Vec<StringColumn>,
     rows: usize,
@@ -28,8 +28,7 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        let parts = batches(file, None)?.map(|part| part.map(TableBatch::into_rows));
-        Self::of_batches(file, &parts.collect::<Result<Vec<_>, _>>()?)
+        Self::of_parts(file, &batches(file, None)?.collect::<Result<Vec<_>, _>>()?)
     }
 
     /// The same table from memory; `name` stands for its file in diagnostics.
@@ -37,8 +36,11 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let parts: Vec<TableBatch> =
-            batches.iter().map(|batch| TableBatch::new(name, batch.clone(), 0)).collect();
+        let part = |batch: &RecordBatch| TableBatch::new(name, batch.clone(), 0);
+        Self::of_parts(name, &batches.iter().map(part).collect::<Vec<_>>())
+    }
+
+    fn of_parts(name: &Path, parts: &[TableBatch]) -> Result<Self, Error> {
         let header = parts.first().map(|part| part.header().to_vec()).unwrap_or_default();
         let column = |column: usize| {
             let texts = parts.iter().map(|part| part.texts(Some(column)));
@@ -80,6 +82,15 @@ impl Table {
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
         let wanted = || self.names.get(names[0]).map_or(names[0], String::as_str);
         self.find(names).ok_or_else(|| missing(&self.file, wanted(), &self.header))
+    }
+
+    /// Where columns stand; an error for each that is not there.
+    pub(super) fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], Vec<Error>> {
+        let found = names.map(|name| self.column(&[name]));
+        if found.iter().all(Result::is_ok) {
+            return Ok(found.map(Result::unwrap_or_default));
+        }
+        Err(found.into_iter().filter_map(Result::err).collect())
     }
 
     /// The text of a cell.

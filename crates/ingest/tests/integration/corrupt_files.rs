@@ -13,12 +13,12 @@ use crate::layouts::{self, channel, place, plain, write};
 #[path = "../../../../tests/hostile/corpus.rs"]
 mod corpus;
 
+fn values() -> ArrayRef {
+    Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()))
+}
+
 fn sound(file: &Path) {
-    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
-    write(
-        file,
-        &[("t", Arc::clone(&values)), ("m", Arc::clone(&values)), ("s", Arc::clone(&values)), ("f", values)],
-    );
+    write(file, &["t", "m", "s", "f"].map(|name| (name, values())));
 }
 
 fn read(file: &Path, m: &Mapping) -> Result<ActuatorChannels, Error> {
@@ -32,11 +32,12 @@ fn code(result: Result<Log, Error>) -> String {
 #[test]
 fn files_that_are_no_logs_are_distinguished() {
     let dir = tempfile::tempdir().unwrap();
-    let m = plain();
+    let m = Arc::new(plain());
+    let open = |file: &Path| Log::open(&LogFiles::one(file), &m);
     let opened = |name: &str, bytes: &[u8]| {
         let file = dir.path().join(name);
         std::fs::write(&file, bytes).unwrap();
-        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
+        open(&file)
     };
     let at = |name: &str, bytes: &[u8]| code(opened(name, bytes));
     let foreign = opened("hdf.parquet", b"\x89HDF\r\n\x1a\n").unwrap_err().diagnostic();
@@ -44,14 +45,11 @@ fn files_that_are_no_logs_are_distinguished() {
     assert_eq!(at("empty.parquet", b""), "empty_log");
     let rows = dir.path().join("rows.parquet");
     write(&rows, &[("t", Arc::new(Float64Array::from(Vec::<f64>::new())))]);
-    assert_eq!(code(Log::open(&LogFiles::one(&rows), &Arc::new(m.clone()))), "empty_log");
+    assert_eq!(code(open(&rows)), "empty_log");
     assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
     assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "encrypted");
-    assert_eq!(code(Log::open(&LogFiles::one(dir.path()), &Arc::new(m.clone()))), "unreadable");
-    assert_eq!(
-        code(Log::open(&LogFiles::one(dir.path().join("none.parquet")), &Arc::new(m.clone()))),
-        "unreadable"
-    );
+    assert_eq!(code(open(dir.path())), "unreadable");
+    assert_eq!(code(open(&dir.path().join("none.parquet"))), "unreadable");
 }
 
 #[test]
@@ -108,28 +106,23 @@ fn a_clock_without_a_unit_is_never_guessed() {
 fn a_name_that_two_columns_have_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("twice.parquet");
-    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
-    let all = |names: &[&'static str]| -> Vec<(&'static str, ArrayRef)> {
-        names.iter().map(|name| (*name, Arc::clone(&values))).collect()
-    };
+    let values = values();
     for column in ["t", "s"] {
-        let mut names = vec!["t", "m", "s", "f"];
-        names.push(column);
-        write(&file, &all(&names));
+        write(&file, &["t", "m", "s", "f", column].map(|name| (name, Arc::clone(&values))));
         let diagnostic = read(&file, &plain()).unwrap_err().diagnostic();
         assert_eq!(
             (diagnostic.code.as_str(), diagnostic.column.as_deref()),
             ("duplicate_column", Some(column))
         );
     }
-    write(&file, &all(&["t", "m", "s", "f", "spare", "spare"]));
+    write(&file, &["t", "m", "s", "f", "spare", "spare"].map(|name| (name, Arc::clone(&values))));
     assert!(read(&file, &plain()).is_ok());
 }
 
 #[test]
 fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
     let (_dir, file) = place("struct.parquet");
-    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    let values = values();
     let field = |name: &str| Arc::new(Field::new(name, DataType::Float64, true));
     let record: ArrayRef = Arc::new(StructArray::from(vec![
         (field("deg"), Arc::clone(&values)),
@@ -146,17 +139,14 @@ fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
 fn names_that_look_alike_are_told_apart() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("alike.parquet");
-    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
-    let columns = |name: &'static str| -> Vec<(&'static str, ArrayRef)> {
-        ["t", "m", name, "f"].into_iter().map(|name| (name, Arc::clone(&values))).collect()
-    };
+    let values = values();
     let alike = [
         ("\u{feff}screw_mm", "screw_mm", "U+FEFF"),
         ("screw\u{a0}mm", "screw mm", "U+00A0"),
         ("scr\u{435}w_mm", "screw_mm", "U+0435"),
     ];
     for (logged, mapped, point) in alike {
-        write(&file, &columns(logged));
+        write(&file, &["t", "m", logged, "f"].map(|name| (name, Arc::clone(&values))));
         let mut m = plain();
         m.channels.screw_position = Some(channel(mapped, Unit::Metre));
         let hint = read(&file, &m).unwrap_err().diagnostic().hint.unwrap();

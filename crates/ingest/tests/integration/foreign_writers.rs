@@ -97,55 +97,30 @@ fn every_writer_and_compression_gives_the_same_flight() {
     assert_eq!(found, 19, "files by pyarrow, polars, pandas, duckdb and spark");
 }
 
+/// Counts, decimals and dictionaries; a row for each actuator, channel, or both; structs, lists, and lists of structs.
 #[test]
-fn counts_decimals_and_dictionaries_give_the_same_flight() {
-    let mut m = wide();
-    m.channels.screw_position =
-        Some(ChannelMapping { scale: 0.001, offset: -20.0, ..m.channels.screw_position.clone().unwrap() });
-    assert_is_the_flight(&actuators(&LogFiles::one(file("pyarrow_types.parquet")), &m), "types", 6e-7, 1);
-}
-
-#[test]
-fn a_row_for_each_actuator_gives_the_same_flight() {
-    let layout = Layout { position_column: Some("actuator".into()), ..Layout::default() };
-    let m = Mapping { layout, ..mapping("") };
-    assert_is_the_flight(
-        &actuators(&LogFiles::one(file("layout_by_position.parquet")), &m),
-        "by position",
-        0.0,
-        1,
-    );
-}
-
-#[test]
-fn a_row_for_each_channel_gives_the_same_flight() {
-    let layout = Layout {
-        name_column: Some("parameter".into()),
-        value_column: Some("value".into()),
-        position_column: None,
-    };
-    let m = Mapping { layout: layout.clone(), ..wide() };
-    assert_is_the_flight(
-        &actuators(&LogFiles::one(file("layout_by_channel.parquet")), &m),
-        "by channel",
-        0.0,
-        1,
-    );
-    let layout = Layout { position_column: Some("actuator".into()), ..layout };
-    let m = Mapping { layout, ..mapping("") };
-    let both = file("layout_by_channel_and_position.parquet");
-    assert_is_the_flight(&actuators(&LogFiles::one(both), &m), "by channel and position", 0.0, 1);
-}
-
-#[test]
-fn structs_lists_and_lists_of_structs_give_the_same_flight() {
-    let structs = actuators(&LogFiles::one(file("layout_structs.parquet")), &mapping("{position}."));
-    assert_is_the_flight(&structs, "structs", 0.0, 1);
-    assert_is_the_flight(&actuators(&LogFiles::one(file("layout_lists.parquet")), &wide()), "lists", 0.0, 1);
-    let layout = Layout { position_column: Some("actuator".into()), ..Layout::default() };
-    let mut m = Mapping { layout, ..mapping("samples.") };
-    m.clock.column = Some("samples.t".into());
-    assert_is_the_flight(&actuators(&LogFiles::one(file("layout_records.parquet")), &m), "records", 0.0, 1);
+fn every_layout_gives_the_same_flight() {
+    let mut types = wide();
+    let screw = types.channels.screw_position.take().unwrap();
+    types.channels.screw_position = Some(ChannelMapping { scale: 0.001, offset: -20.0, ..screw });
+    let by_position = Layout { position_column: Some("actuator".into()), ..Layout::default() };
+    let [name_column, value_column] = ["parameter", "value"].map(|column| Some(column.to_owned()));
+    let by_channel = Layout { name_column, value_column, position_column: None };
+    let by_both = Layout { position_column: Some("actuator".into()), ..by_channel.clone() };
+    let mut records = Mapping { layout: by_position.clone(), ..mapping("samples.") };
+    records.clock.column = Some("samples.t".into());
+    for (name, m, rounding) in [
+        ("pyarrow_types", types, 6e-7),
+        ("layout_by_position", Mapping { layout: by_position, ..mapping("") }, 0.0),
+        ("layout_by_channel", Mapping { layout: by_channel, ..wide() }, 0.0),
+        ("layout_by_channel_and_position", Mapping { layout: by_both, ..mapping("") }, 0.0),
+        ("layout_structs", mapping("{position}."), 0.0),
+        ("layout_lists", wide(), 0.0),
+        ("layout_records", records, 0.0),
+    ] {
+        let log = LogFiles::one(file(&format!("{name}.parquet")));
+        assert_is_the_flight(&actuators(&log, &m), name, rounding, 1);
+    }
 }
 
 #[test]
