@@ -11,11 +11,16 @@ use std::fs;
 use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
-    TailNumber,
-};
+use records::{GapEstimate, GapRecord, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store};
+
+#[path = "../tests/integration/fleet.rs"]
+#[allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "it holds what the tests need, and stops where a name is wrong"
+)]
+mod fleet;
 
 type Outcomes<T> = Result<T, Box<dyn Error>>;
 
@@ -146,28 +151,14 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
         nis: Some(1.0 + 0.1 * noise(6)),
         ..GapEstimate::refused("")
     };
-    Ok(GapRecord {
-        flight: Flight {
-            tail_number: TailNumber::new(tail(tail_at))?,
-            flight_id: FlightId::new(format!("{tail_at}-{flight:04}"))?,
-            departure_utc: departure(flight)?,
-            flight_hours: Some(HOURS),
-            tail_hours_end: Some(1000.0 + HOURS * (flight + 1) as f64),
-        },
-        position: Position::new(POSITIONS[place])?,
-        part_number: PartNumber::new(PARTS[place / 2])?,
-        serial_number: SerialNumber::new(serial(tail_at, place))?,
-        unit_hours: Some(unit.age_h + HOURS * (flight + 1) as f64),
-        estimate: if refused { GapEstimate::refused("no_load_reversal") } else { estimate },
-        provenance: Provenance {
-            log_path: log(tail_at, flight),
-            log_digest: "made".to_owned(),
-            config_digest: "made".to_owned(),
-            program_version: "made".to_owned(),
-            run_id: "made".to_owned(),
-            processed_utc: departure(flight)?,
-        },
-    })
+    let estimate = if refused { GapEstimate::refused("no_load_reversal") } else { estimate };
+    let [tail, serial] = [tail(tail_at), serial(tail_at, place)];
+    let names = [&*tail, POSITIONS[place], PARTS[place / 2], &serial, &format!("{tail_at}-{flight:04}")];
+    let mut record = fleet::record(names, departure(flight)?, HOURS, estimate);
+    let hours = HOURS * (flight + 1) as f64;
+    (record.flight.tail_hours_end, record.unit_hours) = (Some(1000.0 + hours), Some(unit.age_h + hours));
+    record.provenance.log_path = log(tail_at, flight);
+    Ok(record)
 }
 
 fn log(tail_at: usize, flight: usize) -> String {
@@ -180,26 +171,21 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
     let records: Vec<GapRecord> =
         places.map(|(place, unit)| record(tail_at, place, flight, unit)).collect::<Outcomes<_>>()?;
     let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count() as i64;
-    let account = LogRecord {
-        log_path: log(tail_at, flight),
-        size_bytes: 1_000,
-        log_digest: Some("made".to_owned()),
-        config_digest: Some("made".to_owned()),
-        tail_number: Some(tail(tail_at)),
-        flight_id: Some(format!("{tail_at}-{flight:04}")),
-        departure_utc: Some(departure(flight)?),
-        positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: if bad { LogOutcome::Error } else { LogOutcome::Done },
-        estimated: if bad { 0 } else { records.len() as i64 - refused },
-        refused: if bad { 0 } else { refused },
-        error_code: bad.then(|| "time_goes_back".to_owned()),
-        error_detail: bad.then(|| "column <b>t_ns</b>, row 1204311".to_owned()),
-        duration_s: 0.1,
-        run_id: "made".to_owned(),
-        processed_utc: departure(flight)?,
-        ..LogRecord::default()
-    };
-    Ok(LogResult { account, records: if bad { Vec::new() } else { records }, moved_from: Vec::new() })
+    let mut result = fleet::result(records);
+    result.account.estimated -= refused;
+    result.account.refused = refused;
+    if bad {
+        result.records.clear();
+        result.account = LogRecord {
+            outcome: LogOutcome::Error,
+            estimated: 0,
+            refused: 0,
+            error_code: Some("time_goes_back".to_owned()),
+            error_detail: Some("column <b>t_ns</b>, row 1204311".to_owned()),
+            ..result.account
+        };
+    }
+    Ok(result)
 }
 
 fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {

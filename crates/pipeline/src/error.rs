@@ -48,6 +48,12 @@ impl From<records::row_schema::RowError> for Error {
     }
 }
 
+impl From<ingest::Error> for Error {
+    fn from(error: ingest::Error) -> Self {
+        Self::refused(error.diagnostic())
+    }
+}
+
 impl Error {
     pub(crate) fn refused(diagnostic: Diagnostic) -> Self {
         Self::Refused(vec![diagnostic])

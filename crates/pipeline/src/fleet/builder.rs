@@ -7,10 +7,10 @@ use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use rayon::prelude::*;
 
-use crate::fleet::flight_row::{FlightExtras, FlightInput, FlightRow, StoredFlight};
+use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight, signed_error};
 use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::row_keys::{RowKey, TextColumn};
-use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at};
+use crate::fleet::row_keys::TextColumn;
+use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, number};
 
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
@@ -40,29 +40,6 @@ pub(crate) const COLUMNS: [&str; 14] = [
 pub(crate) fn stored_columns() -> Vec<&'static str> {
     let stored = COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
     stored.chain([OTHER_GAP, SETTINGS]).collect()
-}
-
-/// Builder of histories from rows.
-#[derive(Debug, Default)]
-pub struct HistoryBuilder(RowsByUnit<(StoredFlight, ())>);
-
-impl HistoryBuilder {
-    /// Adds a flight.
-    pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
-        let (unit, place) = self.0.of_unit(who);
-        let flown = FlightRow::new(row, place, &mut unit.names);
-        unit.rows.push(((flown, FlightExtras::of(row)), ()));
-    }
-
-    /// The histories of a table made elsewhere.
-    pub fn into_external(self) -> Histories {
-        histories(self.0.into_parts(), false).0
-    }
-
-    /// The histories of the store, whose flights belong to rows of the installations table.
-    pub fn into_store(self) -> Histories {
-        histories(self.0.into_parts(), true).0
-    }
 }
 
 /// Adds rows of an estimates table.
@@ -197,22 +174,21 @@ impl<'a> FlightColumns<'a> {
         let wrong = |detail: String| self.chunk.error(row, Some(self.departure), detail);
         let departure_us = self.departures.is_valid(row).then(|| self.departures.value(row));
         let departure_us = departure_us.ok_or_else(|| wrong("it is empty".into()))?;
-        let departure_utc = Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
+        Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
         let gap_m = at(&self.gaps_m, row);
         if let Some(settings) = self.settings.get(row).filter(|_| gap_m.is_some()) {
             unit.settings.add(settings, 1, departure_us);
         }
-        let input = FlightInput {
-            flight_id: self.flights.get(row),
-            departure_utc,
-            flight_hours: at(&self.hours, row),
-            tail_hours_end: at(&self.meters, row),
-            load_reversals: at(&self.reversals, row).map(|n| n as u64),
-            gap_m,
-            gap_se_m: at(&self.errors_m, row),
-            disagreeing_gap_m: gap_m.and_then(|gap_m| self.other_gap_m(row, gap_m)),
+        let name = self.flights.get(row).unwrap_or_default();
+        let flown = FlightRow::new(departure_us, gap_m, place, name, &mut unit.names);
+        let other_m = gap_m.and_then(|gap_m| self.other_gap_m(row, gap_m));
+        let extras = FlightExtras {
+            flight_hours: number(&self.hours, row),
+            tail_hours_end: number(&self.meters, row),
+            gap_se_m: signed_error(at(&self.errors_m, row), gap_m.zip(other_m)),
+            load_reversals: at(&self.reversals, row).map_or(u64::MAX, |n| n as u64),
         };
-        Ok((FlightRow::new(&input, place, &mut unit.names), FlightExtras::of(&input)))
+        Ok((flown, extras))
     }
 
     /// The gap that contradicts that of a row, m.
@@ -261,9 +237,7 @@ mod tests {
             ("flags", Arc::new(flags.finish())),
         ];
         let batch = RecordBatch::try_from_iter(columns).unwrap();
-        let mut rows = RowsByUnit::default();
-        add_batch(&mut rows, &batch).unwrap();
-        let histories = histories(rows.into_parts(), true).0;
+        let histories = of_batches(&[batch], add_batch);
         let history = histories.get(&(None, "S".into())).unwrap();
         let errors: Vec<f64> =
             history.flights().iter().map(|flown| history.extras(flown).gap_se_m().unwrap() * 1e6).collect();
@@ -272,15 +246,28 @@ mod tests {
         assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
     }
 
+    type Rows = RowsByUnit<(StoredFlight, ())>;
+    type Add = fn(&mut Rows, &RecordBatch) -> Result<(), ingest::Error>;
+
     fn chunk(batch: &RecordBatch) -> TableBatch {
         TableBatch::new("results".as_ref(), batch.clone(), 0)
     }
 
-    fn add_batch(
-        rows: &mut RowsByUnit<(StoredFlight, ())>,
-        batch: &RecordBatch,
-    ) -> Result<(), ingest::Error> {
+    fn add_batch(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
         add_stored(rows, &chunk(batch), batch)
+    }
+
+    fn add_plain(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        add_external(rows, &chunk(batch))
+    }
+
+    /// The histories of a table in batches.
+    fn of_batches(batches: &[RecordBatch], add: Add) -> Histories {
+        let put = |rows: &mut RowsByUnit<_>, part: usize| {
+            add(rows, &batches[part]).unwrap();
+            Ok(())
+        };
+        histories(of_parts(batches.len(), put).unwrap(), true).0
     }
 
     /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
@@ -319,44 +306,21 @@ mod tests {
         RecordBatch::try_from_iter(texts.chain(numbers)).unwrap()
     }
 
-    /// Each row by itself, as the tables mean it.
-    fn one_by_one(rows: &[Cells]) -> Histories {
-        let mut gathering = HistoryBuilder::default();
-        for ([part, serial, tail, position, flight], departure_us, gap_m) in rows {
-            let who = RowKey {
-                part_number: part.as_deref(),
-                serial_number: serial.as_deref().unwrap(),
-                tail_number: tail.as_deref(),
-                position: position.as_deref(),
-            };
-            let row = FlightInput {
-                flight_id: flight.as_deref().map(str::trim),
-                departure_utc: Timestamp::from_microsecond(*departure_us).unwrap(),
-                flight_hours: None,
-                tail_hours_end: None,
-                load_reversals: gap_m.map(|gap| gap as u64),
-                gap_m: *gap_m,
-                gap_se_m: None,
-                disagreeing_gap_m: None,
-            };
-            gathering.put(who, &row);
-        }
-        gathering.into_store()
-    }
-
     #[test]
     fn rows_of_the_store_and_of_a_foreign_table_are_what_each_of_them_is_by_itself() {
         let rows = rows();
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        let (mut stored, mut plain) = (RowsByUnit::default(), RowsByUnit::default());
         // In other parts names have other codes.
-        for some in rows.chunks(230) {
-            add_batch(&mut stored, &batch(some, &coded)).unwrap();
-            add_external(&mut plain, &chunk(&batch(some, &DataType::Utf8))).unwrap();
-        }
-        let expected = row_texts(&one_by_one(&rows));
-        assert_eq!(row_texts(&histories(stored.into_parts(), true).0), expected);
-        assert_eq!(row_texts(&histories(plain.into_parts(), true).0), expected);
+        let parts = |texts| rows.chunks(230).map(|some| batch(some, texts)).collect::<Vec<_>>();
+        let expected = one_by_one(&rows);
+        assert_eq!(row_texts(&of_batches(&parts(&coded), add_batch)), expected);
+        assert_eq!(row_texts(&of_batches(&parts(&DataType::Utf8), add_plain)), expected);
+    }
+
+    /// The histories of rows that are read each by itself.
+    fn one_by_one(rows: &[Cells]) -> Vec<String> {
+        let batches: Vec<_> = rows.chunks(1).map(|row| batch(row, &DataType::Utf8)).collect();
+        row_texts(&of_batches(&batches, add_plain))
     }
 
     /// All that is known of all units.
@@ -374,16 +338,12 @@ mod tests {
     #[test]
     fn any_number_of_workers_brings_together_what_one_does() {
         let rows = rows();
-        let expected = row_texts(&one_by_one(&rows));
+        let expected = one_by_one(&rows);
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
             let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
-            let put = |rows: &mut RowsByUnit<(StoredFlight, ())>, part: usize| {
-                add_batch(rows, &parts[part]).unwrap();
-                Ok(())
-            };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
-            let found = pool.install(|| histories(of_parts(parts.len(), put).unwrap(), true).0);
+            let found = pool.install(|| of_batches(&parts, add_batch));
             assert!(row_texts(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
         }
         assert!(of_parts::<StoredFlight>(0, |_, _| Ok(())).unwrap().is_empty());
@@ -392,7 +352,7 @@ mod tests {
     /// Independent of the order of the workers, the first error of the table is returned.
     #[test]
     fn of_several_errors_the_first_is_returned() {
-        let refuse = |_: &mut RowsByUnit<(StoredFlight, ())>, part: usize| match part {
+        let refuse = |_: &mut Rows, part: usize| match part {
             0..3 => Ok(()),
             first => {
                 let empty = RecordBatch::new_empty(Arc::new(arrow::datatypes::Schema::empty()));

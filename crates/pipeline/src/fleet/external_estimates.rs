@@ -28,10 +28,10 @@ pub struct AsOfQuery {
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Histories, Error> {
-    let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS).map_err(bad)?;
+    let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS)?;
     let parts = of_parts(table.len(), |rows, part| {
-        let mut chunks = table.batches(part..part + 1).map_err(bad)?;
-        chunks.try_for_each(|chunk| builder::add_external(rows, &chunk?)).map_err(bad)
+        let mut chunks = table.batches(part..part + 1)?;
+        Ok(chunks.try_for_each(|chunk| builder::add_external(rows, &chunk?))?)
     })?;
     Ok(builder::histories(parts, false).0)
 }
@@ -41,7 +41,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    let parts = of_parts(chunks.len(), |rows, part| builder::add_external(rows, &chunks[part]).map_err(bad))?;
+    let parts = of_parts(chunks.len(), |rows, part| Ok(builder::add_external(rows, &chunks[part])?))?;
     Ok(builder::histories(parts, false).0)
 }
 
@@ -50,7 +50,7 @@ pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn queries(file: &Path) -> Result<Vec<AsOfQuery>, Error> {
-    queries_of(&Table::read(file).map_err(bad)?)
+    queries_of(&Table::read(file)?)
 }
 
 /// The units and days of a table of queries.
@@ -58,24 +58,16 @@ pub fn queries(file: &Path) -> Result<Vec<AsOfQuery>, Error> {
 /// # Errors
 /// As [`read`].
 pub fn queries_of(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
-    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
-    let as_of = table.column(&["as_of_utc"]).map_err(bad)?;
+    let serial = table.column(&["serial_number", "serial"])?;
+    let as_of = table.column(&["as_of_utc"])?;
     let part = table.find(&["part_number"]);
     (0..table.len())
         .map(|row| {
             Ok(AsOfQuery {
                 part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),
-                serial_number: table
-                    .required(row, serial, name::<records::SerialNumber>)
-                    .map_err(bad)?
-                    .to_string(),
-                as_of_utc: table.required(row, as_of, utc).map_err(bad)?,
+                serial_number: table.required(row, serial, name::<records::SerialNumber>)?.to_string(),
+                as_of_utc: table.required(row, as_of, utc)?,
             })
         })
         .collect()
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "it is what `map_err` hands over")]
-fn bad(error: ingest::Error) -> Error {
-    Error::refused(error.diagnostic())
 }

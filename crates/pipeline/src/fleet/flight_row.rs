@@ -2,22 +2,6 @@
 
 use jiff::Timestamp;
 
-/// One flight of one unit, from the store or from an external table of estimates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct FlightInput<'a> {
-    pub flight_id: Option<&'a str>,
-    pub departure_utc: Timestamp,
-    pub flight_hours: Option<f64>,
-    pub tail_hours_end: Option<f64>,
-    pub load_reversals: Option<u64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-    /// The gap by the other estimator where the record has the flag `estimators_disagree`; of a flagged record of an
-    /// external table its own.
-    pub disagreeing_gap_m: Option<f64>,
-}
-
 /// A flight, and its secondary columns.
 pub(crate) type StoredFlight = (FlightRow, FlightExtras);
 
@@ -36,13 +20,19 @@ pub struct FlightRow {
 }
 
 impl FlightRow {
-    /// A flight in a place of its unit; its name is appended to those of the unit's other flights.
-    pub(crate) fn new(row: &FlightInput<'_>, place: u32, names: &mut String) -> Self {
+    /// A flight in a place of its unit; its name, which may be empty, is appended to those of the unit's other flights.
+    pub(crate) fn new(
+        departure_us: i64,
+        gap_m: Option<f64>,
+        place: u32,
+        name: &str,
+        names: &mut String,
+    ) -> Self {
         let begin = names.len() as u32;
-        names.push_str(row.flight_id.unwrap_or_default());
+        names.push_str(name);
         Self {
-            departure_us: row.departure_utc.as_microsecond(),
-            gap_m: row.gap_m.unwrap_or(f64::NAN),
+            departure_us,
+            gap_m: gap_m.unwrap_or(f64::NAN),
             place,
             row: 0,
             name: [begin, names.len() as u32],
@@ -87,24 +77,15 @@ impl FlightRow {
 #[derive(Debug, Clone, Copy)]
 pub struct FlightExtras {
     /// Numbers; `NaN` for none.
-    flight_hours: f64,
-    tail_hours_end: f64,
-    /// With a negative sign where the record is uncertain.
-    gap_se_m: f64,
+    pub(crate) flight_hours: f64,
+    pub(crate) tail_hours_end: f64,
+    /// As [`signed_error`] makes it.
+    pub(crate) gap_se_m: f64,
     /// The largest number for none.
-    load_reversals: u64,
+    pub(crate) load_reversals: u64,
 }
 
 impl FlightExtras {
-    pub(crate) fn of(row: &FlightInput<'_>) -> Self {
-        Self {
-            flight_hours: row.flight_hours.unwrap_or(f64::NAN),
-            tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
-            gap_se_m: signed_error(row),
-            load_reversals: row.load_reversals.unwrap_or(u64::MAX),
-        }
-    }
-
     /// The flight's length, hours.
     pub fn flight_hours(&self) -> Option<f64> {
         known(self.flight_hours)
@@ -131,11 +112,12 @@ impl FlightExtras {
     }
 }
 
-/// The standard error of a gap; where the estimators disagree, with the distance between them, and negative.
-fn signed_error(row: &FlightInput<'_>) -> f64 {
-    match row.gap_m.zip(row.disagreeing_gap_m) {
-        Some((gap_m, other_m)) => -row.gap_se_m.unwrap_or(0.0).hypot(gap_m - other_m),
-        None => row.gap_se_m.unwrap_or(f64::NAN),
+/// The standard error of a gap, m; where another estimate of the gap contradicts it, with the distance between the two, and
+/// negative.
+pub(crate) fn signed_error(gap_se_m: Option<f64>, contradicting_m: Option<(f64, f64)>) -> f64 {
+    match contradicting_m {
+        Some((gap_m, other_m)) => -gap_se_m.unwrap_or(0.0).hypot(gap_m - other_m),
+        None => gap_se_m.unwrap_or(f64::NAN),
     }
 }
 

@@ -1,11 +1,11 @@
 //! The fleet as it is stored, with the bookkeeping joined: flights of each unit by departure, also from external tables.
 
 pub mod bookkeeping;
-pub mod builder;
+pub(crate) mod builder;
 pub mod external_estimates;
 pub mod flight_row;
 pub mod histories;
-pub mod places;
-pub mod row_keys;
+pub(crate) mod places;
+pub(crate) mod row_keys;
 mod settings_counts;
 pub(crate) mod unit_rows;

@@ -6,12 +6,11 @@ use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
 
 /// Unit and position of a row.
 #[derive(Debug, Clone, Copy)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct RowKey<'a> {
-    pub part_number: Option<&'a str>,
-    pub serial_number: &'a str,
-    pub tail_number: Option<&'a str>,
-    pub position: Option<&'a str>,
+pub(crate) struct RowKey<'a> {
+    pub(crate) part_number: Option<&'a str>,
+    pub(crate) serial_number: &'a str,
+    pub(crate) tail_number: Option<&'a str>,
+    pub(crate) position: Option<&'a str>,
 }
 
 /// Key columns of some rows.

@@ -110,12 +110,6 @@ impl<R> RowsByUnit<R> {
         Ok(())
     }
 
-    /// The rows of a unit, and the number of the place of one that comes.
-    pub(crate) fn of_unit(&mut self, who: RowKey<'_>) -> (&mut UnitRows<R>, u32) {
-        let seat = self.seat(who);
-        (&mut self.units[seat.unit].1, seat.place)
-    }
-
     fn seat(&mut self, who: RowKey<'_>) -> Seat {
         let unit = self.unit(who.part_number, who.serial_number);
         Seat { unit, place: self.units[unit].1.places.number(who.tail_number, who.position) }
@@ -145,11 +139,6 @@ impl<R> RowsByUnit<R> {
         self.units.push((name, UnitRows::default()));
         self.follows.push(0);
         unit
-    }
-
-    /// The rows of each unit.
-    pub(crate) fn into_parts(self) -> PartsByUnit<R> {
-        self.units.into_iter().map(|(name, rows)| (name, vec![rows])).collect()
     }
 }
 
@@ -190,7 +179,7 @@ pub(crate) fn of_store<R: Send>(
     of_parts(scan.len(), |rows, part| {
         scan.read(part)?.iter().try_for_each(|batch| {
             let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-            put(rows, &chunk, batch).map_err(|e| Error::refused(e.diagnostic()))
+            Ok(put(rows, &chunk, batch)?)
         })
     })
 }
@@ -198,4 +187,9 @@ pub(crate) fn of_store<R: Send>(
 /// The number of a row.
 pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
     numbers.is_valid(row).then(|| numbers.value(row))
+}
+
+/// The number of a row; NaN for none.
+pub(crate) fn number(numbers: &Float64Array, row: usize) -> f64 {
+    at(numbers, row).unwrap_or(f64::NAN)
 }

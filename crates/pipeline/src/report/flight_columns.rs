@@ -15,11 +15,19 @@ use crate::fleet::builder::{self, FlightColumns};
 use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::TextColumn;
-use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
+use crate::fleet::unit_rows::{RowsByUnit, number, of_store};
 
-/// Columns of numbers that a page shows and no assessment needs.
-const NUMBERS: [&str; 7] =
-    ["unit_hours", "gap_p05_m", "gap_p95_m", "gap_midrange_m", "gap_largest_m", "load_p05_n", "load_p95_n"];
+/// Columns of numbers that a page shows; an assessment needs load reversals alone of them.
+const NUMBERS: [&str; 8] = [
+    "unit_hours",
+    "gap_p05_m",
+    "gap_p95_m",
+    "gap_midrange_m",
+    "gap_largest_m",
+    "load_p05_n",
+    "load_p95_n",
+    "load_reversals",
+];
 
 /// Columns of the gap along the stroke.
 const PROFILE: [&str; 3] = ["gap_profile_at_m", "gap_profile_m", "gap_profile_se_m"];
@@ -82,11 +90,11 @@ fn add(
     let profiles =
         PROFILE.map(|name| batch.column_by_name(name).and_then(|column| column.as_list_opt::<i32>()));
     flights.add_to(rows, |row| FlightExtras {
-        numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
+        numbers: std::array::from_fn(|k| number(&numbers[k], row)),
         reason: reasons.get(row).map(Into::into),
         flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
         profile: profile_of(&profiles, row),
-        quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
+        quantities: std::array::from_fn(|k| number(&quantities[k], row) as f32),
     })
 }
 

@@ -7,6 +7,7 @@ use job::config::AlertChannel;
 use pipeline::findings::alert_changes::{self, Channels};
 use pipeline::findings::delivery::{self, Attempt, Courier};
 use pipeline::findings::finding::{Finding, GAP};
+use pipeline::findings::summary::AlertSummary;
 use records::{AlertRecord, AlertStatus};
 use serde_json::Value;
 use store::{Holder, Store};
@@ -93,7 +94,8 @@ impl World {
             return (written, Err(killed));
         }
         rows.extend(found);
-        (changes, delivery::deliver(rows, &channels, &run_id, self).map(drop))
+        let summary = &mut AlertSummary::default();
+        (changes, delivery::deliver(rows, &channels, &run_id, self, summary).map(drop))
     }
 }
 
@@ -279,8 +281,9 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     let mut table = Table(due.into_iter().map(|r| (r.alert_id.clone(), r)).collect(), Vec::new(), |_| false);
     let run = |table: &mut Table| {
         let rows = table.0.values().cloned().collect();
-        let done = delivery::deliver(rows, &channels, "2", table).unwrap();
-        (done.sent, done.failed.len(), done.waiting, std::mem::take(&mut table.1).len())
+        let mut summary = AlertSummary::default();
+        let done = delivery::deliver(rows, &channels, "2", table, &mut summary).unwrap();
+        (summary.sent, done.failed.len(), summary.waiting, std::mem::take(&mut table.1).len())
     };
     assert_eq!(run(&mut table), (0, 3, 5, 3));
     assert_eq!(run(&mut table), (0, 3, 5, 3));

@@ -3,18 +3,17 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
-use ingest::Flights;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::fleet::bookkeeping::join::Bookkeeping;
 use records::{
-    Alias, Flight, FlightId, GapEstimate, GapRecord, Installation, Installations, LogRecord, PartNumber,
-    Position, Provenance, RunRecord, SerialNumber, Status, TailNumber,
+    Alias, GapEstimate, GapRecord, Installation, Installations, Position, RunRecord, SerialNumber, Status,
+    TailNumber,
 };
 use store::{Holder, LogResult, Query, Store, Writer};
 
+use crate::fleet;
 use crate::gate::is_gate;
 
 const FLIGHTS: i64 = 6;
@@ -27,23 +26,12 @@ fn departure(flight: i64) -> Timestamp {
 
 /// The tables of a version: each has a unit in every position at every time, so that every record has its place.
 fn tables(version: u64) -> (Config, Installations) {
-    let mut config = Config::parse(
-        include_str!("../../../../tests/data/three-aircraft/pipeline.toml"),
-        Path::new("pipeline.toml"),
-        Path::new("."),
-    )
-    .unwrap();
     let change = departure(version as i64) - SignedDuration::from_hours(1);
+    let part = if version == 4 { "EMA-27-1060" } else { "EMA-27-1040" };
     let unit = |position: &str, serial: &str, from: Timestamp, to: Option<Timestamp>| Installation {
-        tail_number: TailNumber::new("N1").unwrap(),
-        position: Position::new(position).unwrap(),
-        part_number: PartNumber::new(if version == 4 { "EMA-27-1060" } else { "EMA-27-1040" }).unwrap(),
-        serial_number: SerialNumber::new(serial).unwrap(),
-        installed_utc: from,
-        removed_utc: to,
         unit_hours_at_install: Some(100.0 * version as f64),
         tail_hours_at_install: Some(1_000.0),
-        today: None,
+        ..fleet::installation(["N1", position, part, serial], from, to)
     };
     let begin = departure(-1);
     let rows = match version % 3 {
@@ -68,74 +56,36 @@ fn tables(version: u64) -> (Config, Installations) {
     };
     let installations = Installations::new(rows).unwrap();
     let aliases = if version == 5 { vec![alias] } else { Vec::new() };
-    let dir = tempfile::tempdir().unwrap();
     let row = |flight: i64| {
         let hours = 1.0 + 0.25 * version as f64;
         format!("N1,FP1,{},{hours},{}\n", departure(flight), 1_000.0 + hours * (flight + 1) as f64)
     };
     let rows: String = (0..FLIGHTS).map(row).collect();
     let head = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n";
-    std::fs::write(dir.path().join("flights.csv"), format!("{head}{rows}")).unwrap();
-    let identity = &config.document.identity;
-    let read = Flights::read(&dir.path().join("flights.csv"), &BTreeMap::new(), identity);
-    config.flights = Arc::new(read.unwrap());
+    let config = fleet::with_flights(fleet::config(), &format!("{head}{rows}"));
     (config, installations.with_aliases(&aliases))
 }
 
 /// What a run stores of a flight's log under some tables. `correction` is the state of the log's content.
 fn result(flight: i64, correction: u64, (config, installations): &(Config, Installations)) -> LogResult {
     let at = departure(flight);
-    let log_path = format!("N1/{flight}.parquet");
     let row = config.flights.of("N1", "FP1", at);
     let record = |position: &str| {
-        let place = Position::new(position).unwrap();
-        let tail = TailNumber::new("N1").unwrap();
+        let (tail, place) = (TailNumber::new("N1").unwrap(), Position::new(position).unwrap());
         let installation = installations.installed_at(&tail, &place, at).unwrap();
         let (part, serial) = installation.unit();
-        let meter = row.and_then(|row| row.tail_hours_end);
         let gap_m = 1e-6 * (50 + flight) as f64 + 1e-7 * correction as f64;
         let estimate =
             GapEstimate { status: Status::Estimated, gap_m: Some(gap_m), ..GapEstimate::default() };
-        GapRecord {
-            flight: Flight {
-                tail_number: tail,
-                flight_id: FlightId::new("FP1").unwrap(),
-                departure_utc: at,
-                flight_hours: row.and_then(|row| row.flight_hours),
-                tail_hours_end: meter,
-            },
-            position: place,
-            part_number: part.clone(),
-            serial_number: serial.clone(),
-            unit_hours: installation.unit_hours(meter),
-            estimate,
-            provenance: Provenance {
-                log_path: log_path.clone(),
-                log_digest: format!("d{correction}"),
-                config_digest: "c".into(),
-                program_version: "0".into(),
-                run_id: "run".into(),
-                processed_utc: departure(FLIGHTS),
-            },
-        }
+        let names = ["N1", position, part.as_str(), serial.as_str(), "FP1"];
+        let mut record = fleet::record(names, at, 0.0, estimate);
+        record.flight.flight_hours = row.and_then(|row| row.flight_hours);
+        record.flight.tail_hours_end = row.and_then(|row| row.tail_hours_end);
+        record.unit_hours = installation.unit_hours(record.flight.tail_hours_end);
+        record.provenance.log_digest = format!("d{correction}");
+        record
     };
-    let records: Vec<GapRecord> = POSITIONS.map(record).to_vec();
-    let account = LogRecord {
-        log_path: log_path.clone(),
-        size_bytes: 1,
-        log_digest: Some(format!("d{correction}")),
-        config_digest: Some("c".into()),
-        tail_number: Some("N1".into()),
-        flight_id: Some("FP1".into()),
-        departure_utc: Some(at),
-        positions: POSITIONS.map(str::to_owned).to_vec(),
-        estimated: records.len() as i64,
-        duration_s: 0.1,
-        run_id: "run".into(),
-        processed_utc: departure(FLIGHTS),
-        ..LogRecord::default()
-    };
-    LogResult { account, records, moved_from: Vec::new() }
+    fleet::result(POSITIONS.map(record).to_vec())
 }
 
 fn run_row(number: i64, tables_digest: Option<String>) -> RunRecord {

@@ -5,10 +5,10 @@
 mod alerts;
 mod bookkeeping;
 mod distributed;
+mod fleet;
 #[path = "../../../../tests/gate.rs"]
 mod gate;
 mod quantities;
 mod report;
-mod scatter;
 mod trends;
 mod work_requests;

@@ -4,17 +4,14 @@
 //! Six tails with four actuators of two part numbers fly three times a day for half a year. Friction follows a season
 //! of ± 10 % that no temperature channel shows.
 
-use std::path::Path;
-
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::quantities::follow::FollowedQuantities;
 use pipeline::assess::trends::{self, UnitSelection};
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, Installations, LogRecord, PartNumber, Position, Provenance,
-    QuantityChange, SerialNumber, Status, TailNumber, TrendRow,
-};
-use store::{Holder, LogResult, Store};
+use records::{GapEstimate, GapRecord, Installations, QuantityChange, Status, TrendRow};
+use store::LogResult;
+
+use crate::fleet;
 
 const TAILS: i32 = 6;
 const POSITIONS: [&str; 4] = ["aileron_left", "aileron_right", "elevator_left", "elevator_right"];
@@ -112,76 +109,36 @@ fn estimate(at: &At, plant: Plant) -> GapEstimate {
 
 fn record(at: &At, plant: Plant, swaps: bool) -> GapRecord {
     let (tail, position) = (format!("T{}", at.tail), POSITIONS[at.position]);
-    GapRecord {
-        flight: Flight {
-            tail_number: TailNumber::new(&tail).unwrap(),
-            flight_id: FlightId::new(format!("{tail}-{:04}", at.flight)).unwrap(),
-            departure_utc: departure(at.flight),
-            flight_hours: Some(2.0),
-            tail_hours_end: None,
-        },
-        position: Position::new(position).unwrap(),
-        part_number: PartNumber::new(if at.position < 2 { "EMA-27-1040" } else { "EMA-27-1060" }).unwrap(),
-        // Two units change places after half of the flights, if `swaps`.
-        serial_number: match (swaps && at.position == 0 && at.flight >= FLIGHTS / 2, at.tail) {
-            (true, 0) => SerialNumber::new(format!("T1-{position}")).unwrap(),
-            (true, 1) => SerialNumber::new(format!("T0-{position}")).unwrap(),
-            _ => SerialNumber::new(format!("{tail}-{position}")).unwrap(),
-        },
-        unit_hours: None,
-        estimate: estimate(at, plant),
-        provenance: Provenance {
-            log_path: format!("{tail}/{}.parquet", at.flight),
-            log_digest: "d".into(),
-            config_digest: "c".into(),
-            program_version: "0".into(),
-            run_id: "run".into(),
-            processed_utc: departure(FLIGHTS),
-        },
-    }
+    // Two units change places after half of the flights, if `swaps`.
+    let unit = match (swaps && at.position == 0 && at.flight >= FLIGHTS / 2, at.tail) {
+        (true, 0) => 1,
+        (true, 1) => 0,
+        _ => at.tail,
+    };
+    let [serial, flight] = [format!("T{unit}-{position}"), format!("{tail}-{:04}", at.flight)];
+    let part = if at.position < 2 { "EMA-27-1040" } else { "EMA-27-1060" };
+    fleet::record([&tail, position, part, &serial, &flight], departure(at.flight), 2.0, estimate(at, plant))
 }
 
 fn result(tail: i32, flight: i32, plant: Plant, swaps: bool) -> LogResult {
-    let records: Vec<GapRecord> =
-        (0..POSITIONS.len()).map(|position| record(&At { tail, position, flight }, plant, swaps)).collect();
-    let account = LogRecord {
-        log_path: records[0].provenance.log_path.clone(),
-        size_bytes: 1,
-        log_digest: Some("d".into()),
-        config_digest: Some("c".into()),
-        tail_number: Some(records[0].flight.tail_number.to_string()),
-        flight_id: Some(records[0].flight.flight_id.to_string()),
-        departure_utc: Some(records[0].flight.departure_utc),
-        positions: POSITIONS.map(str::to_owned).to_vec(),
-        estimated: records.len() as i64,
-        duration_s: 0.1,
-        run_id: "run".into(),
-        processed_utc: departure(FLIGHTS),
-        ..LogRecord::default()
-    };
-    LogResult { account, records, moved_from: Vec::new() }
+    let positions = 0..POSITIONS.len();
+    fleet::result(positions.map(|position| record(&At { tail, position, flight }, plant, swaps)).collect())
 }
 
 /// Assessments of a fleet in which something is planted.
 fn followed(plant: Plant) -> (Vec<TrendRow>, FollowedQuantities) {
-    assessed(plant, false)
+    assessed(&fleet::config(), plant, false)
 }
 
-fn assessed(plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
-    assessed_under(include_str!("../../../../tests/data/three-aircraft/pipeline.toml"), plant, swaps)
-}
-
-fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
+fn assessed(config: &Config, plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::create_or_open(folder.path().join("results")).unwrap();
     let results: Vec<LogResult> = (0..TAILS)
         .flat_map(|tail| (0..FLIGHTS).map(move |flight| result(tail, flight, plant, swaps)))
         .collect();
-    store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
-    let config = Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
+    let store = fleet::store(folder.path(), &results);
     let ask = UnitSelection::default();
     let found =
-        trends::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap();
+        trends::assess_store_with_quantities(config, &Installations::default(), &store, &ask).unwrap();
     (found.now, found.followed)
 }
 
@@ -244,10 +201,9 @@ fn changes_of_single_units_are_theirs() {
 
 #[test]
 fn a_part_has_limits_of_its_own() {
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml").to_owned()
-        + "\n[part.\"EMA-27-1040\".quantity_limits]\nstiffness_share = 0.5\n";
-    let (rows, _) = assessed_under(
-        &text,
+    let limits = "[part.\"EMA-27-1040\".quantity_limits]\nstiffness_share = 0.5\n\n[logs]";
+    let (rows, _) = assessed(
+        &fleet::config_with("[logs]", limits),
         |at, e| {
             if at.is(0, 0) || at.is(1, 2) {
                 scale(&mut e.stiffness_n_per_m, 1.0 - 0.10 * at.drift());
@@ -308,7 +264,7 @@ fn a_unit_that_moves_to_a_tail_with_another_load_cell_has_not_softened() {
             scale(&mut e.stiffness_n_per_m, 1.08);
         }
     };
-    let (_, found) = assessed(plant, true);
+    let (_, found) = assessed(&fleet::config(), plant, true);
     assert_eq!(found.changes, [], "{:#?}", found.changes);
     let moved =
         found.rows.iter().find(|r| r.serial_number == "T0-aileron_left" && r.quantity == "stiffness_n_per_m");

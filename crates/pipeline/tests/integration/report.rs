@@ -7,17 +7,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
-use job::Config;
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::report::compose::compose;
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, Installations, PartNumber, Position, Provenance, SerialNumber,
-    Status, TailNumber, TrendRow,
-};
+use records::{GapEstimate, GapRecord, Installations, Status, TrendRow};
 use report::{Report, UnitView};
-use store::{Holder, LogRecord, LogResult, Store};
+use store::{LogResult, Store};
 
-use crate::scatter::scatter_um;
+use crate::fleet::{self, config, scatter_um};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 6.0;
@@ -28,11 +24,6 @@ const DAYS: i32 = 400;
 const LAST: i32 = DAYS - DAYS_A_LOG;
 const LIMIT_M: f64 = 150e-6;
 
-fn config() -> Config {
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml");
-    Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
-}
-
 fn day(count: i32) -> Timestamp {
     "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
 }
@@ -41,53 +32,18 @@ fn day(count: i32) -> Timestamp {
 fn record(unit: i32, at: i32) -> GapRecord {
     let hours = HOURS_A_DAY * f64::from(at + 1);
     let gap_um = 20.0 + (20.0 + 2.0 * f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-    GapRecord {
-        flight: Flight {
-            tail_number: TailNumber::new(format!("T{unit:02}")).unwrap(),
-            flight_id: FlightId::new(format!("{unit}-{at}")).unwrap(),
-            departure_utc: day(at),
-            flight_hours: Some(1.5),
-            tail_hours_end: Some(500.0 + hours),
-        },
-        position: Position::new("aileron_left").unwrap(),
-        part_number: PartNumber::new("EMA-27-1040").unwrap(),
-        serial_number: SerialNumber::new(format!("S{unit:02}")).unwrap(),
-        unit_hours: None,
-        estimate: GapEstimate {
-            status: Status::Estimated,
-            reason: None,
-            gap_m: Some(gap_um * 1e-6),
-            gap_se_m: Some(1e-6),
-            load_reversals: 100,
-            ..GapEstimate::default()
-        },
-        provenance: Provenance {
-            log_path: format!("{unit}/{at}.parquet"),
-            log_digest: "d".into(),
-            config_digest: "c".into(),
-            program_version: "0".into(),
-            run_id: "run".into(),
-            processed_utc: day(DAYS),
-        },
-    }
-}
-
-fn log(record: &GapRecord) -> LogRecord {
-    LogRecord {
-        log_path: record.provenance.log_path.clone(),
-        size_bytes: 1,
-        log_digest: Some("d".into()),
-        config_digest: Some("c".into()),
-        tail_number: Some(record.flight.tail_number.to_string()),
-        flight_id: Some(record.flight.flight_id.to_string()),
-        departure_utc: Some(record.flight.departure_utc),
-        positions: vec![record.position.to_string()],
-        estimated: 1,
-        duration_s: 0.1,
-        run_id: "run".into(),
-        processed_utc: day(DAYS),
-        ..LogRecord::default()
-    }
+    let estimate = GapEstimate {
+        status: Status::Estimated,
+        gap_m: Some(gap_um * 1e-6),
+        gap_se_m: Some(1e-6),
+        load_reversals: 100,
+        ..GapEstimate::default()
+    };
+    let [tail, serial, flight] = [format!("T{unit:02}"), format!("S{unit:02}"), format!("{unit}-{at}")];
+    let names = [&tail, "aileron_left", "EMA-27-1040", &serial, &flight];
+    let mut record = fleet::record(names, day(at), 1.5, estimate);
+    record.flight.tail_hours_end = Some(500.0 + hours);
+    record
 }
 
 fn assessed(store: &Store, as_of: Timestamp) -> BTreeMap<String, TrendRow> {
@@ -102,14 +58,10 @@ fn close(a: f64, b: f64, share: f64) -> bool {
 
 /// A store with the records of all units.
 fn store(folder: &Path) -> Store {
-    let store = Store::create_or_open(folder.join("results")).unwrap();
     let flown =
         (0..UNITS).flat_map(|unit| (0..DAYS).step_by(DAYS_A_LOG as usize).map(move |at| record(unit, at)));
-    let results: Vec<LogResult> = flown
-        .map(|record| LogResult { account: log(&record), records: vec![record], moved_from: Vec::new() })
-        .collect();
-    store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
-    store
+    let results: Vec<LogResult> = flown.map(|record| fleet::result(vec![record])).collect();
+    fleet::store(folder, &results)
 }
 
 #[test]

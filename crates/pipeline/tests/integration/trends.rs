@@ -1,84 +1,58 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 
-use std::fmt::Write as _;
-use std::path::Path;
-
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::backtest;
 use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
-use pipeline::fleet::builder::HistoryBuilder;
-use pipeline::fleet::flight_row::FlightInput;
 use pipeline::fleet::histories::Histories;
-use pipeline::fleet::row_keys::RowKey;
-use records::Installations;
-use records::TrendRow;
+use records::{GapEstimate, GapRecord, Installation, Installations, Status, TailNumber, TrendRow};
+use std::fmt::Write as _;
 
-use crate::scatter::scatter_um;
+use crate::fleet::{self, config, scatter_um};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
-
-fn config() -> Config {
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml");
-    Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
-}
 
 fn day(count: i32) -> Timestamp {
     "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
 }
 
-/// A flight of one of the units.
-#[derive(Clone)]
-struct Row {
-    unit: i32,
-    tail: String,
-    flight_id: String,
-    /// All but its name.
-    assess: FlightInput<'static>,
-}
-
-fn gathering(rows: &[Row]) -> HistoryBuilder {
-    let mut gathering = HistoryBuilder::default();
-    for Row { unit, tail, flight_id, assess } in rows {
-        let (serial, position) = (format!("S{unit:02}"), format!("place_{unit}"));
-        let who = RowKey {
-            part_number: Some("EMA-27-1040"),
-            serial_number: &serial,
-            tail_number: Some(tail),
-            position: Some(&position),
-        };
-        gathering.put(who, &FlightInput { flight_id: Some(flight_id), ..*assess });
-    }
-    gathering
-}
-
-fn histories(rows: &[Row]) -> Histories {
-    gathering(rows).into_external()
+/// What a store of some records reads back.
+fn histories(rows: &[GapRecord]) -> Histories {
+    let folder = tempfile::tempdir().unwrap();
+    let results: Vec<_> = rows.iter().map(|row| fleet::result(vec![row.clone()])).collect();
+    trends::load_histories(&fleet::store(folder.path(), &results)).unwrap()
 }
 
 /// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
-fn flown(days: i32) -> Vec<Row> {
+fn flown(days: i32) -> Vec<GapRecord> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
         let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-        let assess = FlightInput {
-            flight_id: None,
-            departure_utc: day(at),
-            flight_hours: Some(HOURS_A_DAY),
-            tail_hours_end: Some(500.0 + hours),
-            load_reversals: Some(100),
+        let estimate = GapEstimate {
+            status: Status::Estimated,
             gap_m: Some(gap_um * 1e-6),
             gap_se_m: Some(1e-6),
-            disagreeing_gap_m: None,
+            load_reversals: 100,
+            ..GapEstimate::default()
         };
-        Row { unit, tail: format!("T{unit:02}"), flight_id: format!("{unit}-{at}"), assess }
+        let [tail, position] = [format!("T{unit:02}"), format!("place_{unit}")];
+        let [serial, flight] = [format!("S{unit:02}"), format!("{unit}-{at}")];
+        let names = [&tail, &position, "EMA-27-1040", &serial, &flight];
+        let mut record = fleet::record(names, day(at), HOURS_A_DAY, estimate);
+        record.flight.tail_hours_end = Some(500.0 + hours);
+        record
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
 }
 
-fn assess(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
+/// The number of the unit that a record of [`flown`] is of.
+fn unit(record: &GapRecord) -> i32 {
+    record.serial_number.as_str()[1..].parse().unwrap()
+}
+
+fn assess(flown: &[GapRecord], as_of: Timestamp) -> Vec<TrendRow> {
     let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
     trends::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
 }
@@ -131,11 +105,11 @@ fn dates_count_from_the_last_flight_at_the_units_own_rate() {
 #[test]
 fn utilisation_counts_the_flights_that_left_no_log() {
     let mut rows = flown(200);
-    rows.retain(|row| row.assess.departure_utc.duration_since(day(0)).as_hours() / 24 % 3 == 0);
+    rows.retain(|row| row.flight.departure_utc.duration_since(day(0)).as_hours() / 24 % 3 == 0);
     let metered = &assess(&rows, day(199))[0];
     assert!((metered.hours_per_day.unwrap() - HOURS_A_DAY).abs() < 1e-9, "{metered:?}");
     assert_eq!(metered.usage_source.as_deref(), Some("tail_hours"));
-    rows.iter_mut().for_each(|row| row.assess.tail_hours_end = None);
+    rows.iter_mut().for_each(|row| row.flight.tail_hours_end = None);
     let logged = &assess(&rows, day(199))[0];
     assert!((logged.hours_per_day.unwrap() - HOURS_A_DAY / 3.0).abs() < 1e-9, "{logged:?}");
     assert_eq!(logged.usage_source.as_deref(), Some("logged_flights"));
@@ -157,8 +131,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
     let installations =
         ingest::tables::installations(table.path(), &config.document.columns.installations).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
-    let rows =
-        trends::assess_histories(&config, &installations, gathering(&rows).into_store(), &ask).unwrap();
+    let rows = trends::assess_histories(&config, &installations, histories(&rows), &ask).unwrap();
     for row in &rows {
         let is_removed = row.serial_number == "S03";
         assert_eq!(row.state.is_none(), is_removed, "{row:?}");
@@ -178,7 +151,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
 
 #[test]
 fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
-    let past = backtest::of_histories(&config(), &Installations::default(), &histories(&flown(700))).unwrap();
+    let past = backtest::of_histories(&config(), &Installations::default(), histories(&flown(700))).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
         let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;
@@ -193,9 +166,7 @@ fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached(
 }
 
 fn booked(file: &str) -> Config {
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-        .replace("[logs]", &format!("[logs]\nmaintenance = \"tests/data/{file}\""));
-    Config::parse(&text, Path::new("pipeline.toml"), Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap()
+    fleet::config_with("[logs]", &format!("[logs]\nmaintenance = \"tests/data/{file}\""))
 }
 
 #[test]
@@ -227,12 +198,6 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }
 
-fn configured_axis(axis: &str) -> Config {
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-        .replace("[trend]", &format!("[trend]\naxis = \"{axis}\""));
-    Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
-}
-
 #[test]
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
@@ -242,12 +207,12 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
                 .unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
-    assert_eq!(axes(&configured_axis("flights")), [Some("flights".to_owned())].into());
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-        .replace("[trend]", "[trend]\naxis = \"flights\"")
-        .replace("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1040\"]\naxis = \"reversals\"");
-    let own = Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
-    assert_eq!(axes(&own), [Some("load_reversals".to_owned())].into());
+    let of_all = "[trend]\naxis = \"flights\"";
+    assert_eq!(axes(&fleet::config_with("[trend]", of_all)), [Some("flights".to_owned())].into());
+    let own = "[part.\"EMA-27-1040\"]";
+    let mut config = fleet::config_with(own, &format!("{own}\naxis = \"reversals\""));
+    config.document.trend.axis = fleet::config_with("[trend]", of_all).document.trend.axis;
+    assert_eq!(axes(&config), [Some("load_reversals".to_owned())].into());
 }
 
 /// The fleet of [`flown`], of which every second flight left no log and no hour meter is read: the flights
@@ -256,33 +221,23 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
 fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     const UNITS: i32 = 14;
     const DAYS: i32 = 300;
-    let folder = tempfile::tempdir().unwrap();
-    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-        .replace("[logs]", "[logs]\nflights = \"flights.csv\"");
-    std::fs::write(folder.path().join("pipeline.toml"), text).unwrap();
     let row = |unit: i32, at: i32| format!("T{unit:02},{unit}-{at},{},2.0\n", day(at));
     let rows = (0..UNITS).flat_map(|unit| (0..DAYS + 50).map(move |at| row(unit, at)));
     let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
-    std::fs::write(folder.path().join("flights.csv"), rows.fold(head, |all, row| all + &row)).unwrap();
-    let config_with = Config::read(&folder.path().join("pipeline.toml")).unwrap();
-    let installation = |unit: i32| records::Installation {
-        tail_number: records::TailNumber::new(format!("T{unit:02}")).unwrap(),
-        position: records::Position::new(format!("place_{unit}")).unwrap(),
-        part_number: records::PartNumber::new("EMA-27-1040").unwrap(),
-        serial_number: records::SerialNumber::new(format!("S{unit:02}")).unwrap(),
-        installed_utc: day(-1),
-        removed_utc: None,
-        unit_hours_at_install: Some(100.0),
-        tail_hours_at_install: None,
-        today: None,
+    let config_with = fleet::with_flights(config(), &rows.fold(head, |all, row| all + &row));
+    let installation = |unit: i32| {
+        let [tail, position, serial] =
+            [format!("T{unit:02}"), format!("place_{unit}"), format!("S{unit:02}")];
+        let names = [&*tail, &position, "EMA-27-1040", &serial];
+        Installation { unit_hours_at_install: Some(100.0), ..fleet::installation(names, day(-1), None) }
     };
     let installations = Installations::new((0..UNITS).map(installation).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
     let assess = |config: &Config| {
         let mut logged = flown(DAYS);
-        logged.retain(|row| row.flight_id.ends_with(['1', '3', '5', '7', '9']));
-        logged.iter_mut().for_each(|row| row.assess.tail_hours_end = None);
-        trends::assess_histories(config, &installations, gathering(&logged).into_store(), &ask).unwrap()
+        logged.retain(|row| row.flight.flight_id.as_str().ends_with(['1', '3', '5', '7', '9']));
+        logged.iter_mut().for_each(|row| row.flight.tail_hours_end = None);
+        trends::assess_histories(config, &installations, histories(&logged), &ask).unwrap()
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in assess(&config_with).iter().zip(assess(&config())).enumerate() {
@@ -305,14 +260,15 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
 fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let nobody = Installations::default();
     let mut rows = flown(228);
-    for row in rows.iter_mut().filter(|row| row.unit == 5 && row.assess.departure_utc >= day(200)) {
-        row.assess.gap_m = row.assess.gap_m.map(|gap| gap - 12e-6);
+    for row in rows.iter_mut().filter(|row| unit(row) == 5 && row.flight.departure_utc >= day(200)) {
+        row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap - 12e-6);
     }
-    let known: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc < day(200)).cloned().collect();
-    let assess = |rows: &[Row]| {
+    let known: Vec<GapRecord> =
+        rows.iter().filter(|row| row.flight.departure_utc < day(200)).cloned().collect();
+    let assess = |rows: &[GapRecord]| {
         trends::assess_histories(&config(), &nobody, histories(rows), &UnitSelection::default()).unwrap()
     };
-    let states = |rows: &[Row]| -> Vec<records::UnitState> {
+    let states = |rows: &[GapRecord]| -> Vec<records::UnitState> {
         assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
     };
     let nothing = std::collections::BTreeSet::new();
@@ -357,15 +313,16 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
 #[test]
 fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
     let mut rows = flown(228);
-    for row in rows.iter_mut().filter(|row| row.unit < 6) {
-        let at = row.assess.departure_utc;
-        row.tail = "T77".into();
-        row.assess.gap_m = match row.unit {
-            4.. => row.assess.gap_m.filter(|_| at < day(200) || at > day(215)),
-            _ => row.assess.gap_m.map(|gap| if at >= day(203) { gap + 8e-6 } else { gap }),
+    for row in rows.iter_mut().filter(|row| unit(row) < 6) {
+        let at = row.flight.departure_utc;
+        row.flight.tail_number = TailNumber::new("T77").unwrap();
+        row.estimate.gap_m = match unit(row) {
+            4.. => row.estimate.gap_m.filter(|_| at < day(200) || at > day(215)),
+            _ => row.estimate.gap_m.map(|gap| if at >= day(203) { gap + 8e-6 } else { gap }),
         };
     }
-    let known: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc <= day(215)).cloned().collect();
+    let known: Vec<GapRecord> =
+        rows.iter().filter(|row| row.flight.departure_utc <= day(215)).cloned().collect();
     let said_then = assess(&known, day(215));
     assert!(said_then[0].change_points.iter().any(|change| change.tail_wide), "{:?}", said_then[0]);
     assert_eq!(assess(&rows, day(215)), said_then);
@@ -376,11 +333,11 @@ fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
 fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
     let mut rows = flown(228);
     for row in &mut rows {
-        if row.unit < 4 {
-            row.tail = "T77".into();
+        if unit(row) < 4 {
+            row.flight.tail_number = TailNumber::new("T77").unwrap();
         }
-        if (row.unit < 4 || row.unit == 9) && row.assess.departure_utc >= day(205) {
-            row.assess.gap_m = row.assess.gap_m.map(|gap| gap + 8e-6);
+        if (unit(row) < 4 || unit(row) == 9) && row.flight.departure_utc >= day(205) {
+            row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap + 8e-6);
         }
     }
     let assess = assess(&rows, day(227));
@@ -410,10 +367,13 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
 fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them() {
     let with = |off_um: f64, is_flagged: bool| {
         let mut rows = flown(200);
-        for row in rows.iter_mut().filter(|row| row.unit == 3 && row.assess.departure_utc > day(193)) {
-            let gap_m = row.assess.gap_m.unwrap();
-            row.assess.gap_m = Some(gap_m + off_um * 1e-6);
-            row.assess.disagreeing_gap_m = is_flagged.then_some(gap_m);
+        for row in rows.iter_mut().filter(|row| unit(row) == 3 && row.flight.departure_utc > day(193)) {
+            let gap_m = row.estimate.gap_m.unwrap();
+            row.estimate.gap_m = Some(gap_m + off_um * 1e-6);
+            if is_flagged {
+                row.estimate.flags = vec!["estimators_disagree".to_owned()];
+                row.estimate.gap_midrange_fitted_m = Some(gap_m);
+            }
         }
         assess(&rows, day(199)).into_iter().find(|row| row.serial_number == "S03").unwrap()
     };

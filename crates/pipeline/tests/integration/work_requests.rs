@@ -5,11 +5,10 @@ use pipeline::findings::finding::{Finding, GAP};
 use pipeline::findings::work_requests::{self, Decision};
 use pipeline::findings::work_update::{self, Tables};
 use pipeline::fleet::bookkeeping::maintenance_log::MaintenanceLog;
-use records::{
-    Installation, Installations, PartNumber, Position, SerialNumber, TailNumber, WorkEvent, WorkEventKind,
-    WorkRequest,
-};
+use records::{Installation, Installations, WorkEvent, WorkEventKind, WorkRequest};
 use trend::MaintenanceEvent;
+
+use crate::fleet;
 
 fn utc(text: &str) -> Timestamp {
     let text = if text.contains('T') { text.to_owned() } else { format!("{text}T00:00:00Z") };
@@ -17,17 +16,7 @@ fn utc(text: &str) -> Timestamp {
 }
 
 fn installation(serial: &str, tail: &str, from: &str, to: Option<&str>) -> Installation {
-    Installation {
-        tail_number: TailNumber::new(tail).unwrap(),
-        position: Position::new("aileron").unwrap(),
-        part_number: PartNumber::new("EMA").unwrap(),
-        serial_number: SerialNumber::new(serial).unwrap(),
-        installed_utc: utc(from),
-        removed_utc: to.map(utc),
-        unit_hours_at_install: None,
-        tail_hours_at_install: None,
-        today: None,
-    }
+    fleet::installation([tail, "aileron", "EMA", serial], utc(from), to.map(utc))
 }
 
 /// A planner's desk: the events so far, and the tables.

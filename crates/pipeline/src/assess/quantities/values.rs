@@ -10,7 +10,7 @@ use store::{Query, Store};
 use crate::error::Error;
 use crate::findings::monitoring::median;
 use crate::fleet::places::{Positions, TailPosition, UnitKey};
-use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, of_store};
+use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, number, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
 const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
@@ -113,11 +113,11 @@ fn add(rows: &mut RowsByUnit<FlightValues>, chunk: &TableBatch) -> Result<(), in
         unit.rows.push(FlightValues {
             departure_us: departures.value(row),
             place,
-            temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
+            temperature_c: number(&temperatures, row) as f32,
             load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
             values: std::array::from_fn(|k| {
                 let (values, errors) = &columns[k];
-                (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)
+                (number(values, row) as f32, at(errors, row).unwrap_or(0.0) as f32)
             }),
         });
         Ok(())

@@ -42,13 +42,9 @@ impl InspectionRow {
             .iter()
             .rev()
             .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days_between(r.departure_utc(), self.date_utc)));
-        let mut gaps: Vec<f64> = near.filter_map(FlightRow::gap_m).take(MAX_COMPARED).collect();
-        gaps.sort_by(f64::total_cmp);
-        let middle = gaps.len() / 2;
-        let median = gaps
-            .get(middle)
-            .map(|upper| if gaps.len() % 2 == 1 { *upper } else { f64::midpoint(gaps[middle - 1], *upper) });
-        (median, gaps.len())
+        let gaps: Vec<f64> = near.filter_map(FlightRow::gap_m).take(MAX_COMPARED).collect();
+        let count = gaps.len();
+        (trend::quantity::median(gaps), count)
     }
 
     /// What it measured, in words, and what the estimates before it read where they contradict it.
@@ -126,22 +122,21 @@ fn plausible_play(text: &str) -> Result<f64, String> {
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be right.
 pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
     let Some(file) = &config.document.logs.inspections else { return Ok(None) };
-    let bad = |e: ingest::Error| Error::refused(e.diagnostic());
-    let table = Table::read(&config.path(file)).map_err(bad)?;
-    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
-    let date = table.column(&["date_utc", "date"]).map_err(bad)?;
-    let play = table.column(&["play_m"]).map_err(bad)?;
+    let table = Table::read(&config.path(file))?;
+    let serial = table.column(&["serial_number", "serial"])?;
+    let date = table.column(&["date_utc", "date"])?;
+    let play = table.column(&["play_m"])?;
     let [part, instrument, force] =
         ["part_number", "instrument", "force_n"].map(|column| table.find(&[column]));
     let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
     let check = |row| {
         Ok(InspectionRow {
             part_number: text(row, part),
-            serial_number: table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
-            date_utc: table.required(row, date, utc).map_err(bad)?,
-            play_m: table.required(row, play, plausible_play).map_err(bad)?,
+            serial_number: table.required(row, serial, name::<SerialNumber>)?.to_string(),
+            date_utc: table.required(row, date, utc)?,
+            play_m: table.required(row, play, plausible_play)?,
             instrument: text(row, instrument),
-            force_n: table.optional(row, force, number).map_err(bad)?,
+            force_n: table.optional(row, force, number)?,
         })
     };
     (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)

@@ -20,20 +20,18 @@ pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
-    let bad = |e: ingest::Error| Error::Refused(vec![e.diagnostic()]);
-    let table = Table::read(file).map_err(bad)?;
-    let [part, serial, done, kind] =
-        ["part_number", "serial_number", "utc", "kind"].map(|n| table.column(&[n]));
-    let (part, serial, done, kind) =
-        (part.map_err(bad)?, serial.map_err(bad)?, done.map_err(bad)?, kind.map_err(bad)?);
+    let table = Table::read(file)?;
+    let column = |name| table.column(&[name]);
+    let (part, serial) = (column("part_number")?, column("serial_number")?);
+    let (done, kind) = (column("utc")?, column("kind")?);
     let mut maintenance = MaintenanceLog::new();
     for row in 0..table.len() {
         let unit = (
-            table.required(row, part, name::<PartNumber>).map_err(bad)?.to_string(),
-            table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
+            table.required(row, part, name::<PartNumber>)?.to_string(),
+            table.required(row, serial, name::<SerialNumber>)?.to_string(),
         );
-        let utc_us = table.required(row, done, utc).map_err(bad)?.as_microsecond();
-        let renews = table.required(row, kind, renews).map_err(bad)?;
+        let utc_us = table.required(row, done, utc)?.as_microsecond();
+        let renews = table.required(row, kind, renews)?;
         maintenance.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
     }
     Ok(maintenance)

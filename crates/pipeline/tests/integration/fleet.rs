@@ -1,0 +1,124 @@
+//! Configurations, installations, records and stores of planned fleets.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use ingest::Flights;
+use jiff::Timestamp;
+use job::Config;
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, Installation, PartNumber, Position, Provenance, SerialNumber,
+    TailNumber,
+};
+use store::{Holder, LogRecord, LogResult, Store};
+
+/// Configuration of the sample fleet, with a text replaced by another; relative paths begin in this crate's folder.
+pub(crate) fn config_with(from: &str, to: &str) -> Config {
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml");
+    assert!(text.contains(from), "{from} is not in the configuration");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    Config::parse(&text.replace(from, to), Path::new("pipeline.toml"), folder).unwrap()
+}
+
+pub(crate) fn config() -> Config {
+    config_with("[logs]", "[logs]")
+}
+
+/// A configuration with a flights table.
+pub(crate) fn with_flights(mut config: Config, table: &str) -> Config {
+    let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+    std::fs::write(file.path(), table).unwrap();
+    let flights = Flights::read(file.path(), &BTreeMap::new(), &config.document.identity);
+    config.flights = Arc::new(flights.unwrap());
+    config
+}
+
+/// An installation of a tail, position, part number and serial number.
+pub(crate) fn installation(
+    [tail, position, part, serial]: [&str; 4],
+    installed_utc: Timestamp,
+    removed_utc: Option<Timestamp>,
+) -> Installation {
+    Installation {
+        tail_number: TailNumber::new(tail).unwrap(),
+        position: Position::new(position).unwrap(),
+        part_number: PartNumber::new(part).unwrap(),
+        serial_number: SerialNumber::new(serial).unwrap(),
+        installed_utc,
+        removed_utc,
+        unit_hours_at_install: None,
+        tail_hours_at_install: None,
+        today: None,
+    }
+}
+
+/// A record of a tail, position, part number, serial number and flight.
+pub(crate) fn record(
+    [tail, position, part, serial, flight]: [&str; 5],
+    departure_utc: Timestamp,
+    flight_hours: f64,
+    estimate: GapEstimate,
+) -> GapRecord {
+    GapRecord {
+        flight: Flight {
+            tail_number: TailNumber::new(tail).unwrap(),
+            flight_id: FlightId::new(flight).unwrap(),
+            departure_utc,
+            flight_hours: Some(flight_hours),
+            tail_hours_end: None,
+        },
+        position: Position::new(position).unwrap(),
+        part_number: PartNumber::new(part).unwrap(),
+        serial_number: SerialNumber::new(serial).unwrap(),
+        unit_hours: None,
+        estimate,
+        provenance: Provenance {
+            log_path: format!("{tail}/{flight} {departure_utc}.parquet"),
+            log_digest: "d".into(),
+            config_digest: "c".into(),
+            program_version: "0".into(),
+            run_id: "run".into(),
+            processed_utc: departure_utc,
+        },
+    }
+}
+
+/// What a run stores of a log with some records of one flight.
+pub(crate) fn result(records: Vec<GapRecord>) -> LogResult {
+    let GapRecord { flight, provenance, .. } = &records[0];
+    let account = LogRecord {
+        log_path: provenance.log_path.clone(),
+        size_bytes: 1,
+        log_digest: Some(provenance.log_digest.clone()),
+        config_digest: Some(provenance.config_digest.clone()),
+        tail_number: Some(flight.tail_number.to_string()),
+        flight_id: Some(flight.flight_id.to_string()),
+        departure_utc: Some(flight.departure_utc),
+        positions: records.iter().map(|record| record.position.to_string()).collect(),
+        estimated: records.len() as i64,
+        duration_s: 0.1,
+        run_id: "run".into(),
+        processed_utc: provenance.processed_utc,
+        ..LogRecord::default()
+    };
+    LogResult { account, records, moved_from: Vec::new() }
+}
+
+/// A store with the results of some logs, below a folder.
+pub(crate) fn store(folder: &Path, results: &[LogResult]) -> Store {
+    let store = Store::create_or_open(folder.join("results")).unwrap();
+    store.lock(&Holder::this_process(), None).unwrap().commit(results).unwrap();
+    store
+}
+
+/// Scatter of ± 1 µm (1 sd), the same in every run: twelve uniform numbers less six.
+pub(crate) fn scatter_um(unit: i32, day: i32) -> f64 {
+    let mut state = (i64::from(unit) * 100_003 + i64::from(day) + 1) as u64;
+    state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
