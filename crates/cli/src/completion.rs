@@ -8,7 +8,7 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use clap_complete::CompletionCandidate;
+use clap_complete::{ArgValueCompleter, CompletionCandidate};
 use job::Config;
 use store::Store;
 
@@ -17,29 +17,9 @@ use crate::args::{CONFIG, QueryKey};
 /// Most names that are offered at once.
 const MAX_CANDIDATES: usize = 200;
 
-/// Tail numbers.
-pub(crate) fn tails(typed: &OsStr) -> Vec<CompletionCandidate> {
-    candidates(typed, "tail_number")
-}
-
-/// Serial numbers.
-pub(crate) fn serials(typed: &OsStr) -> Vec<CompletionCandidate> {
-    candidates(typed, "serial_number")
-}
-
-/// Part numbers.
-pub(crate) fn parts(typed: &OsStr) -> Vec<CompletionCandidate> {
-    candidates(typed, "part_number")
-}
-
-/// Flights.
-pub(crate) fn flights(typed: &OsStr) -> Vec<CompletionCandidate> {
-    candidates(typed, "flight_id")
-}
-
-/// Positions.
-pub(crate) fn positions(typed: &OsStr) -> Vec<CompletionCandidate> {
-    candidates(typed, "position")
+/// Completes the values of a column of the records.
+pub(crate) fn of(column: &'static str) -> ArgValueCompleter {
+    ArgValueCompleter::new(move |typed: &OsStr| candidates(typed, column))
 }
 
 /// Values for the field that the command line of `query` names.

@@ -102,7 +102,7 @@ pub(crate) fn backtest_forecasts(
             Some(batches) => external_estimates::from_batches(&chunks(batches))?,
             None => trends::load_histories(&pipeline::open_store(config, installations)?)?,
         };
-        backtest::of_histories(config, installations, &histories)
+        backtest::of_histories(config, installations, histories)
     });
     table(py, rows)
 }
@@ -188,8 +188,7 @@ pub(crate) fn work(
     status: Option<String>,
     units: [Option<String>; 3],
 ) -> PyResult<Table> {
-    let [tail_number, serial_number, part_number] = units;
-    let selection = WorkSelection { status, tail_number, serial_number, part_number };
+    let selection = WorkSelection { status, units: selection(py, units, None)? };
     let config = &config.inner;
     let found = py.detach(|| Ok(work_list::work_list(config, &selection)?.0));
     table(py, found)

@@ -21,16 +21,16 @@ pub(crate) struct QueryArgs {
     #[arg(value_name = "ID", add = ArgValueCompleter::new(completion::queried))]
     pub second: Option<String>,
     /// Records of this tail.
-    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::tails))]
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = completion::of("tail_number"))]
     pub tail: Option<String>,
     /// Records of this unit.
-    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::serials))]
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = completion::of("serial_number"))]
     pub serial: Option<String>,
     /// Records of this flight.
-    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::flights))]
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = completion::of("flight_id"))]
     pub flight: Option<String>,
     /// Records of this position.
-    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::positions))]
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = completion::of("position"))]
     pub position: Option<String>,
     #[command(flatten)]
     pub departures: DepartureArgs,
@@ -38,7 +38,7 @@ pub(crate) struct QueryArgs {
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true, help_heading = "Selection")]
     pub last: Option<usize>,
     /// Only this part number.
-    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::parts))]
+    #[arg(long, help_heading = "Selection", add = completion::of("part_number"))]
     pub part: Option<String>,
     #[command(flatten)]
     pub rows: RowFormatArgs,
@@ -90,13 +90,13 @@ pub(crate) struct ExternalEstimatesArgs {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ExplainArgs {
     /// Flight to trace.
-    #[arg(add = ArgValueCompleter::new(completion::flights))]
+    #[arg(add = completion::of("flight_id"))]
     pub flight: String,
     /// Position of the actuator.
-    #[arg(add = ArgValueCompleter::new(completion::positions))]
+    #[arg(add = completion::of("position"))]
     pub position: String,
     /// Tail number, if several aircraft have a flight of this name.
-    #[arg(long, add = ArgValueCompleter::new(completion::tails))]
+    #[arg(long, add = completion::of("tail_number"))]
     pub tail: Option<String>,
     #[command(flatten)]
     pub departures: DepartureArgs,

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use clap_complete::ArgValueCompleter;
 
 use super::parse::{parse_count, parse_span, parse_workers};
 use super::selection::DepartureArgs;
@@ -16,10 +15,10 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub departures: DepartureArgs,
     /// Only this tail.
-    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::tails))]
+    #[arg(long, help_heading = "Selection", add = completion::of("tail_number"))]
     pub tail: Option<String>,
     /// Only flights of this unit.
-    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::serials))]
+    #[arg(long, help_heading = "Selection", add = completion::of("serial_number"))]
     pub serial: Option<String>,
     /// Process at most N logs.
     #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true, help_heading = "Selection")]

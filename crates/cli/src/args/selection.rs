@@ -1,7 +1,6 @@
 //! Options that select units and departures.
 
 use clap::Args as ClapArgs;
-use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
 
 use super::parse::parse_utc;
@@ -12,13 +11,13 @@ use crate::completion;
 #[command(next_help_heading = "Selection")]
 pub(crate) struct UnitFilterArgs {
     /// Only units on this tail.
-    #[arg(long, add = ArgValueCompleter::new(completion::tails))]
+    #[arg(long, add = completion::of("tail_number"))]
     pub tail: Option<String>,
     /// Only this unit.
-    #[arg(long, add = ArgValueCompleter::new(completion::serials))]
+    #[arg(long, add = completion::of("serial_number"))]
     pub serial: Option<String>,
     /// Only this part number.
-    #[arg(long, add = ArgValueCompleter::new(completion::parts))]
+    #[arg(long, add = completion::of("part_number"))]
     pub part: Option<String>,
 }
 

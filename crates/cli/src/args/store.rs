@@ -1,7 +1,6 @@
 //! Arguments of `store`.
 
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
-use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
 
 use super::parse::{parse_count, parse_span, parse_utc};
@@ -82,13 +81,13 @@ pub(crate) enum StoreCommand {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ForgetArgs {
     /// Records of this flight.
-    #[arg(long, value_name = "ID", add = ArgValueCompleter::new(completion::flights))]
+    #[arg(long, value_name = "ID", add = completion::of("flight_id"))]
     pub flight: Option<String>,
     /// Records of this log, by its path in the store.
     #[arg(long, value_name = "PATH")]
     pub log: Option<String>,
     /// Records of this tail.
-    #[arg(long, add = ArgValueCompleter::new(completion::tails))]
+    #[arg(long, add = completion::of("tail_number"))]
     pub tail: Option<String>,
     /// Records of this position.
     #[arg(long)]

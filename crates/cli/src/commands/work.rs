@@ -81,9 +81,7 @@ fn decide(
 fn list(config: &Config, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
     let selection = WorkSelection {
         status: args.status.and_then(|status| Some(status.to_possible_value()?.get_name().to_owned())),
-        tail_number: args.units.tail.clone(),
-        serial_number: args.units.serial.clone(),
-        part_number: args.units.part.clone(),
+        units: args.units.selection(None),
     };
     let (found, units) = work_list::work_list(config, &selection)?;
     if found.is_empty() {

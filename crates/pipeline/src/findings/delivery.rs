@@ -18,6 +18,7 @@ use job::config::AlertChannel;
 use records::{AlertRecord, AlertStatus};
 
 use crate::findings::alert_changes::Channels;
+use crate::findings::summary::AlertSummary;
 
 /// Failures in a row after which a channel is left until the next run.
 const MAX_FAILURES: usize = 3;
@@ -37,21 +38,13 @@ pub enum Attempt {
     Unknown(String),
 }
 
-/// What a delivery did, by message.
+/// Messages of a delivery that did not certainly arrive.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Delivery {
-    /// Messages that were accepted.
-    pub sent: usize,
     /// Messages that were not accepted, and why: the next run sends them again.
     pub failed: Vec<AlertRecord>,
     /// Messages that may have been received, new in this run.
     pub unconfirmed: Vec<AlertRecord>,
-    /// Messages that earlier runs left unconfirmed, and that are not sent again.
-    pub unconfirmed_before: usize,
-    /// Messages left for the next run without an attempt.
-    pub waiting: usize,
-    /// Messages that were not sent to a channel that the configuration has no more, by its name.
-    pub without_channel: BTreeMap<String, usize>,
 }
 
 /// Where rows are written, and how messages are sent.
@@ -72,7 +65,7 @@ pub trait Courier {
     fn is_stopped(&self) -> bool;
 }
 
-/// Sends every message that is due in a configured channel, oldest attempt first.
+/// Sends every message that is due in a configured channel, oldest attempt first, and counts the messages in `summary`.
 ///
 /// # Errors
 /// When the store cannot be written; what was not marked is `sending`.
@@ -81,13 +74,14 @@ pub fn deliver<C: Courier>(
     channels: &Channels,
     run_id: &str,
     courier: &mut C,
+    summary: &mut AlertSummary,
 ) -> Result<Delivery, C::Error> {
     let mut delivery = Delivery::default();
     let mut due = BTreeMap::<String, Vec<AlertRecord>>::new();
     for mut row in rows {
         let Some(channel) = channels.get(&row.channel) else {
             if !row.channel.is_empty() && row.status == AlertStatus::Pending {
-                *delivery.without_channel.entry(row.channel).or_default() += 1;
+                *summary.without_channel.entry(row.channel).or_default() += 1;
             }
             continue;
         };
@@ -106,7 +100,7 @@ pub fn deliver<C: Courier>(
         {
             due.entry(row.channel.clone()).or_default().push(row);
         } else if row.status == AlertStatus::Unconfirmed {
-            delivery.unconfirmed_before += 1;
+            summary.unconfirmed_before += 1;
         }
     }
     if !delivery.unconfirmed.is_empty() {
@@ -114,16 +108,10 @@ pub fn deliver<C: Courier>(
     }
     for (name, mut rows) in due {
         // A message that always fails must not keep others back.
-        rows.sort_by(|a, b| {
-            (a.attempts, a.as_of_utc, a.change_number, &a.alert_id).cmp(&(
-                b.attempts,
-                b.as_of_utc,
-                b.change_number,
-                &b.alert_id,
-            ))
-        });
+        rows.sort_by_cached_key(|row| (row.attempts, row.as_of_utc, row.change_number, row.alert_id.clone()));
         let is_repeatable = channels.get(&name).is_some_and(is_repeatable);
-        ChannelDelivery { run_id, is_repeatable, courier, delivery: &mut delivery }.run(rows)?;
+        let delivery = &mut delivery;
+        ChannelDelivery { run_id, is_repeatable, courier, delivery, summary }.run(rows)?;
     }
     Ok(delivery)
 }
@@ -140,6 +128,7 @@ struct ChannelDelivery<'a, C> {
     is_repeatable: bool,
     courier: &'a mut C,
     delivery: &'a mut Delivery,
+    summary: &'a mut AlertSummary,
 }
 
 impl<C: Courier> ChannelDelivery<'_, C> {
@@ -166,7 +155,7 @@ impl<C: Courier> ChannelDelivery<'_, C> {
             failures = if row.error.is_some() { failures + 1 } else { 0 };
             marked.push(row);
         }
-        self.delivery.waiting += rows.len();
+        self.summary.waiting += rows.len();
         if marked.is_empty() { Ok(()) } else { self.courier.write(&marked) }
     }
 
@@ -180,7 +169,7 @@ impl<C: Courier> ChannelDelivery<'_, C> {
         row.error = error;
         mark(row, status, self.run_id);
         match status {
-            AlertStatus::Sent => self.delivery.sent += 1,
+            AlertStatus::Sent => self.summary.sent += 1,
             AlertStatus::Unconfirmed => self.delivery.unconfirmed.push(row.clone()),
             _ => self.delivery.failed.push(row.clone()),
         }

@@ -55,8 +55,8 @@ impl FollowUp<'_> {
         let alerts = summary.alerts.insert(AlertSummary::default());
         let rows = self.detect(&findings, channels, writer, alerts, now)?;
         let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
-        let delivery = delivery::deliver(rows, channels, self.run_id, &mut courier)?;
-        alerts.add(&delivery);
+        let delivery = delivery::deliver(rows, channels, self.run_id, &mut courier, alerts)?;
+        (alerts.failed, alerts.unconfirmed) = (delivery.failed.len(), delivery.unconfirmed.len());
         summary.errors.extend(diagnostics(&delivery));
         Ok(())
     }
@@ -131,17 +131,6 @@ impl FollowUp<'_> {
         writer.write_alerts(&found)?;
         rows.extend(found);
         Ok(rows)
-    }
-}
-
-impl AlertSummary {
-    fn add(&mut self, delivery: &Delivery) {
-        self.sent = delivery.sent;
-        self.failed = delivery.failed.len();
-        self.unconfirmed = delivery.unconfirmed.len();
-        self.unconfirmed_before = delivery.unconfirmed_before;
-        self.waiting = delivery.waiting;
-        self.without_channel.clone_from(&delivery.without_channel);
     }
 }
 

@@ -18,12 +18,8 @@ use crate::fleet::histories::UnitKey;
 pub struct WorkSelection {
     /// `open`, `acknowledged`, `deferred`, `closed` or `all`.
     pub status: Option<String>,
-    /// Requests of this tail only.
-    pub tail_number: Option<String>,
-    /// Requests of this serial number only.
-    pub serial_number: Option<String>,
-    /// Requests of this part number only.
-    pub part_number: Option<String>,
+    /// Units of the requests.
+    pub units: UnitSelection,
 }
 
 impl WorkSelection {
@@ -33,10 +29,8 @@ impl WorkSelection {
             Some("all") => true,
             Some(status) => request.status == status,
         };
-        is_wanted
-            && (self.tail_number.is_none() || self.tail_number == request.tail_number)
-            && self.serial_number.as_ref().is_none_or(|serial| *serial == request.serial_number)
-            && (self.part_number.is_none() || self.part_number == request.part_number)
+        let tail = &self.units.tail_number;
+        is_wanted && self.units.names(&unit(request)) && (tail.is_none() || *tail == request.tail_number)
     }
 }
 

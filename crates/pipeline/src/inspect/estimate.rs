@@ -15,7 +15,7 @@ use crate::logs::discover;
 records::row! {
     /// An estimate without a store: the columns of a record except those of a run. Columns of an unidentified log are
     /// null.
-    #[derive(Debug, Clone)]
+    #[derive(Debug, Clone, Default)]
     #[expect(missing_docs, reason = "each field is the column of a record")]
     pub struct EstimateRow {
         pub tail_number: Option<String>,
@@ -143,18 +143,10 @@ fn unidentified(
     program_version: &str,
 ) -> EstimateRow {
     EstimateRow {
-        tail_number: None,
-        position: None,
         part_number: Some(number.to_string()),
-        serial_number: None,
-        flight_id: None,
-        departure_utc: None,
-        flight_hours: None,
-        tail_hours_end: None,
         estimate,
-        log_path: None,
-        log_digest: None,
         config_digest: config.digest_of_part(number),
         program_version: program_version.to_owned(),
+        ..EstimateRow::default()
     }
 }

@@ -50,8 +50,8 @@ pub fn simulate(
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<usize, Error> {
-    let logs = write_data(spec, folder, jobs, watch)?;
-    text(&folder.join("pipeline.toml"), &configuration(spec, &Tables::of(spec)))?;
+    let (logs, tables) = write_data(spec, folder, jobs, watch)?;
+    text(&folder.join("pipeline.toml"), &configuration(spec, &tables))?;
     Ok(logs)
 }
 
@@ -66,18 +66,19 @@ pub const SAMPLE_FOLDER: &str = "sample-data";
 /// # Errors
 /// [`Error::Refused`] when a file cannot be written.
 pub fn write_sample(folder: &Path, watch: &(dyn Fn(Event) + Sync)) -> Result<usize, Error> {
-    let logs = write_data(&spec(None, None)?, &folder.join(SAMPLE_FOLDER), None, watch)?;
+    let (logs, _) = write_data(&spec(None, None)?, &folder.join(SAMPLE_FOLDER), None, watch)?;
     text(&folder.join("pipeline.toml"), SAMPLE_CONFIGURATION)?;
     Ok(logs)
 }
 
-/// Flies every flight that has a log and writes logs, tables and `truth.parquet`.
+/// Flies every flight that has a log and writes logs, tables and `truth.parquet`. Returns the number of logs and the names of
+/// the tables.
 fn write_data(
     spec: &Spec,
     folder: &Path,
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
-) -> Result<usize, Error> {
+) -> Result<(usize, Vec<&'static str>), Error> {
     let plan = Plan::new(spec).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     let logged: Vec<usize> =
         (0..plan.flights.len()).filter(|&index| plan.flights[index].log != LogState::Absent).collect();
@@ -90,37 +91,27 @@ fn write_data(
             Ok::<(), Error>(())
         })
     })?;
-    let tables = Tables::of(spec);
-    text(&folder.join("installations.csv"), &installations(&plan))?;
-    if tables.flights {
-        text(&folder.join("flights.csv"), &flights(&plan))?;
+    let tables = tables(&plan, spec);
+    for (name, table) in &tables {
+        text(&folder.join(format!("{name}.csv")), table)?;
     }
-    if tables.maintenance {
-        text(&folder.join("maintenance.csv"), &maintenance(&plan))?;
-    }
-    if tables.inspections {
-        text(&folder.join("inspections.csv"), &inspections(&plan))?;
-    }
-    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])
-        .map_err(|e| Error::refused(e.diagnostic()))?;
-    Ok(logged.len())
+    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])?;
+    Ok((logged.len(), tables.into_iter().map(|(name, _)| name).collect()))
 }
 
-/// The tables of a fleet that are not always there.
-struct Tables {
-    flights: bool,
-    maintenance: bool,
-    inspections: bool,
-}
-
-impl Tables {
-    fn of(spec: &Spec) -> Self {
-        Self {
-            flights: spec.flights_per_log > 1,
-            maintenance: spec.reshims.iter().any(|shim| shim.is_recorded),
-            inspections: !spec.play_checks.is_empty(),
-        }
+/// The tables of a fleet, by name; only installations are always there.
+fn tables(plan: &Plan, spec: &Spec) -> Vec<(&'static str, String)> {
+    let mut tables = vec![("installations", installations(plan))];
+    if spec.flights_per_log > 1 {
+        tables.push(("flights", flights(plan)));
     }
+    if spec.reshims.iter().any(|shim| shim.is_recorded) {
+        tables.push(("maintenance", maintenance(plan)));
+    }
+    if !spec.play_checks.is_empty() {
+        tables.push(("inspections", inspections(plan)));
+    }
+    tables
 }
 
 /// Flies one flight and writes its log: a column for each channel of each actuator.
@@ -134,7 +125,7 @@ fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Erro
     let name = log_name(planned);
     let logs = folder.join(if planned.log == LogState::Truncated { "arrives-later" } else { "logs" });
     let file = logs.join(&name);
-    write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.diagnostic()))?;
+    write_parquet(&file, &columns, &facts(planned))?;
     match planned.log {
         LogState::Duplicate => copy(&file)?,
         LogState::Truncated => truncate(&file)?,
@@ -202,64 +193,39 @@ fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
 }
 
 fn installations(plan: &Plan) -> String {
-    let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n".to_owned();
-    for installation in &plan.installations {
-        let removed = installation.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{removed},{:.1},{:.1}",
-            installation.tail_number,
-            installation.position,
-            installation.part_number,
-            installation.serial_number,
-            instant(installation.installed_us),
-            installation.unit_hours_at_install,
-            installation.tail_hours_at_install
-        );
-    }
-    text
+    let head = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n";
+    let rows = plan.installations.iter().map(|of| {
+        let removed = of.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
+        let names = [&of.tail_number, &of.position, &of.part_number, &of.serial_number].map(String::as_str);
+        let (installed, hours) = (instant(of.installed_us), of.unit_hours_at_install);
+        format!("{},{installed},{removed},{hours:.1},{:.1}\n", names.join(","), of.tail_hours_at_install)
+    });
+    head.to_owned() + &rows.collect::<String>()
 }
 
 /// Every flight, with and without a log.
 fn flights(plan: &Plan) -> String {
-    let mut text = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned();
-    for flight in &plan.flights {
-        let _ = writeln!(
-            text,
-            "{},{},{},{:.2},{:.2}",
-            flight.tail_number,
-            flight.flight_id,
-            instant(flight.departure_us),
-            flight.flight_hours,
-            flight.tail_hours_end
-        );
-    }
-    text
+    let row = |of: &PlannedFlight| {
+        let (names, departure) = (format!("{},{}", of.tail_number, of.flight_id), instant(of.departure_us));
+        format!("{names},{departure},{:.2},{:.2}\n", of.flight_hours, of.tail_hours_end)
+    };
+    "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned()
+        + &plan.flights.iter().map(row).collect::<String>()
 }
 
 fn maintenance(plan: &Plan) -> String {
-    let mut text = "part_number,serial_number,utc,kind\n".to_owned();
-    for row in &plan.maintenance {
-        let _ = writeln!(text, "{},{},{},reshim", row.part_number, row.serial_number, instant(row.at_us));
-    }
-    text
+    let rows = plan.maintenance.iter();
+    let rows =
+        rows.map(|of| format!("{},{},{},reshim\n", of.part_number, of.serial_number, instant(of.at_us)));
+    "part_number,serial_number,utc,kind\n".to_owned() + &rows.collect::<String>()
 }
 
 fn inspections(plan: &Plan) -> String {
-    let mut text = "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned();
-    for row in &plan.inspections {
-        let _ = writeln!(
-            text,
-            "{},{},{},{:e},{},{}",
-            row.part_number,
-            row.serial_number,
-            instant(row.at_us),
-            row.play_m,
-            row.instrument,
-            row.force_n
-        );
-    }
-    text
+    let rows = plan.inspections.iter().map(|of| {
+        let (unit, date) = (format!("{},{}", of.part_number, of.serial_number), instant(of.at_us));
+        format!("{unit},{date},{:e},{},{}\n", of.play_m, of.instrument, of.force_n)
+    });
+    "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned() + &rows.collect::<String>()
 }
 
 /// The contract's columns of a truth table: actuators of the flights whose logs are whole.
@@ -291,17 +257,9 @@ fn truth(plan: &Plan) -> Vec<(String, Column)> {
 }
 
 /// A configuration that reads these logs: nominal parts, the sensors' own facts.
-fn configuration(spec: &Spec, tables: &Tables) -> String {
-    let named = |is_there: bool, name: &str| {
-        if is_there { format!("\n{name} = \"{name}.csv\"") } else { String::new() }
-    };
-    let tables = [
-        named(tables.flights, "flights"),
-        named(tables.maintenance, "maintenance"),
-        named(tables.inspections, "inspections"),
-    ];
-    let installations = "installations = \"installations.csv\"";
-    let mut text = HEAD.replace(installations, &format!("{installations}{}", tables.concat()));
+fn configuration(spec: &Spec, tables: &[&str]) -> String {
+    let tables: Vec<String> = tables.iter().map(|name| format!("{name} = \"{name}.csv\"")).collect();
+    let mut text = HEAD.replace("installations = \"installations.csv\"", &tables.join("\n"));
     let Some(first) = spec.parts.first() else { return text };
     text += &channel_tables(first, "channel");
     for part in &spec.parts[1..] {

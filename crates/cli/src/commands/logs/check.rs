@@ -159,45 +159,28 @@ fn log_page(log: &LogCheck) -> String {
 }
 
 fn layout(channels: &[ChannelCheck]) -> String {
-    let columns = [
-        text("position", 0),
-        text("serial", 3),
-        text("channel", 0),
-        text("column", 1),
-        number("min", 0),
-        number("max", 0),
-        text("unit", 1),
-        number("resolution", 4),
-        number("rate [Hz]", 6),
-        number("missing [%]", 2),
-        number("frozen [%]", 5),
-        number("spikes", 7),
-        text("note", 0),
+    let scale = |c: &ChannelCheck| if c.unit == "m" { 1e3 } else { 1.0 };
+    let shown = |v: Option<f64>, places: usize| v.map_or_else(table::empty_cell, |v| format!("{v:.places$}"));
+    let percent = |share: Option<f64>| shown(share.map(|share| share * 100.0), 2);
+    let columns: &table::Columns<'_, ChannelCheck> = &[
+        (text("position", 0), &|c| c.position.clone()),
+        (text("serial", 3), &|c| table::or_dash(c.serial_number.as_deref())),
+        (text("channel", 0), &|c| c.channel.to_owned()),
+        (text("column", 1), &|c| c.column.clone()),
+        (number("min", 0), &|c| shown(c.min.map(|v| v * scale(c)), 3)),
+        (number("max", 0), &|c| shown(c.max.map(|v| v * scale(c)), 3)),
+        (text("unit", 1), &|c| if c.unit == "m" { "mm".to_owned() } else { c.unit.to_owned() }),
+        (number("resolution", 4), &|c| match c.resolution.filter(|_| c.unit == "m") {
+            Some(m) => format!("{:.3} µm", m * 1e6),
+            None => shown(c.resolution, 3),
+        }),
+        (number("rate [Hz]", 6), &|c| shown(c.rate_hz, 1)),
+        (number("missing [%]", 2), &|c| percent(c.missing_share)),
+        (number("frozen [%]", 5), &|c| percent(c.frozen_share)),
+        (number("spikes", 7), &|c| c.spikes.map_or_else(table::empty_cell, |n| n.to_string())),
+        (text("note", 0), &ChannelCheck::note_and_remedy),
     ];
-    let cells = |c: &ChannelCheck| {
-        let scale = if c.unit == "m" { 1e3 } else { 1.0 };
-        let value = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{:.3}", v * scale));
-        let share = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{:.2}", v * 100.0));
-        let step = c.resolution.map_or_else(table::empty_cell, |v| {
-            if c.unit == "m" { format!("{:.3} µm", v * 1e6) } else { format!("{v:.3}") }
-        });
-        vec![
-            c.position.clone(),
-            c.serial_number.clone().unwrap_or_else(table::empty_cell),
-            c.channel.to_owned(),
-            c.column.clone(),
-            value(c.min),
-            value(c.max),
-            if c.unit == "m" { "mm".into() } else { c.unit.to_owned() },
-            step,
-            c.rate_hz.map_or_else(table::empty_cell, |rate| format!("{rate:.1}")),
-            share(c.missing_share),
-            share(c.frozen_share),
-            c.spikes.map_or_else(table::empty_cell, |n| n.to_string()),
-            c.note_and_remedy(),
-        ]
-    };
-    table::layout(&columns, &channels.iter().map(cells).collect::<Vec<_>>())
+    table::of(channels, columns)
 }
 
 /// Column types by log, to find columns whose type changes between logs.

@@ -29,7 +29,7 @@ pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) ->
         Some(file) => pipeline::fleet::external_estimates::read(file)?,
         None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
     };
-    let found = backtest::of_histories(&config, &installations, &histories)?;
+    let found = backtest::of_histories(&config, &installations, histories)?;
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;
     Ok(Code::Success)
 }

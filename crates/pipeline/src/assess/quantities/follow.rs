@@ -564,14 +564,13 @@ fn day(at: Timestamp) -> String {
 fn shown(quantity: Quantity, value: f64) -> String {
     let (unit, factor) = quantity.display_unit();
     let value = (value * factor * 1e3).round() / 1e3 + 0.0;
-    let places = if value.abs() >= 100.0 {
-        0
-    } else if value.abs() >= 10.0 {
-        1
-    } else {
-        2
-    };
-    format!("{value:.places$} {unit}").trim_end().to_owned()
+    format!("{} {unit}", short(value)).trim_end().to_owned()
+}
+
+/// A number with about three digits.
+pub(crate) fn short(value: f64) -> String {
+    let places = [100.0, 10.0].iter().filter(|least| value.abs() < **least).count();
+    format!("{value:.places$}")
 }
 
 /// Whether changes of a quantity are shown as a share.

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use records::{Quantity, QuantityRow};
 
+use crate::assess::quantities::follow::short;
+
 /// Quantities that are compared; a gap differs by wear.
 const COMPARED: [Quantity; 6] = [
     Quantity::StiffnessNPerM,
@@ -162,12 +164,6 @@ fn tail_note(tail: &str, members: &[&Deviation<'_>]) -> String {
     )
 }
 
-/// A number with about three digits.
-fn short(value: f64) -> String {
-    let places = [100.0, 10.0].iter().filter(|least| value.abs() < **least).count();
-    format!("{value:.places$}")
-}
-
 /// What a wrong sensor of a tail does to its gaps, and who should act.
 fn consequence(quantity: Quantity) -> &'static str {
     match quantity {
@@ -204,22 +200,11 @@ mod tests {
                     serial_number: format!("{tail}-{position}"),
                     tail_number: Some(format!("T{tail}")),
                     position: Some(format!("p{position}")),
-                    as_of_utc: jiff::Timestamp::UNIX_EPOCH,
                     quantity: Quantity::StiffnessNPerM.as_str(),
-                    flights: 40,
-                    outliers: 0,
-                    since_utc: None,
-                    baseline: None,
                     level: Some(level),
                     level_se: Some(1e5),
-                    change: None,
-                    change_se: None,
-                    rate_per_hour: None,
-                    rate_se_per_hour: None,
                     change_limit: Some(0.05 * 50e6),
-                    steps: Vec::new(),
-                    state: None,
-                    reason: None,
+                    ..QuantityRow::default()
                 });
             }
         }

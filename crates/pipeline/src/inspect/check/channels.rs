@@ -17,7 +17,7 @@ pub const RATIO: &str = "screw/motor ratio";
 
 records::row! {
     /// One channel of one actuator of one log.
-    #[derive(Debug, Clone)]
+    #[derive(Debug, Clone, Default)]
     #[expect(missing_docs, reason = "each field is a column named for what it holds")]
     pub struct ChannelCheck {
         pub log: String,
@@ -109,17 +109,7 @@ pub(super) fn actuator(
         channel,
         column: column.cloned().unwrap_or_default(),
         unit,
-        samples: 0,
-        missing_share: None,
-        min: None,
-        max: None,
-        resolution: None,
-        rate_hz: None,
-        frozen_share: None,
-        saturated_share: None,
-        spikes: None,
-        note: None,
-        remedy: None,
+        ..ChannelCheck::default()
     };
     if !at.lacking.is_empty() {
         let note =
