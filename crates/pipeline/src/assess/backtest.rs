@@ -64,12 +64,13 @@ records::row! {
 pub fn of_histories(
     config: &Config,
     installations: &Installations,
-    histories: &Histories,
+    mut histories: Histories,
 ) -> Result<Vec<BacktestRow>, Error> {
-    let cuts: Vec<(&UnitKey, Timestamp)> =
-        histories.iter().flat_map(|(name, history)| cuts(history).map(move |day| (name, day))).collect();
+    let of_unit =
+        |(name, history): (&UnitKey, _)| cuts(history).map(|day| (name.clone(), day)).collect::<Vec<_>>();
+    let cuts: Vec<(UnitKey, Timestamp)> = histories.iter().flat_map(of_unit).collect();
     let days: Vec<Timestamp> = cuts.iter().map(|(_, day)| *day).collect();
-    let fleet = FleetContext::new(config, installations, histories, &days)?;
+    let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
     let pasts = cuts.par_iter().map(|(name, day)| past(&fleet, name, *day));
     Ok(pasts.collect::<Result<Vec<_>, Error>>()?.into_iter().flatten().collect())
 }

@@ -53,7 +53,7 @@ pub struct UnitSelection {
 
 impl UnitSelection {
     /// Whether a unit of that name is selected, on any tail.
-    fn names(&self, name: &UnitKey) -> bool {
+    pub(crate) fn names(&self, name: &UnitKey) -> bool {
         self.serial_number.as_ref().is_none_or(|s| *s == name.1)
             && (self.part_number.is_none() || self.part_number == name.0)
     }
@@ -115,11 +115,11 @@ pub fn assess_store_with_quantities(
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
-    let mut histories = load_histories(&store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
+    let mut histories = load_histories(store)?;
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
-    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc, config))
@@ -162,9 +162,9 @@ pub fn assess_run(
     units: &BTreeSet<UnitKey>,
     run: RunFacts<'_>,
 ) -> Result<RunAssessments, Error> {
-    let mut histories = load_histories(&store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
+    let mut histories = load_histories(store)?;
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
-    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
     let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
     let (mut now, tail_wide) = fleet.statements_with_steps(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
@@ -222,7 +222,7 @@ pub(crate) struct ReportAssessments {
 pub(crate) fn assess_for_report(
     config: &Config,
     installations: &Installations,
-    histories: &Histories,
+    histories: &mut Histories,
     ask: &UnitSelection,
     days_before: &[i64],
     store: &Store,
@@ -267,7 +267,7 @@ pub fn assess_queries(
 ) -> Result<Vec<TrendRow>, Error> {
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
     let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
-    let fleet = FleetContext::consuming(config, installations, &mut histories, &days)?;
+    let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
     let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
     queries.par_iter().zip(&selected).map(statement).collect()
 }
@@ -305,7 +305,7 @@ pub fn assess_histories(
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
-    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
     Ok(fleet.selected(ask, as_of)?.0)
 }
 
@@ -349,22 +349,8 @@ pub(crate) struct FleetContext<'a> {
 
 impl<'a> FleetContext<'a> {
     /// Adds up the usage of all units, and learns the priors of the cut-off before each of the `days`, without later data.
+    /// Frees the columns of the histories that the sums hold.
     pub(crate) fn new(
-        config: &'a Config,
-        installations: &'a Installations,
-        histories: &'a Histories,
-        days: &[Timestamp],
-    ) -> Result<Self, Error> {
-        let books = UsageSources::read(config, installations)?;
-        let is_booked = histories.is_booked();
-        let units: Vec<_> = histories.iter().collect();
-        let read = |(name, history)| books.series(name, history, is_booked);
-        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Self::of(config, installations, histories, series, days)
-    }
-
-    /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
-    fn consuming(
         config: &'a Config,
         installations: &'a Installations,
         histories: &'a mut Histories,
@@ -379,18 +365,7 @@ impl<'a> FleetContext<'a> {
         };
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Self::of(config, installations, histories, series, days)
-    }
-
-    /// Histories, and the usage series of each; the operator's tables apply to those of the store alone.
-    fn of(
-        config: &'a Config,
-        installations: &'a Installations,
-        histories: &'a Histories,
-        series: Vec<Series>,
-        days: &[Timestamp],
-    ) -> Result<Self, Error> {
-        let is_booked = histories.is_booked();
+        let histories: &'a Histories = histories;
         let limits = Limits::new(config, series.iter());
         let parts = histories.names().map(|name| name.0.as_deref()).zip(&series);
         let priors = FleetPriors::train(parts, limits, days);

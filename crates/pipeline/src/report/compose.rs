@@ -22,7 +22,7 @@ use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name}
 use crate::report::flight_columns::{FlightExtras, StoreContents};
 use records::report_rows::{ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow};
 use records::time::{days_after, days_between};
-use records::{ChangePoint, TrendRow, WorkRequest};
+use records::{ChangePoint, TrendRow};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -43,19 +43,19 @@ pub fn compose(
 ) -> Result<Report, Error> {
     let mut checks = inspections::read(config)?;
     let mut logs = Logs::of(store)?;
-    let StoreContents { histories, mut extras, store_version } =
-        StoreContents::until(ask.as_of_utc, &store.clone().by_largest_gap(config.parts_by_largest_gap()))?;
+    let StoreContents { mut histories, mut extras, store_version } =
+        StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { fleet, drawn, before, past, priors } =
-        trends::assess_for_report(config, installations, &histories, ask, &days, store)?;
+        trends::assess_for_report(config, installations, &mut histories, ask, &days, store)?;
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
     checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
-    let requests = requests_by_unit(work_requests::requests(&store.work_events()?, made_utc));
+    let mut requests = by_unit(work_requests::requests(&store.work_events()?, made_utc), work_requests::unit);
     let mut tails = tails(&histories, config, as_of_utc);
     // An aircraft whose units flew on others alone has a page too: theirs lead to it.
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
@@ -65,13 +65,15 @@ pub fn compose(
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
         installations: &InstallationIndex::new(installations),
-        quantities: by_unit(&followed.rows),
-        requests: &requests,
+        quantities: by_unit(&followed.rows, |row| row.unit()),
     };
     let unit = |(row, drawn): (TrendRow, &Forecast)| {
         let name = row.unit();
         let extras = extras.remove(&name).unwrap_or_default();
-        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &extras)
+        let work_requests = requests.remove(&name).unwrap_or_default();
+        let history = histories.get(&name);
+        let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), &extras);
+        UnitView { work_requests, ..view }
     };
     let units: Vec<UnitView> = now.into_iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.row.tail_number.as_deref()).collect();
@@ -102,18 +104,11 @@ pub fn compose(
     })
 }
 
-fn requests_by_unit(requests: Vec<WorkRequest>) -> BTreeMap<Name, Vec<WorkRequest>> {
-    let mut by_unit = BTreeMap::<Name, Vec<WorkRequest>>::new();
-    for request in requests {
-        by_unit.entry(work_requests::unit(&request)).or_default().push(request);
-    }
-    by_unit
-}
-
-fn by_unit(rows: &[QuantityRow]) -> BTreeMap<Name, Vec<&QuantityRow>> {
-    let mut units: BTreeMap<Name, Vec<&QuantityRow>> = BTreeMap::new();
+/// Rows by the unit that each is of.
+fn by_unit<R>(rows: impl IntoIterator<Item = R>, unit: impl Fn(&R) -> Name) -> BTreeMap<Name, Vec<R>> {
+    let mut units = BTreeMap::<Name, Vec<R>>::new();
     for row in rows {
-        units.entry(row.unit()).or_default().push(row);
+        units.entry(unit(&row)).or_default().push(row);
     }
     units
 }
@@ -168,7 +163,6 @@ struct ReportComposer<'a> {
     checks: &'a [InspectionRow],
     installations: &'a InstallationIndex<'a>,
     quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
-    requests: &'a BTreeMap<Name, Vec<WorkRequest>>,
 }
 
 impl ReportComposer<'_> {
@@ -197,7 +191,7 @@ impl ReportComposer<'_> {
             flights: flights(history, extras),
             quantities: self.quantities(&name, history, extras),
             installations,
-            work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
+            work_requests: Vec::new(),
             row,
         }
     }
@@ -361,8 +355,16 @@ fn flight(
         None => format!("refused: {reason}"),
         Some(_) => reason.to_owned(),
     });
-    let [unit_hours, gap_p05_m, gap_p95_m, gap_midrange_m, gap_largest_m, load_p05_n, load_p95_n] =
-        extras.numbers();
+    let [
+        unit_hours,
+        gap_p05_m,
+        gap_p95_m,
+        gap_midrange_m,
+        gap_largest_m,
+        load_p05_n,
+        load_p95_n,
+        load_reversals,
+    ] = extras.numbers();
     FlightRow {
         departure_utc: flown.departure_utc(),
         flight_id: history.flight_id(flown).unwrap_or_default().into(),
@@ -375,7 +377,7 @@ fn flight(
         gap_midrange_m,
         gap_largest_m,
         profile: extras.profile.clone(),
-        load_reversals: history.extras(flown).load_reversals(),
+        load_reversals: load_reversals.map(|n| n as u64),
         load_p05_n,
         load_p95_n,
         remarks: reason

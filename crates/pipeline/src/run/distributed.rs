@@ -16,16 +16,16 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::LogFiles;
 use job::Config;
 use records::row_schema::{from_batch, to_batch};
-use records::{Diagnostic, GapRecord, Installations};
+use records::{GapRecord, Installations};
 use serde::{Deserialize, Serialize};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
 use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
-use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
+use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::scheduler::{Context, Touched, WorkerContext, execute_run};
+use crate::run::scheduler::{Context, RunInputs, Touched, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::StepCount;
 
@@ -44,14 +44,6 @@ pub struct Task {
 
 /// Processes tasks and returns their results in any order.
 pub type Engine<'a> = dyn FnMut(&[Task]) -> Result<Vec<RecordBatch>, String> + 'a;
-
-/// Status and diagnostics of a processed log, without its records.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct TaskResult {
-    account: LogRecord,
-    #[serde(rename = "complaints")]
-    diagnostics: Vec<Diagnostic>,
-}
 
 /// The columns of a result: those of a record, and three more. Each log has one row with its status
 /// (`account`, and `error_code` with `error_detail` where it failed), and one row for each record.
@@ -76,43 +68,40 @@ pub fn process_task(
     task: &Task,
     program_version: &str,
 ) -> Result<RecordBatch, Error> {
-    let (plan, budget) = (Plan::default(), MemoryBudget::new(config.document.run.memory_mib));
-    let (plan, budget, steps, run_id) = (&plan, &budget, &StepCount::default(), task.run_id.as_str());
-    let worker = WorkerContext { config, installations, program_version, plan, run_id, budget, steps };
+    // Content can be known only to a plan that has accounts, and this one has none.
+    let inputs = RunInputs {
+        config: config.clone(),
+        installations: installations.clone(),
+        plan: Plan::default(),
+        run_id: task.run_id.clone(),
+        program_version: program_version.to_owned(),
+    };
+    let (budget, steps) = (MemoryBudget::new(config.document.run.memory_mib), StepCount::default());
+    let worker = WorkerContext { inputs: &inputs, budget: &budget, steps: &steps };
     let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
     let log_path = task.log_path.clone();
     let work = WorkItem { files, fault: None, log_path, stat: None, why: WorkReason::New, before: None };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    match pool.install(|| worker.process_log(&work)) {
-        LogOutcomeData::Read { account, records, diagnostics } => {
-            encode_result(&account, &records, diagnostics)
-        }
-        // Content can be known only to a plan that has accounts, and this one has none.
-        LogOutcomeData::Same(account) => encode_result(&account, &[], Vec::new()),
-    }
+    encode_result(&pool.install(|| worker.process_log(&work)))
 }
 
 /// Result of one log as rows: its status first, then its records.
-fn encode_result(
-    account: &LogRecord,
-    records: &[GapRecord],
-    diagnostics: Vec<Diagnostic>,
-) -> Result<RecordBatch, Error> {
-    let results = TaskResult { account: account.clone(), diagnostics };
-    let results = serde_json::to_string(&results).map_err(|e| Error::Engine(e.to_string()))?;
+fn encode_result(done: &ProcessedLog) -> Result<RecordBatch, Error> {
+    let json = serde_json::to_string(done).map_err(|e| Error::Engine(e.to_string()))?;
+    let account = &done.account;
     let schema = schema();
     let head = |field: &Arc<Field>| -> ArrayRef {
         let text = match field.name().as_str() {
             "log_path" => Some(account.log_path.as_str()),
             "error_code" => account.error_code.as_deref(),
             "error_detail" => account.error_detail.as_deref(),
-            "account" => Some(results.as_str()),
+            "account" => Some(json.as_str()),
             _ => return new_null_array(field.data_type(), 1),
         };
         Arc::new(StringArray::from(vec![text]))
     };
     let first = RecordBatch::try_new(Arc::clone(&schema), schema.fields().iter().map(head).collect())?;
-    let records = to_batch(records)?;
+    let records = to_batch(&done.records)?;
     let rest = |field: &Arc<Field>| {
         let column = records.column_by_name(field.name()).cloned();
         column.unwrap_or_else(|| new_null_array(field.data_type(), records.num_rows()))
@@ -137,14 +126,14 @@ pub fn run(
         intent.state(writer)?;
         let budget = MemoryBudget::new(config.document.run.memory_mib);
         let steps = StepCount::default();
-        let worker = &inputs.worker(&budget, &steps);
-        let mut ledger = OwnershipLedger::of(worker.plan, worker.config);
+        let worker = &WorkerContext { inputs, budget: &budget, steps: &steps };
+        let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config);
         report.not_reached = 0;
-        for works in worker.plan.work.chunks(at_a_time.max(1)) {
+        for works in inputs.plan.work.chunks(at_a_time.max(1)) {
             process_batch((worker, context), works, engine, (writer, &mut ledger, report))?;
         }
         report.not_reached = report.not_reached_logs.len();
-        report.add_coverage(ledger.accounts(), worker.config, worker.installations);
+        report.add_coverage(ledger.accounts(), &inputs.config, &inputs.installations);
         Ok(Touched { units: ledger.touched, renamed: ledger.renamed })
     })
 }
@@ -157,13 +146,13 @@ fn process_batch(
     (writer, ledger, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
 ) -> Result<(), Error> {
     let sound = works.iter().filter(|work| work.fault.is_none());
-    let tasks: Vec<Task> = sound.map(|work| task(work, worker.run_id)).collect();
+    let tasks: Vec<Task> = sound.map(|work| task(work, &worker.inputs.run_id)).collect();
     let mut answers =
         if tasks.is_empty() { HashMap::new() } else { read(&engine(&tasks).map_err(Error::Engine)?)? };
     let mut results: Vec<LogResult> = Vec::new();
     for work in works {
         let done = match answers.remove(&work.log_path) {
-            Some((results, records)) => to_log_result(worker, work, results, records),
+            Some(answer) => to_log_result(worker, work, answer),
             None if work.fault.is_some() => worker.process_log(work),
             None => {
                 report.not_reached_logs.push(work.log_path.clone());
@@ -190,30 +179,24 @@ fn task(work: &WorkItem, run_id: &str) -> Task {
 }
 
 /// Outcome of a log, as if it had been processed by this process.
-fn to_log_result(
-    worker: &WorkerContext<'_>,
-    work: &WorkItem,
-    results: TaskResult,
-    records: Vec<GapRecord>,
-) -> LogOutcomeData {
+fn to_log_result(worker: &WorkerContext<'_>, work: &WorkItem, answer: ProcessedLog) -> ProcessedLog {
     // The engine has seen the log, and this process its file.
     let LogRecord { size_bytes, modified_utc_ns, file_id, log_path, .. } =
-        summary::of_log(work, worker.run_id);
-    let mut account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..results.account };
+        summary::of_log(work, &worker.inputs.run_id);
+    let ProcessedLog { account, records, diagnostics } = answer;
+    let mut account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..account };
     if let Some((estimated, refused)) = worker.already_recorded(work, &account) {
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
-        return LogOutcomeData::Same(Box::new(already_recorded));
+        return ProcessedLog::without_records(already_recorded, Vec::new());
     }
-    summary::set_error(&mut account, &results.diagnostics);
-    LogOutcomeData::Read { account: Box::new(account), records, diagnostics: results.diagnostics }
+    summary::set_error(&mut account, &diagnostics);
+    ProcessedLog { account, records, diagnostics }
 }
-
-type TaskResults = HashMap<String, (TaskResult, Vec<GapRecord>)>;
 
 /// Results by log, with rows in any order. The first of equal rows counts; a result
 /// that lacks records is ignored.
-fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
-    let mut results: HashMap<String, TaskResult> = HashMap::new();
+fn read(batches: &[RecordBatch]) -> Result<HashMap<String, ProcessedLog>, Error> {
+    let mut results: HashMap<String, ProcessedLog> = HashMap::new();
     let mut records: HashMap<String, BTreeMap<RecordKey, GapRecord>> = HashMap::new();
     for batch in batches {
         let batch = typed(batch)?;
@@ -229,10 +212,10 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
             of_log.entry(RecordKey::of(&record)).or_insert(record);
         }
     }
-    let whole = results.into_iter().filter_map(|(log, results)| {
+    let whole = results.into_iter().filter_map(|(log, answer)| {
         let records: Vec<GapRecord> = records.remove(&log).unwrap_or_default().into_values().collect();
-        (records.len() as i64 == results.account.estimated + results.account.refused)
-            .then_some((log, (results, records)))
+        (records.len() as i64 == answer.account.estimated + answer.account.refused)
+            .then_some((log, ProcessedLog { records, ..answer }))
     });
     Ok(whole.collect())
 }

@@ -14,6 +14,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use job::Config;
 use job::flight_log::{duplicate_flight, may_be_pieces, pieces_undeclared};
 use records::{Diagnostic, GapRecord, Status};
+use serde::{Deserialize, Serialize};
 use store::{HeldRecord, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
@@ -23,30 +24,35 @@ use crate::run::event::Event;
 use crate::run::summary::{self, DuplicateLog, RunSummary};
 
 /// Outcome of one log.
-pub(crate) enum LogOutcomeData {
-    /// The content is known; only name or date is new.
-    Same(Box<LogRecord>),
-    /// The log was read.
-    Read {
-        /// Its status.
-        account: Box<LogRecord>,
-        /// Its records.
-        records: Vec<GapRecord>,
-        /// Its errors.
-        diagnostics: Vec<Diagnostic>,
-    },
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ProcessedLog {
+    /// Its status: `known` where its content and settings are those of stored records, so that only its name or its date is
+    /// new.
+    pub(crate) account: LogRecord,
+    /// Its records.
+    #[serde(skip)]
+    pub(crate) records: Vec<GapRecord>,
+    /// Its errors.
+    #[serde(rename = "complaints")]
+    pub(crate) diagnostics: Vec<Diagnostic>,
 }
 
-impl LogOutcomeData {
+impl ProcessedLog {
+    /// A log without records.
+    pub(crate) fn without_records(account: LogRecord, diagnostics: Vec<Diagnostic>) -> Self {
+        Self { account, records: Vec::new(), diagnostics }
+    }
+
+    /// Whether the content is known, so that no record was made.
+    pub(crate) fn is_known(&self) -> bool {
+        self.account.outcome == LogOutcome::Known
+    }
+
     pub(crate) fn event(&self, work: &WorkItem) -> Event {
         let (log, bytes) = (work.log_path.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
-        let (estimated, refused, diagnostics) = match self {
-            Self::Read { account, diagnostics, .. } => {
-                (account.estimated as usize, account.refused as usize, diagnostics.clone())
-            }
-            Self::Same(_) => (0, 0, Vec::new()),
-        };
-        Event::Finished { log, bytes, estimated, refused, diagnostics }
+        let new = |count: i64| if self.is_known() { 0 } else { count as usize };
+        let (estimated, refused) = (new(self.account.estimated), new(self.account.refused));
+        Event::Finished { log, bytes, estimated, refused, diagnostics: self.diagnostics.clone() }
     }
 }
 
@@ -118,41 +124,37 @@ impl<'a> OwnershipLedger<'a> {
     /// When the stored records of its flight cannot be read.
     pub(crate) fn resolve(
         &mut self,
-        done: LogOutcomeData,
+        done: ProcessedLog,
         writer: &Writer,
         report: &mut RunSummary,
     ) -> Result<Vec<LogResult>, Error> {
-        match done {
-            LogOutcomeData::Same(account) => {
-                report.known += 1;
-                if let Some(digests) = plan::digests(&account) {
-                    let is_new_path = !self.plan.accounts.contains_key(&account.log_path);
-                    let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
-                    let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
-                    self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
-                    let owner = self.plan.here.get(&digests).filter(|owner| **owner != account.log_path);
-                    if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
-                        let (log, owner) = (account.log_path.clone(), owner.clone());
-                        report.duplicates.push(DuplicateLog { log, owner });
-                    }
-                }
-                self.insert((*account).clone());
-                Ok(vec![LogResult { account: *account, records: Vec::new(), moved_from: Vec::new() }])
-            }
-            LogOutcomeData::Read { account, records, diagnostics } => {
-                self.read(*account, records, diagnostics, writer, report)
+        if !done.is_known() {
+            return self.read(done, writer, report);
+        }
+        let account = done.account;
+        report.known += 1;
+        if let Some(digests) = plan::digests(&account) {
+            let is_new_path = !self.plan.accounts.contains_key(&account.log_path);
+            let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
+            let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
+            self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
+            let owner = self.plan.here.get(&digests).filter(|owner| **owner != account.log_path);
+            if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
+                let (log, owner) = (account.log_path.clone(), owner.clone());
+                report.duplicates.push(DuplicateLog { log, owner });
             }
         }
+        self.insert(account.clone());
+        Ok(vec![LogResult { account, records: Vec::new(), moved_from: Vec::new() }])
     }
 
     fn read(
         &mut self,
-        mut account: LogRecord,
-        records: Vec<GapRecord>,
-        mut diagnostics: Vec<Diagnostic>,
+        done: ProcessedLog,
         writer: &Writer,
         report: &mut RunSummary,
     ) -> Result<Vec<LogResult>, Error> {
+        let ProcessedLog { mut account, records, mut diagnostics } = done;
         let pieces = self.undeclared_pieces(&account);
         if !pieces.is_empty() {
             return Ok(self.refuse_pieces(account, diagnostics, pieces, report));

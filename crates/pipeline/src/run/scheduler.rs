@@ -30,7 +30,7 @@ use crate::fleet::histories::UnitKey;
 use crate::logs::discover;
 use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
-use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
+use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::summary::{self, KilledRun, RunSummary};
 use crate::run::worker_pool::{Next, PoolSettings, StepCount, WorkerPool};
@@ -131,7 +131,7 @@ pub(crate) fn execute_run(
     refuse_placeholders(config, &installations)?;
     inspections::read(config)?;
     let found = discover::discover(config)?;
-    let store = Store::create_or_open(config.store())?;
+    let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
     let mut writer = store.lock(&context.holder, context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
@@ -235,26 +235,12 @@ pub(crate) struct RunInputs {
 }
 
 impl RunInputs {
-    /// Input of a worker.
-    pub(crate) fn worker<'a>(&'a self, budget: &'a MemoryBudget, steps: &'a StepCount) -> WorkerContext<'a> {
-        WorkerContext {
-            config: &self.config,
-            installations: &self.installations,
-            program_version: &self.program_version,
-            plan: &self.plan,
-            run_id: &self.run_id,
-            budget,
-            steps,
-        }
-    }
-
     /// Outcome of a log that exceeded its time limit.
-    pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> LogOutcomeData {
+    pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> ProcessedLog {
         let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
-        let mut failed = self.worker(&budget, &steps).failed(work, diagnostic);
-        if let LogOutcomeData::Read { account, .. } = &mut failed {
-            account.duration_s = after_s;
-        }
+        let worker = WorkerContext { inputs: self, budget: &budget, steps: &steps };
+        let mut failed = worker.failed(work, diagnostic);
+        failed.account.duration_s = after_s;
         failed
     }
 }
@@ -269,7 +255,7 @@ fn process_all(
     raise_mmap_threshold();
     let shared = Arc::clone(inputs);
     let process_log = move |log: usize, budget: &MemoryBudget, steps: &StepCount| {
-        shared.worker(budget, steps).process_log(&shared.plan.work[log])
+        WorkerContext { inputs: &shared, budget, steps }.process_log(&shared.plan.work[log])
     };
     let run = &inputs.config.document.run;
     let settings = PoolSettings {
@@ -316,74 +302,65 @@ fn write(
 /// Input of a worker, shared by all.
 #[derive(Clone, Copy)]
 pub(crate) struct WorkerContext<'a> {
-    pub(crate) config: &'a Config,
-    pub(crate) installations: &'a Installations,
-    pub(crate) program_version: &'a str,
-    pub(crate) plan: &'a Plan,
-    pub(crate) run_id: &'a str,
+    pub(crate) inputs: &'a RunInputs,
     pub(crate) budget: &'a MemoryBudget,
     pub(crate) steps: &'a StepCount,
 }
 
 impl WorkerContext<'_> {
     /// One log; when a read of it failed for a cause that may pass, it is read again as a whole.
-    pub(crate) fn process_log(&self, work: &WorkItem) -> LogOutcomeData {
+    pub(crate) fn process_log(&self, work: &WorkItem) -> ProcessedLog {
         for delay in READ_AGAIN_AFTER {
             let done = self.process_once(work);
-            match &done {
-                LogOutcomeData::Read { diagnostics, .. }
-                    if diagnostics.iter().any(|diagnostic| ingest::is_transient(&diagnostic.code)) =>
-                {
-                    std::thread::sleep(delay);
-                }
-                _ => return done,
+            if !done.diagnostics.iter().any(|diagnostic| ingest::is_transient(&diagnostic.code)) {
+                return done;
             }
+            std::thread::sleep(delay);
         }
         self.process_once(work)
     }
 
     /// One log; a panic in it is an error row like any other.
-    fn process_once(&self, work: &WorkItem) -> LogOutcomeData {
+    fn process_once(&self, work: &WorkItem) -> ProcessedLog {
         let clock = Instant::now();
         let done = catch_panic(&work.log_path, || Ok(self.open(work)));
-        let done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
-        match done {
-            LogOutcomeData::Read { mut account, records, diagnostics } => {
-                account.duration_s = clock.elapsed().as_secs_f64();
-                LogOutcomeData::Read { account, records, diagnostics }
-            }
-            same @ LogOutcomeData::Same(_) => same,
+        let mut done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
+        if !done.is_known() {
+            done.account.duration_s = clock.elapsed().as_secs_f64();
         }
+        done
     }
 
-    fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> LogOutcomeData {
-        let mut account = summary::of_log(work, self.run_id);
-        let digest = match self.plan.unidentified.as_str() {
-            "" => digest_without_identity(self.config, self.installations),
+    fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> ProcessedLog {
+        let mut account = summary::of_log(work, &self.inputs.run_id);
+        let digest = match self.inputs.plan.unidentified.as_str() {
+            "" => digest_without_identity(&self.inputs.config, &self.inputs.installations),
             known => known.to_owned(),
         };
         account.config_digest = Some(digest);
         summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
-        LogOutcomeData::Read {
-            account: Box::new(account),
-            records: Vec::new(),
-            diagnostics: vec![diagnostic],
-        }
+        ProcessedLog::without_records(account, vec![diagnostic])
     }
 
-    fn open(&self, work: &WorkItem) -> LogOutcomeData {
+    fn open(&self, work: &WorkItem) -> ProcessedLog {
         if let Some(fault) = &work.fault {
             return self.failed(work, fault.clone());
         }
         let step = self.steps.begin();
-        let opened = match FlightLog::open(&work.files, &work.log_path, self.config, self.installations) {
+        let opened = match FlightLog::open(
+            &work.files,
+            &work.log_path,
+            &self.inputs.config,
+            &self.inputs.installations,
+        ) {
             Ok(opened) => opened,
             Err(diagnostic) => return self.failed(work, diagnostic),
         };
         let flight = opened.flight();
         let names = opened.position_names();
-        let mut account = summary::of_log(work, self.run_id);
-        account.config_digest = Some(config_digest(self.config, self.installations, &flight, &names));
+        let mut account = summary::of_log(work, &self.inputs.run_id);
+        account.config_digest =
+            Some(config_digest(&self.inputs.config, &self.inputs.installations, &flight, &names));
         account.log_digest = Some(opened.digest.clone());
         account.tail_number = Some(flight.tail_number.to_string());
         account.flight_id = Some(flight.flight_id.to_string());
@@ -392,7 +369,7 @@ impl WorkerContext<'_> {
         if let Some(already_recorded) = self.already_recorded(work, &account) {
             (account.estimated, account.refused) = already_recorded;
             account.outcome = LogOutcome::Known;
-            return LogOutcomeData::Same(Box::new(account));
+            return ProcessedLog::without_records(account, Vec::new());
         }
         drop(step);
         self.read(&opened, account)
@@ -413,16 +390,16 @@ impl WorkerContext<'_> {
         if let Some(own) = work.before.as_ref().filter(is_known) {
             return Some((own.estimated, own.refused));
         }
-        let here = self.plan.here.get(&digests).and_then(|path| self.plan.accounts.get(path));
+        let here = self.inputs.plan.here.get(&digests).and_then(|path| self.inputs.plan.accounts.get(path));
         let is_copy = here.filter(is_known).map(|_| (0, 0));
-        let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
+        let gone = self.inputs.plan.gone.get(&digests.0).into_iter().flatten();
         is_copy.or_else(|| gone.filter(is_known).map(|gone| (gone.estimated, gone.refused)).next())
     }
 
-    fn read(&self, opened: &FlightLog, mut account: LogRecord) -> LogOutcomeData {
+    fn read(&self, opened: &FlightLog, mut account: LogRecord) -> ProcessedLog {
         let stamp = ProvenanceStamp {
-            run_id: self.run_id.to_owned(),
-            program_version: self.program_version.to_owned(),
+            run_id: self.inputs.run_id.clone(),
+            program_version: self.inputs.program_version.clone(),
             processed_utc: Timestamp::now(),
         };
         let (records, diagnostics) = self.records(opened, &stamp);
@@ -430,17 +407,17 @@ impl WorkerContext<'_> {
         account.refused = refused as i64;
         account.estimated = (records.len() - refused) as i64;
         summary::set_error(&mut account, &diagnostics);
-        LogOutcomeData::Read { account: Box::new(account), records, diagnostics }
+        ProcessedLog { account, records, diagnostics }
     }
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
     fn records(&self, opened: &FlightLog, stamp: &ProvenanceStamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
-        let actuators: Vec<_> = opened.actuators(self.installations).collect();
+        let actuators: Vec<_> = opened.actuators(&self.inputs.installations).collect();
         let bytes = MemoryBudget::actuator_bytes(opened.rows());
         let process_log = |at: &&ActuatorColumns| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();
-            opened.record(at, self.config, self.installations, stamp)
+            opened.record(at, &self.inputs.config, &self.inputs.installations, stamp)
         };
         let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
         for done in actuators.par_iter().with_max_len(1).map(process_log).collect::<Vec<_>>() {
@@ -456,7 +433,7 @@ impl WorkerContext<'_> {
 }
 
 /// Results that arrive within a short time after the first.
-fn collect_batch(first: LogOutcomeData, pool: &mut WorkerPool<'_>) -> Result<Vec<LogOutcomeData>, Error> {
+fn collect_batch(first: ProcessedLog, pool: &mut WorkerPool<'_>) -> Result<Vec<ProcessedLog>, Error> {
     let deadline = Instant::now() + BATCH_WAIT;
     let mut gathered = vec![first];
     while gathered.len() < BATCH_LOGS {

@@ -17,7 +17,7 @@ use records::Diagnostic;
 use crate::error::Error;
 use crate::logs::plan::{Plan, WorkItem};
 use crate::run::event::Event;
-use crate::run::flight_ownership::LogOutcomeData;
+use crate::run::flight_ownership::ProcessedLog;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::time_limit::log_timeout;
 
@@ -34,7 +34,7 @@ const MAX_ABANDONED_IN_A_ROW: usize = 16;
 const MAX_LATE: usize = 256;
 
 /// What does one log, by its index in the plan.
-pub(crate) type ProcessLog = dyn Fn(usize, &MemoryBudget, &StepCount) -> LogOutcomeData + Send + Sync;
+pub(crate) type ProcessLog = dyn Fn(usize, &MemoryBudget, &StepCount) -> ProcessedLog + Send + Sync;
 
 /// How many steps of a log (its opening, an actuator) threads are at just now.
 #[derive(Debug, Default)]
@@ -50,13 +50,13 @@ impl StepCount {
 /// What a worker reports; the order of one worker's messages is kept.
 enum Message {
     Started { log: usize, at: Instant },
-    Finished { log: usize, outcome: Box<LogOutcomeData> },
+    Finished { log: usize, outcome: Box<ProcessedLog> },
 }
 
 /// What comes next.
 pub(crate) enum Next {
     /// What came of a log.
-    Log(Box<LogOutcomeData>),
+    Log(Box<ProcessedLog>),
     /// Nothing until the deadline.
     Nothing,
     /// Every log is finished or will not be reached.
@@ -159,7 +159,7 @@ pub(crate) struct PoolSettings<'a> {
     pub(crate) stop: &'a AtomicBool,
     pub(crate) watch: &'a (dyn Fn(Event) + Sync),
     /// The outcome of a log that was given up after some seconds.
-    pub(crate) fail: &'a dyn Fn(&WorkItem, Diagnostic, f64) -> LogOutcomeData,
+    pub(crate) fail: &'a dyn Fn(&WorkItem, Diagnostic, f64) -> ProcessedLog,
 }
 
 /// The workers of a run, seen from the thread that writes.
@@ -248,7 +248,7 @@ impl<'a> WorkerPool<'a> {
         self.workers.shared.stop();
     }
 
-    fn finished(&mut self, log: usize, outcome: Box<LogOutcomeData>) -> Next {
+    fn finished(&mut self, log: usize, outcome: Box<ProcessedLog>) -> Next {
         self.is_finished[log] = true;
         (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
         Next::Log(outcome)
@@ -328,7 +328,7 @@ mod tests {
             before: None,
         };
         let plan = Plan { work: (0..logs).map(work).collect(), ..Plan::default() };
-        let outcome = |work: &WorkItem| LogOutcomeData::Same(Box::new(not_reached(work, "run")));
+        let outcome = |work: &WorkItem| ProcessedLog::without_records(not_reached(work, "run"), Vec::new());
         let accounts = plan.work.clone();
         let process_log = move |log: usize, _: &MemoryBudget, steps: &StepCount| {
             process(log, steps);
