@@ -2,6 +2,7 @@
 
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
@@ -16,26 +17,34 @@ use crate::sensors::sensor::Sensors;
 pub const SAMPLE_SPEC: &str = include_str!("../../specs/sample.toml");
 
 /// A fleet, its flights and its sensors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Spec {
     /// Everything random follows from this. Default 1.
+    #[default(1)]
     pub seed: u64,
     /// Midnight UTC of this day opens the plan, `2026-03-02`.
+    #[default("2026-03-02")]
     pub start_date: String,
     /// Tail numbers.
     pub tails: Vec<String>,
     /// How many flights each tail makes. Default 10.
+    #[default(10)]
     pub flights_per_tail: usize,
     /// One flight of this many in a row, drawn at random, has a log. Default 1: each.
+    #[default(1)]
     pub flights_per_log: usize,
     /// Each flight has a slot of so many days; below 1, several flights a day. Default 7.
+    #[default(7.0)]
     pub days_between_flights: f64,
     /// Mean length of a flight, hours. Default 1.8.
+    #[default(1.8)]
     pub flight_hours: f64,
     /// Flights last evenly between ± this share of the mean. Default 0.3.
+    #[default(0.3)]
     pub flight_hours_spread: f64,
     /// What the first tail's meter reads at the start, hours; each further tail has 10 % more. Default 2000.
+    #[default(2000.0)]
     pub tail_hours: f64,
     /// Length, rate and loads of the logs.
     pub profile: Profile,
@@ -216,36 +225,6 @@ pub struct Aircraft {
     pub load_bias_n: f64,
     /// Vibration of its loads in place of the profile's. Default the profile's.
     pub buffet: Option<Vibration>,
-}
-
-impl Default for Spec {
-    /// No aircraft; ten weekly flights from 2026-03-02 on.
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            start_date: "2026-03-02".to_owned(),
-            tails: Vec::new(),
-            flights_per_tail: 10,
-            flights_per_log: 1,
-            days_between_flights: 7.0,
-            flight_hours: 1.8,
-            flight_hours_spread: 0.3,
-            tail_hours: 2000.0,
-            profile: Profile::default(),
-            sensors: Sensors::default(),
-            spread: ParameterSpread::default(),
-            parts: Vec::new(),
-            positions: Vec::new(),
-            units: Vec::new(),
-            swaps: Vec::new(),
-            replacements: Vec::new(),
-            reshims: Vec::new(),
-            play_checks: Vec::new(),
-            log_faults: Vec::new(),
-            aircraft: Vec::new(),
-            changes: Vec::new(),
-        }
-    }
 }
 
 impl Spec {

@@ -1,13 +1,14 @@
 //! Changes that come over the flights of a fleet: to a unit, to the sensors of a tail, to all units of a part.
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, finite, positive, within};
 use crate::plant::actuator_plant::Plant;
 use crate::sensors::sensor::Sensors;
 
 /// A change of the actuators that meet all of its conditions; a condition that is left out holds for all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlantedChange {
     /// The aircraft.
@@ -19,12 +20,15 @@ pub struct PlantedChange {
     /// The unit, wherever it is installed.
     pub serial_number: Option<String>,
     /// First flight of a tail that shows the change, counted from 1. Default 1.
+    #[default(1)]
     pub from_flight: usize,
     /// Flight from which the whole change shows; in between it grows in proportion. Default `from_flight`: a step.
     pub to_flight: Option<usize>,
     /// Stiffness over that before. Default 1.
+    #[default(1.0)]
     pub stiffness_factor: f64,
     /// Dry and load-dependent friction over that before. Default 1.
+    #[default(1.0)]
     pub friction_factor: f64,
     /// Added to the gain error of the load cell. Default 0.
     pub load_gain: f64,
@@ -44,26 +48,6 @@ pub(crate) struct ActuatorFlight<'a> {
     pub(crate) serial_number: &'a str,
     /// Flight of the tail, counted from 1.
     pub(crate) number: usize,
-}
-
-impl Default for PlantedChange {
-    /// Of all actuators, from the first flight on: nothing.
-    fn default() -> Self {
-        Self {
-            tail: None,
-            position: None,
-            part_number: None,
-            serial_number: None,
-            from_flight: 1,
-            to_flight: None,
-            stiffness_factor: 1.0,
-            friction_factor: 1.0,
-            load_gain: 0.0,
-            load_bias_n: 0.0,
-            skew_s: 0.0,
-            load_delay_s: 0.0,
-        }
-    }
 }
 
 impl PlantedChange {

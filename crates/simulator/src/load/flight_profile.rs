@@ -1,6 +1,7 @@
 //! Flight profile: duration, sample rate, commands and loads.
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, not_negative, positive, within};
 use crate::load::turbulence::GustForm;
@@ -10,26 +11,35 @@ use crate::load::vibration::Vibration;
 ///
 /// The phases stretch with the duration. The load is dynamic pressure × (manoeuvre + gust −
 /// stiffness × deflection), so it reverses many times unless `no_reversal` or `reversals` limits that.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Profile {
     /// Length of the log, seconds, 5 to 20 000. Default 150.
+    #[default(150.0)]
     pub duration_s: f64,
     /// Samples per second, 10 to 5000. Default 250.
+    #[default(250.0)]
     pub sample_rate_hz: f64,
     /// The load that about one cruise sample in twenty exceeds, N. Default 8000.
+    #[default(8000.0)]
     pub load_n: f64,
     /// Half the stroke: commands stay within ± this, metres. Default 0.03.
+    #[default(0.03)]
     pub stroke_m: f64,
     /// Rms of the gust-like load over `load_n`. Default 0.3.
+    #[default(0.3)]
     pub gust_share: f64,
     /// Corner of the gust's spectrum, which falls with the fourth power beyond, Hz. Default 0.8.
+    #[default(0.8)]
     pub gust_hz: f64,
     /// Rms of the ever-present small trim motion over the stroke. Default 0.01.
+    #[default(0.01)]
     pub trim_share: f64,
     /// Rms of the pilot's moves over the stroke. Default 0.12.
+    #[default(0.12)]
     pub stick_share: f64,
     /// Load that a full deflection takes off at full dynamic pressure, over `load_n`. Default 0.3.
+    #[default(0.3)]
     pub hinge_share: f64,
     /// The load keeps one sign throughout: the gap cannot be seen. Default false.
     pub no_reversal: bool,
@@ -44,30 +54,8 @@ pub struct Profile {
     /// Share of the flight after the preflight checks with a constant command. Default 0.
     pub rest_share: f64,
     /// Mean length of a rest, seconds; rests last between half and one and a half times this. Default 10.
+    #[default(10.0)]
     pub rest_s: f64,
-}
-
-impl Default for Profile {
-    fn default() -> Self {
-        Self {
-            duration_s: 150.0,
-            sample_rate_hz: 250.0,
-            load_n: 8000.0,
-            stroke_m: 0.03,
-            gust_share: 0.3,
-            gust_hz: 0.8,
-            trim_share: 0.01,
-            stick_share: 0.12,
-            hinge_share: 0.3,
-            no_reversal: false,
-            gust_form: GustForm::LowPass,
-            reversals: None,
-            buffet: Vibration::default(),
-            motor_vibration: Vibration::default(),
-            rest_share: 0.0,
-            rest_s: 10.0,
-        }
-    }
 }
 
 impl Profile {

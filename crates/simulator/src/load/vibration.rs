@@ -6,6 +6,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, not_negative, within};
 use crate::load::shaping_filter::ShapedNoise;
@@ -27,23 +28,19 @@ pub struct Line {
 /// Vibration as noise in a band and up to three lines.
 ///
 /// Of the load, `rms` and `amplitude` are shares of `load_n`; of the motor, metres at the screw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vibration {
     /// Lower edge of the band, Hz, 0.5 to 500. Default 5.
+    #[default(5.0)]
     pub low_hz: f64,
     /// Upper edge of the band, Hz. Default 60.
+    #[default(60.0)]
     pub high_hz: f64,
     /// Rms of the noise in the band. Default 0.
     pub rms: f64,
     /// Lines; TOML knows an array of up to three tables.
     pub lines: Lines,
-}
-
-impl Default for Vibration {
-    fn default() -> Self {
-        Self { low_hz: 5.0, high_hz: 60.0, rms: 0.0, lines: Lines::default() }
-    }
 }
 
 /// Up to three lines; an unused line has no amplitude.

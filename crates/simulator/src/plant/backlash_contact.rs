@@ -6,6 +6,7 @@
 //! it the flank is met.
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, not_negative, positive, within};
 use crate::load::flight_commands::phase_factor;
@@ -115,22 +116,27 @@ impl ContactLaw {
 const LINE_POINTS: usize = 200;
 
 /// The coupling between motor and screw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Contact {
     /// K, N/m: of one flank, beyond whatever softness `law` adds.
+    #[default(5e7)]
     pub stiffness_n_per_m: f64,
     /// f, N·s/m: acts while a flank is touched, and never makes it pull.
+    #[default(2000.0)]
     pub damping_n_s_per_m: f64,
     /// Total free travel, metres; negative for a preloaded nut, whose flanks both press that deep in the middle.
+    #[default(100e-6)]
     pub gap_m: f64,
     /// δX₀: the relative position X₂ − X₁ in the middle of the gap, metres.
+    #[default(100e-6)]
     pub offset_m: f64,
     /// How the force grows with the penetration.
     pub law: ContactLaw,
     /// The law of the lower flank, which pushes the screw up. Default: `law`.
     pub lower_law: Option<ContactLaw>,
     /// Stiffness of the lower flank over the upper's, 0.2 to 5. Default 1.
+    #[default(1.0)]
     pub lower_stiffness_factor: f64,
     /// Growth of the stiffness from the start to the end of the log, as a share, −0.5 to 1. Default 0.
     pub stiffness_drift: f64,
@@ -139,29 +145,12 @@ pub struct Contact {
     /// Gap that the most worn place of the stroke has in addition to `gap_m`, metres. Default 0.
     pub worn_m: f64,
     /// Screw position of that place, and distance at which the wear has fallen to 61 % (a bell curve), metres.
+    #[default([0.0, 5e-3])]
     pub worn_at_m: [f64; 2],
     /// Stiffness in the middle of each phase (preflight, take-off, climb, cruise, approach, landing)
     /// over `stiffness_n_per_m`, changing linearly between, 0.2 to 5. Default 1 in each.
+    #[default([1.0; 6])]
     pub stiffness_phase_factors: [f64; 6],
-}
-
-impl Default for Contact {
-    fn default() -> Self {
-        Self {
-            stiffness_n_per_m: 5e7,
-            damping_n_s_per_m: 2000.0,
-            gap_m: 100e-6,
-            offset_m: 100e-6,
-            law: ContactLaw::Linear,
-            lower_law: None,
-            lower_stiffness_factor: 1.0,
-            stiffness_drift: 0.0,
-            gap_drift: 0.0,
-            worn_m: 0.0,
-            worn_at_m: [0.0, 5e-3],
-            stiffness_phase_factors: [1.0; 6],
-        }
-    }
 }
 
 /// A force over a step, and how it answers to the relative speed of that step.

@@ -10,6 +10,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::load::flight_profile::Profile;
@@ -70,7 +71,7 @@ pub enum NoiseColour {
 }
 
 /// One channel; every default is zero, a perfect channel. Lengths in the channel's own unit, m or N.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Channel {
     /// White noise, rms.
@@ -102,6 +103,7 @@ pub struct Channel {
     /// in one direction.
     pub hysteresis: f64,
     /// Travel within which the hysteretic error turns to the other side, up to a factor e. Default 1000.
+    #[default(1000.0)]
     pub hysteresis_length: f64,
     /// Largest size that the channel shows, noise excepted; 0 for any. Default 0.
     pub clip: f64,
@@ -117,38 +119,10 @@ pub struct Channel {
     /// Coloured noise, rms, added to the white noise.
     pub coloured_rms: f64,
     /// Corner of the coloured noise, Hz. Default 1.
+    #[default(1.0)]
     pub coloured_hz: f64,
     /// Spectrum of the coloured noise. Default `first_order`.
     pub coloured_form: NoiseColour,
-}
-
-impl Default for Channel {
-    fn default() -> Self {
-        Self {
-            noise_rms: 0.0,
-            resolution: 0.0,
-            gain_error: 0.0,
-            bias: 0.0,
-            drift: 0.0,
-            nonlinearity: 0.0,
-            delay_s: 0.0,
-            dropout_share: 0.0,
-            spikes_per_minute: 0.0,
-            spike: 0.0,
-            freezes_per_minute: 0.0,
-            freeze_s: 0.0,
-            hysteresis: 0.0,
-            hysteresis_length: 1000.0,
-            clip: 0.0,
-            lag_s: 0.0,
-            box_average: false,
-            rate_hz: 0.0,
-            periodic: PeriodicErrors::default(),
-            coloured_rms: 0.0,
-            coloured_hz: 1.0,
-            coloured_form: NoiseColour::FirstOrder,
-        }
-    }
 }
 
 /// Over which range a channel is nonlinear.
@@ -358,29 +332,20 @@ impl Clock {
 ///
 /// Defaults are good ones: noise of 1 and 3 µm and 40 N, steps of 0.3 and 2.3 µm and 10 N, no fault. A
 /// channel that a spec writes down starts from a perfect one instead: every key left out is zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {
     /// The motor's resolver, in metres at the screw.
+    #[default(Channel { noise_rms: 1e-6, resolution: 3e-7, ..Channel::default() })]
     pub motor: Channel,
     /// The screw's position transducer, metres.
+    #[default(Channel { noise_rms: 3e-6, resolution: 2.3e-6, ..Channel::default() })]
     pub screw: Channel,
     /// The load cell, N.
+    #[default(Channel { noise_rms: 40.0, resolution: 10.0, ..Channel::default() })]
     pub load: Channel,
     /// The time stamps.
     pub clock: Clock,
-}
-
-impl Default for Sensors {
-    fn default() -> Self {
-        let channel = |noise_rms, resolution| Channel { noise_rms, resolution, ..Channel::default() };
-        Self {
-            motor: channel(1e-6, 3e-7),
-            screw: channel(3e-6, 2.3e-6),
-            load: channel(40.0, 10.0),
-            clock: Clock::default(),
-        }
-    }
 }
 
 impl Sensors {
