@@ -27,7 +27,7 @@ pub struct MethodResults {
 }
 
 /// The methods compared, ours first.
-pub const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load lines", "P99 − P1 of δX"];
+pub(crate) const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load lines", "P99 − P1 of δX"];
 
 /// Travel of the screw in one turn of the motor, m.
 const LEAD_M_PER_REV: f64 = 0.005;
@@ -72,10 +72,7 @@ fn apply_methods(flown: &FlownCase, index: u64) -> Result<MethodResults, String>
 }
 
 /// The flight's channels as the estimator gets them from a log.
-///
-/// # Errors
-/// Stamps or channels that cannot be read, as text.
-pub fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
+fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
     let flight = &flown.flight;
     let arrays = ChannelArrays {
         time_s: &flight.time_s,
@@ -88,7 +85,7 @@ pub fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
 }
 
 /// The noise as a fleet would configure it: that of the sensors, and friction that it expects.
-pub fn expected_noise(sensors: &Sensors) -> NoiseModel {
+pub(crate) fn expected_noise(sensors: &Sensors) -> NoiseModel {
     NoiseModel::Sensors(SensorNoise {
         screw_rms_m: sensors.screw.noise_rms,
         screw_resolution_m: sensors.screw.resolution,
@@ -100,10 +97,7 @@ pub fn expected_noise(sensors: &Sensors) -> NoiseModel {
 }
 
 /// The part as a fleet would configure it: the assumed stiffness and the true sensor noise.
-///
-/// # Errors
-/// A stiffness that is not positive.
-pub fn part(case: &Case) -> Result<Part, estimator::Error> {
+fn part(case: &Case) -> Result<Part, estimator::Error> {
     Ok(Part {
         actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
         geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
@@ -123,7 +117,7 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
 
 /// A baseline: δX on F by least squares on each side of the load, beyond a tenth of its greatest; the
 /// difference of the intercepts.
-pub fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
+pub(crate) fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
     let least_n = 0.1 * load_n.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let intercept_m = |side: f64| {
         let (mut n, mut sf, mut sy, mut sff, mut sfy) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -136,7 +130,7 @@ pub fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
 }
 
 /// A baseline: the 99 % quantile of δX less the 1 % quantile.
-pub fn spread_m(dx_m: &[f64]) -> f64 {
+pub(crate) fn spread_m(dx_m: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = dx_m.iter().copied().filter(|y| y.is_finite()).collect();
     if sorted.is_empty() {
         return f64::NAN;

@@ -9,7 +9,7 @@ use crate::scenarios::{Class, Kind};
 
 /// Flags that no flight of a sound class should raise. `below_detection` counts on gaps of 10 µm and more,
 /// `soft_contact` on hard flanks.
-pub const FALSE_ALARMS: [&str; 6] =
+pub(crate) const FALSE_ALARMS: [&str; 6] =
     ["motor_spikes", "screw_spikes", "load_spikes", "estimators_disagree", "below_detection", "soft_contact"];
 
 /// The least gap on which `below_detection` is a false alarm, m.
@@ -19,38 +19,38 @@ const VISIBLE_GAP_M: f64 = 10e-6;
 #[derive(Debug, Clone)]
 pub struct ErrorStats {
     /// The class.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// How it is judged.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Flights flown.
-    pub flights: usize,
+    pub(crate) flights: usize,
     /// Errors of each method, in the unit of the class.
-    pub errors: [Errors; METHODS.len()],
+    pub(crate) errors: [Errors; METHODS.len()],
     /// Flights with an estimate of contact regression.
-    pub estimated: usize,
+    pub(crate) estimated: usize,
     /// Flights whose 90 % interval holds the truth.
-    pub held: usize,
+    pub(crate) held: usize,
     /// How often each code was given, as refusal or flag.
-    pub codes: BTreeMap<String, usize>,
+    pub(crate) codes: BTreeMap<String, usize>,
     /// How often each of [`FALSE_ALARMS`] was raised without cause; none where the class has a cause.
-    pub false_alarms: Option<[usize; FALSE_ALARMS.len()]>,
+    pub(crate) false_alarms: Option<[usize; FALSE_ALARMS.len()]>,
     /// Every flight: true gap and contact regression's error, µm.
-    pub scatter_um: Vec<(f64, f64)>,
+    pub(crate) scatter_um: Vec<(f64, f64)>,
     /// Error over standard error of every flight.
-    pub deviations: Vec<f64>,
+    pub(crate) deviations: Vec<f64>,
 }
 
 /// Absolute errors: median, 95 % quantile, worst, and how many there are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// Median.
-    pub median: f64,
+    pub(crate) median: f64,
     /// 95 % quantile.
-    pub p95: f64,
+    pub(crate) p95: f64,
     /// Maximum.
-    pub worst: f64,
+    pub(crate) worst: f64,
     /// Flights with an estimate.
-    pub count: usize,
+    pub(crate) count: usize,
 }
 
 impl Errors {
@@ -67,7 +67,7 @@ impl Errors {
 
 impl Kind {
     /// The unit of the errors.
-    pub fn unit(self) -> &'static str {
+    pub(crate) fn unit(self) -> &'static str {
         if self == Self::Single { "%" } else { "µm" }
     }
 }
@@ -110,17 +110,17 @@ impl ErrorStats {
     }
 
     /// Flights refused although the gap can be seen.
-    pub fn false_refusals(&self) -> usize {
+    pub(crate) fn false_refusals(&self) -> usize {
         if self.must_refuse().is_some() { 0 } else { self.flights - self.estimated }
     }
 
     /// Flights with an estimate although the gap cannot be seen.
-    pub fn missed_refusals(&self) -> usize {
+    pub(crate) fn missed_refusals(&self) -> usize {
         if self.must_refuse().is_some() { self.estimated } else { 0 }
     }
 
     /// The refusal code expected.
-    pub fn must_refuse(&self) -> Option<&'static str> {
+    pub(crate) fn must_refuse(&self) -> Option<&'static str> {
         match self.kind {
             Kind::Blind(code) => Some(code),
             _ => None,
@@ -128,7 +128,7 @@ impl ErrorStats {
     }
 
     /// Share of intervals that hold, and the 90 % bounds of that share (Wilson).
-    pub fn coverage(&self) -> (f64, f64, f64) {
+    pub(crate) fn coverage(&self) -> (f64, f64, f64) {
         wilson(self.held, self.estimated)
     }
 }

@@ -14,36 +14,36 @@ use simulator::{
 
 /// A flight to be simulated, and the assumptions of its estimator.
 #[derive(Debug, Clone)]
-pub struct Case {
+pub(crate) struct Case {
     /// What moves.
-    pub plant: Plant,
+    pub(crate) plant: Plant,
     /// What the flight asks of it.
-    pub profile: Profile,
+    pub(crate) profile: Profile,
     /// What reads it.
-    pub sensors: Sensors,
+    pub(crate) sensors: Sensors,
     /// Stiffness assumed over the true one.
-    pub assumed_factor: f64,
+    pub(crate) assumed_factor: f64,
     /// How the channels were mapped.
-    pub mapping: Mapping,
+    pub(crate) mapping: Mapping,
     /// Seed of the flight.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 /// A flown case.
 #[derive(Debug, Clone)]
-pub struct FlownCase {
+pub(crate) struct FlownCase {
     /// The case.
-    pub case: Case,
+    pub(crate) case: Case,
     /// The log as the estimator meets it, and the truth behind it.
-    pub flight: Flight,
+    pub(crate) flight: Flight,
     /// The distance of the flanks, extrapolated to zero load by least squares over 30 to 100 % of the
     /// flight's P95 load; equal to the gap for linear flanks, metres.
-    pub extrapolated_gap_m: f64,
+    pub(crate) extrapolated_gap_m: f64,
 }
 
 /// Channels mapped correctly, or by mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mapping {
+pub(crate) enum Mapping {
     /// Correctly.
     Right,
     /// The load has the wrong sign.
@@ -98,11 +98,6 @@ type Draw = fn(&mut Case, &mut ChaCha8Rng);
 /// Every class.
 pub fn classes() -> &'static [Class] {
     CLASSES
-}
-
-/// The class of a name.
-pub fn class(name: &str) -> Option<&'static Class> {
-    CLASSES.iter().find(|class| class.name == name)
 }
 
 const UM: f64 = 1e-6;
@@ -517,19 +512,19 @@ fn name_seed(name: &str) -> u64 {
 
 impl Class {
     /// Whether its channels hold spikes or wrong channels.
-    pub fn has_spikes(&self) -> bool {
+    pub(crate) fn has_spikes(&self) -> bool {
         let case = self.case(0);
         let channels = [case.sensors.motor, case.sensors.screw, case.sensors.load];
         case.mapping != Mapping::Right || channels.iter().any(|channel| channel.spikes_per_minute > 0.0)
     }
 
     /// Whether a flank is soft at low load.
-    pub fn has_soft_flanks(&self) -> bool {
+    pub(crate) fn has_soft_flanks(&self) -> bool {
         self.case(0).has_soft_flanks()
     }
 
     /// The case of an index; the same index gives the same case.
-    pub fn case(&self, index: u64) -> Case {
+    pub(crate) fn case(&self, index: u64) -> Case {
         let own = if self.kind == Kind::Drawn { name_seed(self.name) } else { 0 };
         let mut rng = ChaCha8Rng::seed_from_u64(0x5eed ^ own ^ (index << 8));
         let mut case = Case {
@@ -547,10 +542,7 @@ impl Class {
     }
 
     /// Flies the flight of an index.
-    ///
-    /// # Errors
-    /// [`simulator::Error::Value`] for a drawn parameter outside its range.
-    pub fn fly(&self, index: u64) -> Result<FlownCase, simulator::Error> {
+    pub(crate) fn fly(&self, index: u64) -> Result<FlownCase, simulator::Error> {
         self.case(index).fly()
     }
 }
@@ -560,21 +552,18 @@ const STIFF_BAND: (f64, f64) = (0.3, 1.0);
 
 impl Case {
     /// Whether a flank is soft at low load.
-    pub fn has_soft_flanks(&self) -> bool {
+    pub(crate) fn has_soft_flanks(&self) -> bool {
         let contact = &self.plant.contact;
         contact.law != ContactLaw::Linear || contact.lower_law.is_some_and(|law| law != ContactLaw::Linear)
     }
 
     /// The stiffness of the part's configuration, N/m.
-    pub fn assumed_stiffness_n_per_m(&self) -> f64 {
+    pub(crate) fn assumed_stiffness_n_per_m(&self) -> f64 {
         self.plant.contact.stiffness_n_per_m * self.assumed_factor
     }
 
     /// Flies the case.
-    ///
-    /// # Errors
-    /// [`simulator::Error::Value`] for a parameter outside its range.
-    pub fn fly(self) -> Result<FlownCase, simulator::Error> {
+    pub(crate) fn fly(self) -> Result<FlownCase, simulator::Error> {
         let mut flight = simulate(&self.plant, &self.profile, &self.sensors, self.seed)?;
         let p95_n = p95(flight.load_n.iter().map(|f| (f - self.sensors.load.bias).abs()));
         match self.mapping {
@@ -611,6 +600,10 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
+    fn case_of(name: &str, index: u64) -> Case {
+        CLASSES.iter().find(|class| class.name == name).unwrap().case(index)
+    }
+
     #[test]
     fn every_class_has_a_name_of_its_own_and_cases_that_can_be_flown() {
         for (k, class) in CLASSES.iter().enumerate() {
@@ -628,7 +621,7 @@ mod tests {
     #[test]
     fn a_case_is_the_same_each_time_and_another_index_gives_another() {
         let fly = |index| {
-            let mut case = class("everything, hard flanks").unwrap().case(index);
+            let mut case = case_of("everything, hard flanks", index);
             case.profile.duration_s = 5.0;
             case.fly().unwrap().flight
         };
@@ -639,11 +632,11 @@ mod tests {
 
     #[test]
     fn a_toe_below_the_band_adds_to_the_gap_and_hard_flanks_do_not() {
-        let mut case = class("soft flanks, 20 µm deep").unwrap().case(0);
+        let mut case = case_of("soft flanks, 20 µm deep", 0);
         case.profile.duration_s = 60.0;
         let flown = case.fly().unwrap();
         assert!((flown.extrapolated_gap_m - flown.flight.gap_m - 24e-6).abs() < 1e-9);
-        let mut hard = class("nominal").unwrap().case(0);
+        let mut hard = case_of("nominal", 0);
         hard.profile.duration_s = 5.0;
         let flown = hard.fly().unwrap();
         assert!((flown.extrapolated_gap_m - flown.flight.gap_m).abs() < 1e-15);

@@ -5,7 +5,6 @@ use estimator::{Filter, KalmanState};
 use rayon::prelude::*;
 use simulator::{Flight, Plant, Sensors};
 
-use crate::paper::operations::{OperationCount, count_step};
 use crate::paper::{Assumed, GAP_M, STEP_S, backlash_m, filter, fly, gap, states};
 
 /// Seeds of the flights; the figures show the first.
@@ -28,9 +27,6 @@ const GROWTH: f64 = 1.0;
 const WINDOW_S: f64 = 12.0;
 /// The state has converged once S is within this share of the gap.
 const CONVERGED: f64 = 0.01;
-
-/// An error of the simulator or the estimator.
-pub type ClaimsError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A change of ΔS, % of the gap, over the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,8 +83,6 @@ pub struct Claims {
     pub gap: GapStatistic,
     /// Error of ΔS with everything known, %.
     pub known: Change,
-    /// Operations of 24, 25, 26, 27 and 28 in a step.
-    pub operations: [OperationCount; 5],
     /// From wrong states.
     pub starts: Vec<Convergence>,
     /// From a wrong backlash with wrong covariances.
@@ -107,7 +101,8 @@ pub struct Claims {
     pub varying: Vec<Window>,
 }
 
-type Result<T> = std::result::Result<T, ClaimsError>;
+/// An error is one of the simulator or of the estimator.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 impl Claims {
     /// Flies and estimates all flights.
@@ -133,11 +128,9 @@ impl Claims {
         let tuning = TUNINGS.par_iter().map(|&factor| {
             Ok(Change::of(factor, &errors(&assume(Assumed { process_noise: factor, ..Assumed::default() })?)))
         });
-        let last = own.len() - 1;
         Ok(Self {
             gap: mid_range(&backlash_m(&own))?,
             known: Change::of(1.0, &errors(&known_m)),
-            operations: count_step(&usual, &own[last], flights[0].load_n[last], own[last].x[0]).0,
             starts: starts(&usual, &flights[0], &own)?,
             spreads: spreads(&usual, &flights[0], &own)?,
             noise: NOISES.par_iter().map(|&factor| noise(factor)).collect::<Result<_>>()?,

@@ -2,12 +2,10 @@
 
 mod claims;
 mod figures;
-mod operations;
 mod page;
 
-pub use claims::{Claims, ClaimsError};
+pub use claims::Claims;
 pub use figures::pictures;
-pub use operations::{OperationCount, count_step};
 pub use page::page;
 
 use estimator::gap::{GapStatistic, mid_range};
@@ -17,28 +15,25 @@ use simulator::{Flight, Plant, Profile, Sensors, simulate};
 use crate::methods::expected_noise;
 
 /// True gap of the flights, m.
-pub const GAP_M: f64 = 100e-6;
+const GAP_M: f64 = 100e-6;
 
 /// An operational flight of the nominal actuator: 120 s, 250 samples a second, loads to about ± 8 kN.
-///
-/// # Errors
-/// A parameter outside its range.
-pub fn fly(plant: &Plant, sensors: &Sensors, seed: u64) -> Result<Flight, simulator::Error> {
+fn fly(plant: &Plant, sensors: &Sensors, seed: u64) -> Result<Flight, simulator::Error> {
     let profile = Profile { duration_s: 120.0, ..Profile::default() };
     simulate(&plant.with_gap_m(GAP_M), &profile, sensors, seed)
 }
 
 /// What is assumed of actuator and noise, each as a factor on what is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Assumed {
+struct Assumed {
     /// Of the stiffness K.
-    pub stiffness: f64,
+    stiffness: f64,
     /// Of the damping f.
-    pub damping: f64,
+    damping: f64,
     /// Of the screw's mass m_s.
-    pub mass: f64,
+    mass: f64,
     /// Of W_d, with V_d as it is.
-    pub process_noise: f64,
+    process_noise: f64,
 }
 
 impl Default for Assumed {
@@ -49,10 +44,7 @@ impl Default for Assumed {
 }
 
 /// The filter of the nominal actuator under assumptions, at a step, s.
-///
-/// # Errors
-/// A parameter that cannot be.
-pub fn filter(assumed: Assumed, sensors: &Sensors, step_s: f64) -> Result<Filter, estimator::Error> {
+fn filter(assumed: Assumed, sensors: &Sensors, step_s: f64) -> Result<Filter, estimator::Error> {
     let plant = Plant::default();
     let actuator = ActuatorModel::linear(
         plant.contact.stiffness_n_per_m * assumed.stiffness,
@@ -66,15 +58,12 @@ pub fn filter(assumed: Assumed, sensors: &Sensors, step_s: f64) -> Result<Filter
 }
 
 /// Relative position δX of a flight, m.
-pub fn relative_position_m(flight: &Flight) -> Vec<f64> {
+fn relative_position_m(flight: &Flight) -> Vec<f64> {
     flight.screw_m.iter().zip(&flight.motor_m).map(|(screw, motor)| screw - motor).collect()
 }
 
 /// The state after each sample (24–28), from a given initial state or the filter's own.
-///
-/// # Errors
-/// Noise levels that contradict each other.
-pub fn states(
+fn states(
     filter: &Filter,
     flight: &Flight,
     start: Option<KalmanState>,
@@ -98,10 +87,7 @@ fn backlash_m(states: &[KalmanState]) -> Vec<f64> {
 }
 
 /// ΔS of a flight (29–31).
-///
-/// # Errors
-/// As [`states`]; S does not move.
-pub fn gap(filter: &Filter, flight: &Flight) -> Result<GapStatistic, estimator::Error> {
+fn gap(filter: &Filter, flight: &Flight) -> Result<GapStatistic, estimator::Error> {
     mid_range(&backlash_m(&states(filter, flight, None)?))
 }
 
