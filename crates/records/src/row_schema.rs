@@ -28,8 +28,8 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, AsArray, BooleanArray, Float64Array, Float64Builder, Int64Array, ListArray, ListBuilder,
-    RecordBatch, StringArray, StringBuilder, StructArray, TimestampMicrosecondArray,
+    Array, ArrayRef, ArrowPrimitiveType, AsArray, BooleanArray, Float64Array, Float64Builder, Int64Array,
+    ListArray, ListBuilder, RecordBatch, StringArray, StringBuilder, StructArray, TimestampMicrosecondArray,
 };
 use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{
@@ -251,40 +251,33 @@ pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, Row
         .collect()
 }
 
-fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<TypedArray<'a>, RowError> {
+/// The array of a column, if it has the column's type.
+fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<&'a ArrayRef, RowError> {
     let problem = |problem: String| RowError::Column { column: column.name, problem };
     let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
-    let typed = match column.data_type {
-        DataType::Utf8 => array.as_string_opt().map(TypedArray::Text),
-        DataType::List(_) => array.as_list_opt().map(TypedArray::List),
-        DataType::Float64 => array.as_primitive_opt::<Float64Type>().map(TypedArray::Number),
-        DataType::Int64 => array.as_primitive_opt::<Int64Type>().map(TypedArray::Count),
-        DataType::Timestamp(..) => array.as_primitive_opt::<TimestampMicrosecondType>().map(TypedArray::Time),
-        _ => None,
+    let is_alike = match (array.data_type(), &column.data_type) {
+        // Other programs name the elements of lists, and the zone of times, otherwise.
+        (DataType::List(_), DataType::List(_)) => true,
+        (DataType::Timestamp(found, _), DataType::Timestamp(wanted, _)) => found == wanted,
+        (found, wanted) => found == wanted,
     };
-    typed.ok_or_else(|| problem(format!("holds {}, where {} is wanted", array.data_type(), column.data_type)))
-}
-
-enum TypedArray<'a> {
-    Text(&'a StringArray),
-    List(&'a ListArray),
-    Number(&'a Float64Array),
-    Count(&'a Int64Array),
-    Time(&'a TimestampMicrosecondArray),
+    let wrong = || problem(format!("holds {}, where {} is wanted", array.data_type(), column.data_type));
+    is_alike.then_some(array).ok_or_else(wrong)
 }
 
 /// Reads the cells of one row, in the order of the declared columns.
 pub struct CellReader<'a> {
     columns: &'a [Column],
-    arrays: &'a [TypedArray<'a>],
+    arrays: &'a [&'a ArrayRef],
     row: usize,
     next: usize,
 }
 
 impl<'a> CellReader<'a> {
-    fn take(&mut self) -> &'a TypedArray<'a> {
+    /// The array of the next cell; `None` where the cell is empty.
+    fn take(&mut self) -> Option<&'a ArrayRef> {
         self.next += 1;
-        &self.arrays[self.next - 1]
+        Some(self.arrays[self.next - 1]).filter(|array| array.is_valid(self.row))
     }
 
     /// An error in the cell taken last.
@@ -297,17 +290,11 @@ impl<'a> CellReader<'a> {
     }
 
     fn text(&mut self) -> Option<&'a str> {
-        match self.take() {
-            TypedArray::Text(array) => array.is_valid(self.row).then(|| array.value(self.row)),
-            _ => None,
-        }
+        Some(self.take()?.as_string::<i32>().value(self.row))
     }
 
     /// Reads a text that is parsed: an identifier, a status.
-    ///
-    /// # Errors
-    /// [`RowError::Value`] when the cell is empty or cannot be parsed.
-    pub fn parse<T, E: ToString>(
+    pub(crate) fn parse<T, E: ToString>(
         &mut self,
         parse: impl FnOnce(&'a str) -> Result<T, E>,
     ) -> Result<T, RowError> {
@@ -317,10 +304,7 @@ impl<'a> CellReader<'a> {
 
     /// The elements of a list; none of a cell that is empty.
     fn list(&mut self) -> Option<ArrayRef> {
-        match self.take() {
-            TypedArray::List(lists) if lists.is_valid(self.row) => Some(lists.value(self.row)),
-            _ => None,
-        }
+        Some(self.take()?.as_list::<i32>().value(self.row))
     }
 
     fn texts(&mut self) -> Vec<String> {
@@ -335,29 +319,14 @@ impl<'a> CellReader<'a> {
         numbers.into_iter().flatten().flatten().collect()
     }
 
-    fn number(&mut self) -> Option<f64> {
-        match self.take() {
-            TypedArray::Number(array) => array.is_valid(self.row).then(|| array.value(self.row)),
-            _ => None,
-        }
-    }
-
-    fn count(&mut self) -> Option<i64> {
-        match self.take() {
-            TypedArray::Count(array) => array.is_valid(self.row).then(|| array.value(self.row)),
-            _ => None,
-        }
+    fn primitive<T: ArrowPrimitiveType>(&mut self) -> Option<T::Native> {
+        Some(self.take()?.as_primitive::<T>().value(self.row))
     }
 
     fn time(&mut self) -> Result<Option<Timestamp>, RowError> {
-        let micros = match self.take() {
-            TypedArray::Time(array) => array.is_valid(self.row).then(|| array.value(self.row)),
-            _ => None,
-        };
-        let time = micros.map(Timestamp::from_microsecond).transpose();
-        time.map_err(|e| {
-            self.problem(format!("{} µs since 1970 is no time: {e}", micros.unwrap_or_default()))
-        })
+        let Some(micros) = self.primitive::<TimestampMicrosecondType>() else { return Ok(None) };
+        let time = Timestamp::from_microsecond(micros);
+        time.map(Some).map_err(|e| self.problem(format!("{micros} µs since 1970 is no time: {e}")))
     }
 }
 
@@ -442,15 +411,15 @@ read_cell!(Option<String>, |cells| Ok(cells.text().map(str::to_owned)));
 read_cell!(Vec<String>, |cells| Ok(cells.texts()));
 read_cell!(Vec<f64>, |cells| Ok(cells.numbers()));
 read_cell!(f64, |cells| {
-    let number = cells.number();
+    let number = cells.primitive::<Float64Type>();
     cells.required(number)
 });
-read_cell!(Option<f64>, |cells| Ok(cells.number().filter(|value| value.is_finite())));
+read_cell!(Option<f64>, |cells| Ok(cells.primitive::<Float64Type>().filter(|value| value.is_finite())));
 read_cell!(i64, |cells| {
-    let count = cells.count();
+    let count = cells.primitive::<Int64Type>();
     cells.required(count)
 });
-read_cell!(Option<i64>, |cells| Ok(cells.count()));
+read_cell!(Option<i64>, |cells| Ok(cells.primitive::<Int64Type>()));
 read_cell!(Timestamp, |cells| {
     let time = cells.time()?;
     cells.required(time)
