@@ -6,26 +6,11 @@ use proptest::prelude::*;
 use records::GapRecord;
 use store::{LogOutcome, LogResult, Query, RecordKey, Store};
 
-use crate::fixtures::{POSITIONS, account, record, result, time, writer};
-
-#[test]
-fn what_is_committed_is_read_back_in_canonical_order() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
-    writer.commit(&[result(2, 1, 50e-6), result(1, 1, 40e-6)]).unwrap();
-    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
-    let records = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap();
-    let expected: Vec<_> = [(1, 0, 30e-6), (1, 1, 40e-6), (2, 1, 50e-6)]
-        .into_iter()
-        .flat_map(|(tail, flight, gap_m)| POSITIONS.map(|position| record(tail, flight, position, gap_m)))
-        .collect();
-    assert_eq!(records, expected);
-}
+use crate::fixtures::{POSITIONS, account, fresh, record, result, time};
 
 #[test]
 fn a_flight_estimated_again_takes_the_place_of_the_old_one_and_of_no_other() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     writer.commit(&[result(1, 0, 30e-6), result(1, 1, 30e-6), result(2, 1, 30e-6)]).unwrap();
     writer.commit(&[result(1, 1, 99e-6)]).unwrap();
     let records = writer.store().records(&Query::default()).unwrap();
@@ -38,8 +23,7 @@ fn a_flight_estimated_again_takes_the_place_of_the_old_one_and_of_no_other() {
 
 #[test]
 fn files_that_hold_no_superseded_record_are_not_touched() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     for flight in 0..4 {
         writer.commit(&[result(1, flight, 30e-6)]).unwrap();
     }
@@ -51,20 +35,8 @@ fn files_that_hold_no_superseded_record_are_not_touched() {
 }
 
 #[test]
-fn the_same_commit_again_leaves_the_same_rows() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
-    let results = [result(1, 0, 30e-6), result(2, 0, 30e-6)];
-    writer.commit(&results).unwrap();
-    let once = writer.store().scan(&Query::default()).unwrap();
-    writer.commit(&results).unwrap();
-    assert_eq!(writer.store().scan(&Query::default()).unwrap(), once);
-}
-
-#[test]
 fn a_retired_record_is_gone_and_a_later_result_has_the_last_word() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     writer.commit(&[result(1, 0, 30e-6), result(1, 1, 30e-6)]).unwrap();
     let mut gone = result(1, 0, 30e-6);
     gone.moved_from = gone.records.drain(..).map(|record| RecordKey::of(&record)).collect();
@@ -79,8 +51,7 @@ fn a_retired_record_is_gone_and_a_later_result_has_the_last_word() {
 
 #[test]
 fn a_log_in_error_leaves_an_account_and_no_record() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     let mut failed = result(1, 0, 30e-6);
     failed.records.clear();
     failed.account.outcome = LogOutcome::Error;
@@ -93,8 +64,7 @@ fn a_log_in_error_leaves_an_account_and_no_record() {
 
 #[test]
 fn the_newest_account_of_a_log_counts_even_when_clocks_go_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     writer.commit(&[result(1, 1, 30e-6), result(1, 0, 30e-6)]).unwrap();
     let mut second = result(1, 1, 30e-6);
     second.account.processed_utc = time("1999-01-01T00:00:00Z");
@@ -105,8 +75,7 @@ fn the_newest_account_of_a_log_counts_even_when_clocks_go_back() {
 
 #[test]
 fn a_reader_that_opened_before_sees_what_came_after() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (dir, mut writer) = fresh();
     let reader = Store::open(dir.path()).unwrap();
     assert_eq!(reader.records(&Query::default()).unwrap(), []);
     writer.commit(&[result(1, 0, 30e-6)]).unwrap();
@@ -136,8 +105,7 @@ proptest! {
         commits in prop::collection::vec(prop::collection::vec(results(), 1..4), 1..7),
         compact_after in 0_usize..7,
     ) {
-        let dir = tempfile::tempdir().unwrap();
-        let mut writer = writer(dir.path());
+        let (_dir, mut writer) = fresh();
         let mut map: BTreeMap<RecordKey, GapRecord> = BTreeMap::new();
         for (i, commit) in commits.iter().enumerate() {
             for result in commit {
@@ -173,8 +141,7 @@ fn assert_whole(records: &[GapRecord]) {
 
 #[test]
 fn a_reader_beside_a_writer_sees_whole_commits_only() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (dir, mut writer) = fresh();
     let reader = Store::open(dir.path()).unwrap();
     std::thread::scope(|scope| {
         let writing = scope.spawn(move || {

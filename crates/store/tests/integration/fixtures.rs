@@ -100,3 +100,10 @@ pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRec
 pub(crate) fn writer(dir: &Path) -> Writer {
     Store::create_or_open(dir).unwrap().lock(&Holder::this_process(), None).unwrap()
 }
+
+/// The writer of a new store in a folder of its own, which is deleted with the first value.
+pub(crate) fn fresh() -> (tempfile::TempDir, Writer) {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = writer(dir.path());
+    (dir, writer)
+}

@@ -6,14 +6,14 @@ use std::time::Duration;
 
 use store::{Query, Store, Writer};
 
-use crate::fixtures::{departure, result, run, writer};
+use crate::fixtures::{departure, fresh, result, run};
 
-fn filled(dir: &Path) -> Writer {
-    let mut writer = writer(dir);
+fn filled() -> (tempfile::TempDir, Writer) {
+    let (dir, mut writer) = fresh();
     for flight in 0..6 {
         writer.commit(&[result(1, flight, 1e-6), result(2, flight, 2e-6)]).unwrap();
     }
-    writer
+    (dir, writer)
 }
 
 fn codes(store: &Store) -> Vec<String> {
@@ -26,8 +26,7 @@ fn data_file(writer: &Writer) -> PathBuf {
 
 #[test]
 fn a_sound_store_has_no_findings_and_is_counted() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (_dir, mut writer) = filled();
     writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
     writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(1))).unwrap();
     writer.end_run(&run("c", "2026-11-20T02:00:00Z", Some(130))).unwrap();
@@ -43,8 +42,7 @@ fn a_sound_store_has_no_findings_and_is_counted() {
 /// A commit of another program that replaces a data file by a copy under a name of its own.
 #[test]
 fn a_foreign_commit_is_found_until_it_is_accepted_and_its_file_is_compacted() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (dir, mut writer) = filled();
     let log = dir.path().join("gaps/_delta_log");
     let newest = fs::read_to_string(log.join("00000000000000000006.json")).unwrap();
     let line = newest.lines().find(|line| line.starts_with("{\"add\"")).unwrap();
@@ -68,8 +66,7 @@ fn a_foreign_commit_is_found_until_it_is_accepted_and_its_file_is_compacted() {
 /// compaction is sufficient.
 #[test]
 fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     for _ in 0..101 {
         writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
     }
@@ -92,8 +89,7 @@ fn an_empty_store_is_sound_and_counts_zero() {
 
 #[test]
 fn verify_finds_any_flipped_byte() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (_dir, writer) = filled();
     let file = data_file(&writer);
     let sound = fs::read(&file).unwrap();
     for at in (0..sound.len()).step_by(sound.len() / 7) {
@@ -108,8 +104,7 @@ fn verify_finds_any_flipped_byte() {
 
 #[test]
 fn verify_names_a_file_that_is_gone_and_one_cut_short() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (_dir, writer) = filled();
     let files = writer.store().files().unwrap();
     fs::remove_file(&files[0]).unwrap();
     fs::write(&files[1], &fs::read(&files[1]).unwrap()[..100]).unwrap();
@@ -122,8 +117,7 @@ fn verify_names_a_file_that_is_gone_and_one_cut_short() {
 
 #[test]
 fn a_torn_log_is_an_error_that_names_the_table() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (dir, writer) = filled();
     fs::write(dir.path().join("gaps/_delta_log/00000000000000000003.json"), "{\"add\":{\"pa").unwrap();
     let error = writer.store().records(&Query::default()).unwrap_err().to_string();
     assert!(error.starts_with("the log of a table is damaged: "), "{error}");
@@ -132,8 +126,7 @@ fn a_torn_log_is_an_error_that_names_the_table() {
 
 #[test]
 fn stray_files_beside_the_data_are_no_rows() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (dir, writer) = filled();
     fs::copy(data_file(&writer), dir.path().join("gaps/copy of yesterday.parquet")).unwrap();
     fs::write(dir.path().join("gaps/notes.txt"), "x").unwrap();
     assert_eq!(writer.store().verify(), []);
@@ -143,8 +136,7 @@ fn stray_files_beside_the_data_are_no_rows() {
 /// As if another program had added a file that is there already.
 #[test]
 fn verify_finds_records_that_are_there_twice() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (dir, writer) = filled();
     let log = dir.path().join("gaps/_delta_log");
     let commit = fs::read_to_string(log.join("00000000000000000006.json")).unwrap();
     let add: &str = commit.lines().find(|line| line.starts_with("{\"add\"")).unwrap();
@@ -161,8 +153,7 @@ fn verify_finds_records_that_are_there_twice() {
 
 #[test]
 fn compaction_leaves_one_sorted_file_and_the_same_answers() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (dir, mut writer) = filled();
     let reader = Store::open(dir.path()).unwrap();
     let (records, accounts) = (reader.scan(&Query::default()).unwrap(), reader.accounts().unwrap());
     let done = writer.compact().unwrap();
@@ -176,9 +167,7 @@ fn compaction_leaves_one_sorted_file_and_the_same_answers() {
 
 #[test]
 fn compaction_refuses_to_give_a_damaged_file_a_new_digest() {
-    let dir = tempfile::tempdir().unwrap();
-    drop(filled(dir.path()));
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = filled();
     let file = data_file(&writer);
     let mut content = fs::read(&file).unwrap();
     content[200] ^= 1;
@@ -189,8 +178,7 @@ fn compaction_refuses_to_give_a_damaged_file_a_new_digest() {
 
 #[test]
 fn superseded_files_are_kept_for_readers_until_they_are_old() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (dir, mut writer) = filled();
     let before = writer.store().files().unwrap();
     writer.compact().unwrap();
     assert!(before.iter().all(|file| file.exists()));
@@ -211,8 +199,7 @@ fn log_files(dir: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (dir, mut writer) = filled();
     (20..36).for_each(|flight| writer.commit(&[result(flight, 0, 1e-6)]).unwrap());
     let files = log_files(dir.path());
     assert!(files.iter().any(|file| file.to_str().unwrap().contains("checkpoint.parquet")), "{files:?}");
@@ -241,8 +228,7 @@ fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
 #[test]
 fn a_changed_action_is_refused_by_readers_with_and_without_a_digest() {
     for has_digests in [true, false] {
-        let dir = tempfile::tempdir().unwrap();
-        drop(filled(dir.path()));
+        let dir = filled().0;
         let file = dir.path().join("gaps/_delta_log/00000000000000000003.json");
         let text = fs::read_to_string(&file).unwrap();
         fs::write(&file, text.replacen("{\"add\":", "{\"aed\":", 1)).unwrap();
@@ -263,8 +249,7 @@ fn statistics_that_do_not_cover_the_content_are_found_without_a_digest() {
         ("\\\"tail_number\\\":\\\"N2\\\"", "\\\"tail_number\\\":\\\"N1\\\""),
         ("freeplaySerials\\\":[\\\"", "freeplaySerials\\\":[\\\"x"),
     ] {
-        let dir = tempfile::tempdir().unwrap();
-        drop(filled(dir.path()));
+        let dir = filled().0;
         fs::remove_dir_all(dir.path().join("gaps/_digests")).unwrap();
         let file = dir.path().join("gaps/_delta_log/00000000000000000003.json");
         let text = fs::read_to_string(&file).unwrap();
@@ -277,8 +262,7 @@ fn statistics_that_do_not_cover_the_content_are_found_without_a_digest() {
 /// A table of records put back to an earlier state, under log records of the present one.
 #[test]
 fn log_records_are_compared_with_the_records() {
-    let dir = tempfile::tempdir().unwrap();
-    drop(filled(dir.path()));
+    let dir = filled().0;
     let table = dir.path().join("gaps");
     fs::remove_file(table.join("_delta_log/00000000000000000006.json")).unwrap();
     let found = codes(&Store::open(dir.path()).unwrap());

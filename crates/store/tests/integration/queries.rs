@@ -7,15 +7,15 @@ use proptest::prelude::*;
 use records::GapRecord;
 use store::{Query, Store, Writer};
 
-use crate::fixtures::{POSITIONS, departure, result, writer};
+use crate::fixtures::{POSITIONS, departure, fresh, result};
 
-fn filled(dir: &std::path::Path) -> Writer {
-    let mut writer = writer(dir);
+fn filled() -> (tempfile::TempDir, Writer) {
+    let (dir, mut writer) = fresh();
     for flight in 0..4 {
         let results: Vec<_> = (0..3).map(|tail| result(tail, flight, 1e-6 * flight as f64)).collect();
         writer.commit(&results).unwrap();
     }
-    writer
+    (dir, writer)
 }
 
 /// The same question asked of rows one by one.
@@ -63,8 +63,7 @@ fn questions() -> impl Strategy<Value = Query> {
 
 #[test]
 fn a_query_answers_what_asking_every_row_would() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (_dir, writer) = filled();
     let all = writer.store().records(&Query::default()).unwrap();
     assert_eq!(all.len(), 36);
     let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
@@ -95,8 +94,7 @@ fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
 
 #[test]
 fn parts_hold_the_rows_that_a_scan_holds() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = filled(dir.path());
+    let (dir, mut writer) = filled();
     let all = writer.store().records(&Query::default()).unwrap();
     let wanted = |query: &Query| {
         let row = |r: &GapRecord| {
@@ -120,21 +118,16 @@ fn parts_hold_the_rows_that_a_scan_holds() {
     });
 }
 
-/// A store of which one byte of one file is another.
-fn flipped() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+#[test]
+fn a_flipped_byte_is_an_error_and_not_a_number_and_a_column_that_none_has_is_one_too() {
+    let (dir, writer) = filled();
     let file = writer.store().files().unwrap().remove(0);
     let mut content = std::fs::read(&file).unwrap();
     content[100] ^= 1;
     std::fs::write(&file, content).unwrap();
-    dir
-}
-
-#[test]
-fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
-    let dir = flipped();
     let store = Store::open(dir.path()).unwrap();
+    let error = store.records(&Query::default()).unwrap_err();
+    assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
     let parts = store.scan_columns(&Query::default(), &["gap_m"]).unwrap();
     let damaged = (0..parts.len()).filter_map(|part| parts.read(part).err());
     let codes: Vec<_> = damaged.map(|error| error.diagnostic().code).collect();
@@ -144,8 +137,7 @@ fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
 
 #[test]
 fn files_that_cannot_hold_an_answer_are_not_opened() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
+    let (dir, writer) = filled();
     // The newest file alone holds the fourth day; the others may as well not be there.
     let files = writer.store().files().unwrap();
     for file in &files {
@@ -163,8 +155,7 @@ fn files_that_cannot_hold_an_answer_are_not_opened() {
 /// A unit moves between tails, and its number is not ordered by tail: bounds exclude no file.
 #[test]
 fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (dir, mut writer) = fresh();
     for tail in 0..25 {
         let mut result = result(tail, 0, 30e-6);
         for (position, record) in result.records.iter_mut().enumerate() {
@@ -190,23 +181,15 @@ fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
 
 #[test]
 fn every_unit_is_listed_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let units = filled(dir.path()).store().distinct("serial_number").unwrap();
+    let (_dir, writer) = filled();
+    let units = writer.store().distinct("serial_number").unwrap();
     let expected = (0..3).flat_map(|tail| POSITIONS.map(|position| format!("S-{tail}-{position}")));
     assert_eq!(units, expected.collect());
 }
 
 #[test]
-fn a_flipped_byte_is_an_error_and_not_a_number() {
-    let dir = flipped();
-    let error = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap_err();
-    assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
-}
-
-#[test]
 fn a_number_that_is_not_finite_is_stored_as_missing() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     let mut overflowed = result(0, 0, 1e-5);
     overflowed.records[0].estimate.nis = Some(f64::INFINITY);
     overflowed.records[1].estimate.nis = Some(f64::NAN);
@@ -216,15 +199,7 @@ fn a_number_that_is_not_finite_is_stored_as_missing() {
     let sound = result(1, 0, 1e-5).records[0].estimate.nis;
     assert!(records.iter().all(|record| record.estimate.nis.is_none() || record.estimate.nis == sound));
     let scan = writer.store().scan_columns(&Query::default(), &["nis"]).unwrap();
-    let stored = (0..scan.len()).flat_map(|part| scan.read(part).unwrap());
-    assert!(
-        stored
-            .flat_map(|batch| batch
-                .column(0)
-                .as_primitive::<Float64Type>()
-                .iter()
-                .flatten()
-                .collect::<Vec<_>>())
-            .all(f64::is_finite)
-    );
+    for batch in (0..scan.len()).flat_map(|part| scan.read(part).unwrap()) {
+        assert!(batch.column(0).as_primitive::<Float64Type>().iter().flatten().all(f64::is_finite));
+    }
 }

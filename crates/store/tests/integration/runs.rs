@@ -1,9 +1,11 @@
 //! The status of a run is known at any instant, also after it was killed.
 
+use std::slice;
+
 use records::Status;
 use store::{Holder, LogOutcome, LogRecord, Query, RunRecord, Store, Writer};
 
-use crate::fixtures::{account, record, result, run, writer};
+use crate::fixtures::{account, fresh, record, result, run, writer};
 
 /// The four logs of a run that means to do flights 0 to 3 of tail 1, and does the first three: estimated,
 /// refused in two of its three positions, and broken.
@@ -41,8 +43,7 @@ fn outcomes(store: &Store, run_id: &str) -> Vec<LogOutcome> {
 
 #[test]
 fn a_run_that_was_killed_is_accounted_for_log_by_log() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (dir, mut writer) = fresh();
     cut_short(&mut writer);
     let store = Store::open(dir.path()).unwrap();
     let runs = store.runs().unwrap();
@@ -58,8 +59,7 @@ fn a_run_that_was_killed_is_accounted_for_log_by_log() {
 /// The commit of records comes before that of their accounts: a kill between them leaves such a store.
 #[test]
 fn records_without_an_account_are_counted_and_their_log_is_done_again() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (dir, mut writer) = fresh();
     let to_do: Vec<LogRecord> = (0..2).map(|flight| not_reached(flight, "run")).collect();
     writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
     writer.commit(&[result(1, 0, 30e-6)]).unwrap();
@@ -75,8 +75,7 @@ fn records_without_an_account_are_counted_and_their_log_is_done_again() {
 
 #[test]
 fn the_next_run_closes_the_account_of_a_killed_one_for_good() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     cut_short(&mut writer);
     let closed = writer.close_killed_runs().unwrap();
     assert_eq!(closed.iter().map(figures).collect::<Vec<_>>(), [[3, 4, 2, 1, 1]]);
@@ -92,18 +91,24 @@ fn the_next_run_closes_the_account_of_a_killed_one_for_good() {
 }
 
 #[test]
-fn a_log_that_is_not_reached_keeps_what_was_known_of_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+fn only_an_outcome_that_settles_a_log_replaces_what_was_known_of_it() {
+    let (_dir, mut writer) = fresh();
     writer.commit(&[result(1, 0, 30e-6)]).unwrap();
-    writer.begin_run(&run("redo", "2026-11-20T02:00:00Z", None), &[not_reached(0, "redo")]).unwrap();
-    assert_eq!(writer.store().accounts().unwrap(), [account(1, 0)]);
+    for outcome in [LogOutcome::NotReached, LogOutcome::Unaccounted] {
+        let open = LogRecord { outcome, ..not_reached(0, "redo") };
+        writer.begin_run(&run("redo", "2026-11-20T02:00:00Z", None), &[open]).unwrap();
+        assert_eq!(writer.store().accounts().unwrap(), [account(1, 0)]);
+    }
+    for outcome in [LogOutcome::Known, LogOutcome::Error, LogOutcome::Done] {
+        let settled = LogRecord { outcome, ..not_reached(0, "redo") };
+        writer.begin_run(&run("redo", "2026-11-20T02:00:00Z", None), slice::from_ref(&settled)).unwrap();
+        assert_eq!(writer.store().accounts().unwrap(), [settled]);
+    }
 }
 
 #[test]
 fn runs_are_listed_by_start_with_their_end() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     let whole = run("a", "2026-11-20T02:00:00Z", Some(1));
     writer.begin_run(&run("a", "2026-11-20T02:00:00Z", None), &[]).unwrap();
     writer.end_run(&whole).unwrap();
@@ -116,8 +121,7 @@ fn runs_are_listed_by_start_with_their_end() {
 /// DuckDB is handed the list of files, and fails on an empty one.
 #[test]
 fn a_table_always_has_a_file() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
+    let (_dir, mut writer) = fresh();
     assert_eq!(writer.store().files().unwrap().len(), 1);
     let mut retired = result(1, 0, 30e-6);
     writer.commit(&[retired.clone()]).unwrap();
