@@ -28,9 +28,6 @@ pub enum LogOutcome {
 }
 
 impl LogOutcome {
-    /// Outcomes that leave the earlier status of a log valid.
-    pub const UNSETTLED: [Self; 2] = [Self::Unaccounted, Self::NotReached];
-
     /// Whether the log was processed without an error.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Done | Self::Known)

@@ -47,12 +47,9 @@ pub enum Error {
     /// The bucket does not return or accept a file.
     #[error(transparent)]
     Object(#[from] object_io::Error),
-    /// A column is not there or has another type.
-    #[error("column `{column}` {problem}")]
-    Column { column: String, problem: String },
-    /// A value is not valid in its column.
-    #[error("column `{column}`, row {row}: {problem}")]
-    Value { column: &'static str, row: usize, problem: String },
+    /// A column is missing or has another type, or a value is not valid in its column.
+    #[error(transparent)]
+    Row(#[from] RowError),
     /// Rows could not be ordered or grouped.
     #[error("rows cannot be sorted: {0}")]
     Frame(#[from] polars::error::PolarsError),
@@ -62,16 +59,6 @@ pub enum Error {
     /// A Parquet file could not be written or read.
     #[error("Parquet: {0}")]
     Parquet(#[from] parquet::errors::ParquetError),
-}
-
-impl From<RowError> for Error {
-    fn from(error: RowError) -> Self {
-        match error {
-            RowError::Column { column, problem } => Self::Column { column: column.to_owned(), problem },
-            RowError::Value { column, row, problem } => Self::Value { column, row, problem },
-            RowError::Arrow(error) => Self::Arrow(error),
-        }
-    }
 }
 
 impl Error {
@@ -110,7 +97,7 @@ impl Error {
             Self::Table { .. } | Self::LogTable { .. } => "store_table",
             Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
             Self::Object(error) => error.code(),
-            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) | Self::Frame(_) => "store_value",
+            Self::Row(_) | Self::Arrow(_) | Self::Frame(_) => "store_value",
             Self::Parquet(_) => "store_unreadable",
         }
     }
@@ -150,7 +137,7 @@ impl Error {
             Self::Damaged { .. } => {
                 "restore this file from a backup; without one, remove the store and run its logs again"
             }
-            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) | Self::Frame(_) => {
+            Self::Row(_) | Self::Arrow(_) | Self::Frame(_) => {
                 "was the table changed by another program? `freeplay store verify` shows details"
             }
             Self::Parquet(_) => "`freeplay store verify` lists the damaged files",

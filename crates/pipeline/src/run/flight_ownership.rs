@@ -172,7 +172,7 @@ impl<'a> OwnershipLedger<'a> {
             let owner = other.log_path.clone();
             let new = HeldRecord::of(&record);
             let is_held_by_run = self.own.contains_key(&key);
-            let is_same = other.log_digest == new.log_digest || other.fingerprint == new.fingerprint;
+            let is_same = other.is_same_as(&new);
             match self.claim(&account, &new, other, is_same, is_held_by_run) {
                 Claim::Takes => {
                     if is_held_by_run {
@@ -200,7 +200,7 @@ impl<'a> OwnershipLedger<'a> {
             let Some(mut loser) = self.accounts.get(&log).cloned() else { continue };
             let left = self.left_to(&loser);
             if !left.is_empty() {
-                let estimated = left.iter().filter(|record| record.is_estimated).count();
+                let estimated = left.iter().filter(|record| record.is_estimated()).count();
                 (loser.estimated, loser.refused) = (estimated as i64, (left.len() - estimated) as i64);
                 self.insert(loser.clone());
                 results.push(LogResult { account: loser, records: Vec::new(), moved_from: Vec::new() });
@@ -251,7 +251,7 @@ impl<'a> OwnershipLedger<'a> {
         let is_gone = holder.is_none();
         // A log that broke speaks for no record any more; a copy of what it was takes its place.
         let is_broken = holder.is_some_and(|holder| holder.estimated + holder.refused == 0);
-        match (new.is_estimated, held.is_estimated) {
+        match (new.is_estimated(), held.is_estimated()) {
             (true, false) => Claim::Takes,
             (false, true) => Claim::IsWorse,
             _ if is_gone || (is_broken && is_same) => Claim::Takes,

@@ -12,8 +12,8 @@ use records::{GapRecord, Status};
 
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::latest_rows::TextFilter;
 use crate::read::query::Query;
+use crate::read::scan::Condition;
 use crate::write::lock::Lock;
 use crate::write::writer::{self, Writer};
 use records::{LogOutcome, LogRecord, RunRecord};
@@ -27,12 +27,8 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogRecord>, Error> {
-        let logs = self.newest(
-            &self.logs,
-            Some(TextFilter { column: "run_id", is_wanted: &|id| id == run_id }),
-            |stats| stats.may_hold("run_id", run_id),
-            |account: &LogRecord| account.log_path.clone(),
-        )?;
+        let of_run = Condition::texts("run_id", run_id, run_id);
+        let logs = self.newest(&self.logs, Some(of_run), |account: &LogRecord| account.log_path.clone())?;
         let mut logs: BTreeMap<String, LogRecord> =
             logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
         let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
@@ -52,7 +48,7 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn runs(&self) -> Result<Vec<RunRecord>, Error> {
-        let mut runs = self.newest(&self.runs, None, |_| true, |run: &RunRecord| run.run_id.clone())?;
+        let mut runs = self.newest(&self.runs, None, |run: &RunRecord| run.run_id.clone())?;
         for run in runs.iter_mut().filter(|run| !run.has_ended()) {
             add_up(run, &self.run_logs(&run.run_id)?);
         }
@@ -66,9 +62,9 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn tables_digest(&self) -> Result<Option<String>, Error> {
-        let name = |run: &RunRecord| run.run_id.clone();
-        let runs = self.newest_with_commits(&self.runs, None, |_| true, name)?;
-        Ok(runs.into_iter().max_by_key(|(commit, _)| *commit).and_then(|(_, run)| run.tables_digest))
+        // Under one name, the newest row of all.
+        let latest = self.newest(&self.runs, None, |_: &RunRecord| String::new())?.pop();
+        Ok(latest.and_then(|run| run.tables_digest))
     }
 
     /// Whether a run holds the store now; in a bucket, whether a run without an end sent a heartbeat recently.

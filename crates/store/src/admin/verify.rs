@@ -130,7 +130,9 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
         Err(error) => vec![error.diagnostic()],
     };
     match table.snapshot() {
-        Ok(snapshot) => findings.extend(snapshot.files.iter().filter_map(|file| wrong_with(table, file))),
+        Ok(snapshot) => {
+            findings.extend(snapshot.files.iter().filter_map(|file| check_file(table, file).err()))
+        }
         // A damaged log file is named already.
         Err(Error::LogDamaged { .. }) if !findings.is_empty() => {}
         Err(error) => findings.push(error.diagnostic()),
@@ -146,60 +148,45 @@ fn foreign_commit(table: &Table, file: &Path) -> Diagnostic {
         )
 }
 
-fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
-    let diagnostic = |code: &str, what: &str| {
-        Diagnostic::new(code, what).in_file(table.location.display_path(&file.path).display())
+/// What is wrong with a data file, in the first respect that is.
+fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
+    const RESTORE: &str = "restore it from a backup of the store";
+    let wrong = |code: &str, what: &str, hint: &str| {
+        Diagnostic::new(code, what).in_file(table.location.display_path(&file.path).display()).hint(hint)
     };
-    let length = match table.location.length(&file.path) {
-        Ok(Some(length)) => length,
-        Ok(None) => {
-            let what = "a committed data file is missing";
-            return Some(
-                diagnostic("store_file_missing", what).hint("restore it from a backup of the store"),
-            );
-        }
-        Err(error) => return Some(error.diagnostic()),
+    let differs = |what: &str, found: String, expected: String| {
+        let what = format!("a data file has another {what} than was committed");
+        let found = Some(found);
+        Err(Diagnostic { found, expected: Some(expected), ..wrong("store_damaged", &what, RESTORE) })
     };
-    if let Err(error) = table.location.fetch(&file.path).and_then(|()| data_file::check(&file.path)) {
-        return Some(error.diagnostic());
-    }
+    let Some(length) = table.location.length(&file.path).map_err(|e| e.diagnostic())? else {
+        return Err(wrong("store_file_missing", "a committed data file is missing", RESTORE));
+    };
+    table
+        .location
+        .fetch(&file.path)
+        .and_then(|()| data_file::check(&file.path))
+        .map_err(|e| e.diagnostic())?;
     if length != file.size_bytes {
-        let mut wrong = diagnostic("store_damaged", "a data file has another length than was committed");
-        (wrong.found, wrong.expected) = (Some(bytes(length)), Some(bytes(file.size_bytes)));
-        return Some(wrong.hint("restore it from a backup of the store"));
+        return differs("length", format!("{length} bytes"), format!("{} bytes", file.size_bytes));
     }
-    let rows = match rows(file) {
-        Ok(rows) => rows,
-        Err(error) => return Some(error.diagnostic().in_file(file.path.display())),
-    };
-    if file.stats.num_records.is_some_and(|committed| committed != rows) {
-        let mut wrong =
-            diagnostic("store_damaged", "a data file has another number of rows than was committed");
-        (wrong.found, wrong.expected) =
-            (Some(rows.to_string()), file.stats.num_records.map(|n| n.to_string()));
-        return Some(wrong.hint("restore it from a backup of the store"));
+    let rows = rows(file).map_err(|e| e.diagnostic().in_file(file.path.display()))?;
+    if let Some(committed) = file.stats.num_records.filter(|committed| *committed != rows) {
+        return differs("number of rows", rows.to_string(), committed.to_string());
     }
     if !file.has_digest() {
-        return Some(
-            diagnostic(
-                "store_file_foreign",
-                "a data file was written by another program and carries no digest",
-            )
-            .hint(
-                "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
-            ),
-        );
+        return Err(wrong(
+            "store_file_foreign",
+            "a data file was written by another program and carries no digest",
+            "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
+        ));
     }
-    match missed_by_statistics(table, file) {
-        Ok(None) => None,
-        Ok(Some(column)) => {
+    match missed_by_statistics(table, file).map_err(|e| e.diagnostic())? {
+        None => Ok(()),
+        Some(column) => {
             let what = format!("the statistics of a data file do not cover its content: {column}");
-            Some(
-                diagnostic("store_damaged", &what)
-                    .hint("restore the log of the table from a backup of the store"),
-            )
+            Err(wrong("store_damaged", &what, "restore the log of the table from a backup of the store"))
         }
-        Err(error) => Some(error.diagnostic()),
     }
 }
 
@@ -208,10 +195,6 @@ fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>
     let files = std::slice::from_ref(&file.path);
     let content = scan::read_table(files, &table.schema, &[])?;
     Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
-}
-
-fn bytes(count: u64) -> String {
-    format!("{count} bytes")
 }
 
 fn rows(file: &DataFile) -> Result<i64, Error> {

@@ -38,14 +38,15 @@ impl Stats {
         text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
     }
 
-    /// Whether the text column may hold a value.
-    pub(crate) fn may_hold(&self, column: &str, value: &str) -> bool {
+    /// Whether the text column may hold a value from `first` to `last`.
+    pub(crate) fn may_hold(&self, column: &str, first: &str, last: &str) -> bool {
         let bound =
             |bounds: &Map<String, Value>| bounds.get(column).and_then(Value::as_str).map(str::to_owned);
         let listed = self.freeplay_serials.as_ref().filter(|_| column == UNITS.0);
-        listed.is_none_or(|units| units.contains(value))
-            && bound(&self.min_values).is_none_or(|low| low.as_str() <= value)
-            && bound(&self.max_values).is_none_or(|high| value <= high.as_str())
+        let is_within = |unit: &String| (first..=last).contains(&unit.as_str());
+        listed.is_none_or(|units| units.iter().any(is_within))
+            && bound(&self.min_values).is_none_or(|low| low.as_str() <= last)
+            && bound(&self.max_values).is_none_or(|high| first <= high.as_str())
     }
 
     /// Which column has values outside the statistics; `None` when they cover the content of the file.
@@ -70,13 +71,6 @@ impl Stats {
             .or_else(|| {
                 units.is_some_and(|(listed, held)| !held.is_subset(listed)).then(|| UNITS.0.to_owned())
             })
-    }
-
-    /// Whether every value of the text column is this one.
-    pub(crate) fn holds_only(&self, column: &str, value: &str) -> bool {
-        [&self.min_values, &self.max_values]
-            .into_iter()
-            .all(|bounds| bounds.get(column) == Some(&json!(value)))
     }
 
     /// The earliest and the latest time the column may hold, µs since 1970; a file without rows holds none,
@@ -180,7 +174,7 @@ mod tests {
     #[test]
     fn what_is_not_known_or_cannot_be_never_prunes() {
         let stats = Stats::parse(Some("torn"));
-        assert!(stats.may_hold("tail_number", "N1"));
+        assert!(stats.may_hold("tail_number", "N1", "N1"));
         assert_eq!(stats.times_us("departure_utc"), (i64::MIN, i64::MAX));
         let reversed = Stats::parse(Some(
             r#"{"minValues":{"t":"2026-01-02T00:00:00Z"},"maxValues":{"t":"2026-01-01T00:00:00Z"}}"#,

@@ -131,26 +131,18 @@ impl Location {
 
     /// Whether a file is there.
     pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
-        let path = self.dir.join(name);
-        match &self.bucket {
-            Some(bucket) => Ok(self.size(bucket, &path)?.is_some()),
-            None => path.try_exists().map_err(Error::io(path, "read")),
-        }
+        Ok(self.length(&self.dir.join(name))?.is_some())
     }
 
     /// A file's bytes as it is there; nothing when it is not.
     pub(crate) fn length(&self, path: &Path) -> Result<Option<u64>, Error> {
-        match &self.bucket {
-            Some(bucket) => self.size(bucket, path),
-            None => match std::fs::metadata(path) {
+        let Some(bucket) = &self.bucket else {
+            return match std::fs::metadata(path) {
                 Ok(data) => Ok(Some(data.len())),
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
                 Err(e) => Err(Error::io(path, "read")(e)),
-            },
-        }
-    }
-
-    fn size(&self, bucket: &BucketLocation, path: &Path) -> Result<Option<u64>, Error> {
+            };
+        };
         match bucket.request(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
             Ok(meta) => Ok(Some(meta.size)),
             Err(object_io::Error::Missing { .. }) => Ok(None),

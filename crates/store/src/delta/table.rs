@@ -501,7 +501,7 @@ mod tests {
         assert_eq!(rows(&table), 24);
         let snapshot = table.snapshot().unwrap();
         let filled: Vec<&DataFile> = snapshot.files.iter().filter(|file| file.has_rows()).collect();
-        let with = |name: &str| filled.iter().filter(|file| file.stats.may_hold("name", name)).count();
+        let with = |name: &str| filled.iter().filter(|file| file.stats.may_hold("name", name, name)).count();
         assert_eq!((with("n03"), with("n23"), with("n99")), (1, 1, 0));
         // Microseconds 1 to 24 lie in the first millisecond, whose end may have been cut off.
         assert!(filled.iter().all(|file| file.stats.times_us("at") == (0, 2_000)));

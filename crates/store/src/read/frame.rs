@@ -6,6 +6,7 @@
 use arrow::array::{ArrayRef, AsArray, DictionaryArray, RecordBatch, StringArray};
 use arrow::compute::interleave_record_batch;
 use arrow::datatypes::{DataType, Int32Type, Int64Type, TimestampMicrosecondType};
+use arrow::error::ArrowError;
 use polars::prelude::{
     Column, DataFrame, Int64Chunked, IntoColumn, NewChunkedArray, SortMultipleOptions, StringChunked,
 };
@@ -18,7 +19,7 @@ const ROW: &str = "row";
 /// Some columns of batches of one schema; times are microseconds.
 ///
 /// # Errors
-/// [`Error::Column`] for a column that is not there, or has another type than text, time or whole number.
+/// [`Error::Arrow`] for a column that is not there, or has another type than text, time or whole number.
 pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame, Error> {
     let height = batches.iter().map(RecordBatch::num_rows).sum();
     let columns = names.iter().map(|name| column(batches, name));
@@ -26,9 +27,8 @@ pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame
 }
 
 fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
-    let fails = |problem: &str| Error::Column { column: name.to_owned(), problem: problem.to_owned() };
-    let arrays = batches.iter().map(|batch| batch.column_by_name(name).ok_or_else(|| fails("is missing")));
-    let arrays: Vec<&ArrayRef> = arrays.collect::<Result<_, _>>()?;
+    let arrays = batches.iter().map(|batch| Ok(batch.column(batch.schema_ref().index_of(name)?)));
+    let arrays: Vec<&ArrayRef> = arrays.collect::<Result<_, ArrowError>>()?;
     Ok(match arrays.first().map(|array| array.data_type()) {
         Some(DataType::Utf8 | DataType::Dictionary(..)) => {
             StringChunked::from_iter_options(name.into(), arrays.iter().flat_map(|array| texts(array)))
@@ -42,7 +42,10 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
             let times = arrays.iter().flat_map(|array| array.as_primitive::<TimestampMicrosecondType>());
             Int64Chunked::from_iter_options(name.into(), times).into_column()
         }
-        _ => return Err(fails("cannot be ordered or grouped by")),
+        _ => {
+            let problem = format!("column `{name}` cannot be ordered or grouped by");
+            return Err(ArrowError::NotYetImplemented(problem).into());
+        }
     })
 }
 

@@ -6,52 +6,32 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use arrow::array::{AsArray, BooleanArray, RecordBatch};
-use arrow::compute::filter_record_batch;
+use arrow::array::AsArray;
 use arrow::datatypes::Int64Type;
 
-use crate::delta::file_stats::Stats;
+use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::scan;
+use crate::read::scan::{self, Condition};
 use records::row_schema::{self, FromCells, Row};
 
-/// Rows in which a text column holds what is wanted; one that is empty there is not.
-#[derive(Clone, Copy)]
-pub(crate) struct TextFilter<'a> {
-    pub(crate) column: &'a str,
-    pub(crate) is_wanted: &'a dyn Fn(&str) -> bool,
-}
-
 impl Store {
-    /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
+    /// Of the rows that meet a condition, the newest of each name, by name; files that cannot hold one are passed over.
     ///
     /// # Errors
     /// As [`Store::records`].
     pub(crate) fn newest<R: Row + FromCells>(
         &self,
         table: &Table,
-        wanted: Option<TextFilter<'_>>,
-        may_hold: impl Fn(&Stats) -> bool,
+        wanted: Option<Condition>,
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
-        let rows = self.newest_with_commits(table, wanted, may_hold, name)?;
-        Ok(rows.into_iter().map(|(_, row)| row).collect())
-    }
-
-    /// The same, each row with the number of its commit.
-    pub(crate) fn newest_with_commits<R: Row + FromCells>(
-        &self,
-        table: &Table,
-        wanted: Option<TextFilter<'_>>,
-        may_hold: impl Fn(&Stats) -> bool,
-        name: impl Fn(&R) -> String,
-    ) -> Result<Vec<(i64, R)>, Error> {
-        let snapshot = table.snapshot()?;
-        let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
-        let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
+        let (snapshot, wanted) = (table.snapshot()?, wanted.as_slice());
+        let may_hold = |file: &&DataFile| file.has_rows() && wanted.iter().all(|w| w.may_be_in(&file.stats));
+        let files: Vec<PathBuf> =
+            snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
         self.check(&files)?;
         newest_of(&files, wanted, name)
     }
@@ -59,18 +39,15 @@ impl Store {
 
 fn newest_of<R: Row + FromCells>(
     files: &[PathBuf],
-    wanted: Option<TextFilter<'_>>,
+    wanted: &[Condition],
     name: impl Fn(&R) -> String,
-) -> Result<Vec<(i64, R)>, Error> {
+) -> Result<Vec<R>, Error> {
     let schema = versioned::schema::<R>();
     let commit_column = schema.index_of(versioned::COMMIT)?;
     // By name: the row, and the commit that it came with.
     let mut newest: BTreeMap<String, (i64, R)> = BTreeMap::new();
     for file in files {
-        for mut batch in scan::read_file(file, &schema, &[])? {
-            if let Some(wanted) = wanted {
-                batch = filter_record_batch(&batch, &wanted.of(&batch)?)?;
-            }
+        for batch in scan::read_file(file, &schema, wanted)? {
             let commits = batch.column(commit_column).as_primitive::<Int64Type>();
             for (&commit, row) in commits.values().iter().zip(row_schema::from_batch::<R>(&batch)?) {
                 let name = name(&row);
@@ -80,14 +57,7 @@ fn newest_of<R: Row + FromCells>(
             }
         }
     }
-    Ok(newest.into_values().collect())
-}
-
-impl TextFilter<'_> {
-    fn of(&self, batch: &RecordBatch) -> Result<BooleanArray, Error> {
-        let texts = batch.column(batch.schema_ref().index_of(self.column)?).as_string::<i32>();
-        Ok(texts.iter().map(|text| Some(text.is_some_and(self.is_wanted))).collect())
-    }
+    Ok(newest.into_values().map(|(_, row)| row).collect())
 }
 
 #[cfg(test)]
@@ -95,7 +65,7 @@ mod tests {
     use std::fs::File;
     use std::sync::Arc;
 
-    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, TimestampNanosecondArray};
+    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, RecordBatch, TimestampNanosecondArray};
     use parquet::arrow::ArrowWriter;
 
     use super::*;
@@ -121,7 +91,7 @@ mod tests {
         RecordBatch::try_from_iter(columns).unwrap()
     }
 
-    fn taken(batches: &[RecordBatch], wanted: Option<TextFilter<'_>>) -> Result<Vec<(String, i64)>, Error> {
+    fn taken(batches: &[RecordBatch], wanted: &[Condition]) -> Result<Vec<(String, i64)>, Error> {
         let dir = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..batches.len()).map(|k| dir.path().join(k.to_string())).collect();
         for (path, batch) in files.iter().zip(batches) {
@@ -130,20 +100,20 @@ mod tests {
             writer.close().unwrap();
         }
         let newest = newest_of(&files, wanted, |run: &RunRecord| run.run_id.clone())?;
-        Ok(newest.into_iter().map(|(_, run)| (run.run_id, run.found)).collect())
+        Ok(newest.into_iter().map(|run| (run.run_id, run.found)).collect())
     }
 
     #[test]
     fn the_commit_tells_which_is_newest_whatever_the_order_of_files() {
         let batches = [foreign(&["b", "a"], 20, 2), foreign(&["b", "c"], 30, 3), foreign(&["a", "c"], 10, 1)];
         let expected = [("a", 20), ("b", 30), ("c", 30)].map(|(name, found)| (name.to_owned(), found));
-        assert_eq!(taken(&batches, None).unwrap(), expected);
+        assert_eq!(taken(&batches, &[]).unwrap(), expected);
     }
 
     #[test]
     fn rows_that_are_not_wanted_are_passed_over() {
-        let wanted = TextFilter { column: "run_id", is_wanted: &|id| id != "a" };
-        let found = taken(&[foreign(&["b", "a"], 1, 1)], Some(wanted)).unwrap();
+        let wanted = Condition::texts("run_id", "b", "c");
+        let found = taken(&[foreign(&["b", "a"], 1, 1)], &[wanted]).unwrap();
         assert_eq!(found, [("b".to_owned(), 1)]);
     }
 
@@ -151,6 +121,6 @@ mod tests {
     fn a_column_that_must_be_there_and_is_not_is_an_error() {
         let batch = foreign(&["a"], 1, 1);
         let without: Vec<usize> = (1..batch.num_columns()).collect();
-        assert!(taken(&[batch.project(&without).unwrap()], None).is_err());
+        assert!(taken(&[batch.project(&without).unwrap()], &[]).is_err());
     }
 }

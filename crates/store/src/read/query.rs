@@ -2,7 +2,6 @@
 
 use jiff::Timestamp;
 
-use crate::delta::file_stats::Stats;
 use crate::read::scan::Condition;
 
 /// Selection of records; a field that is `None` does not restrict it.
@@ -29,34 +28,27 @@ pub struct Query {
 }
 
 impl Query {
-    fn texts(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        [
+    /// Conditions that every matching record meets.
+    pub(crate) fn conditions(&self) -> Vec<Condition> {
+        let texts = [
             ("tail_number", &self.tail_number),
             ("serial_number", &self.serial_number),
             ("part_number", &self.part_number),
             ("flight_id", &self.flight_id),
             ("position", &self.position),
             ("run_id", &self.run_id),
-        ]
-        .into_iter()
-        .filter_map(|(column, value)| Some((column, value.as_deref()?)))
-    }
-
-    /// Whether a file may hold matching records, by its statistics of the text columns that `is_known` names, and by time.
-    pub(crate) fn may_be_in(&self, stats: &Stats, is_known: impl Fn(&str) -> bool) -> bool {
-        let (earliest_us, latest_us) = stats.times_us("departure_utc");
-        self.texts().all(|(column, value)| !is_known(column) || stats.may_hold(column, value))
-            && self.since_utc.is_none_or(|since| since.as_microsecond() <= latest_us)
-            && self.until_utc.is_none_or(|until| earliest_us < until_us(until))
-    }
-
-    /// Conditions that every matching record meets.
-    pub(crate) fn conditions(&self) -> Vec<Condition> {
-        let texts = self.texts().map(|(column, value)| Condition::texts(column, value, value));
+        ];
+        let text = |(column, value): (_, &Option<String>)| {
+            Some(Condition::texts(column, value.as_ref()?, value.as_ref()?))
+        };
         // A departure is cut to whole microseconds in the table, so a bound between two of them rounds up.
         let (first, last) = (self.since_utc.map(until_us), self.until_utc.map(|until| until_us(until) - 1));
         let is_timed = first.or(last).is_some();
-        texts.chain(is_timed.then(|| Condition::times("departure_utc", first, last))).collect()
+        texts
+            .into_iter()
+            .filter_map(text)
+            .chain(is_timed.then(|| Condition::times("departure_utc", first, last)))
+            .collect()
     }
 }
 

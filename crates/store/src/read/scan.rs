@@ -23,7 +23,10 @@ use parquet::arrow::arrow_reader::{
     ParquetRecordBatchReaderBuilder, RowFilter,
 };
 
+use records::row_schema::time_type;
+
 use crate::delta::data_file::GROUP_ROWS;
+use crate::delta::file_stats::Stats;
 use crate::error::Error;
 
 type Builder = ParquetRecordBatchReaderBuilder<File>;
@@ -32,47 +35,68 @@ type Builder = ParquetRecordBatchReaderBuilder<File>;
 #[derive(Debug, Clone)]
 pub(crate) struct Condition {
     pub(crate) column: &'static str,
-    first: Option<Scalar<ArrayRef>>,
-    last: Option<Scalar<ArrayRef>>,
+    bounds: Bounds,
+}
+
+#[derive(Debug, Clone)]
+enum Bounds {
+    Texts(String, String),
+    /// µs since 1970 UTC.
+    Times(Option<i64>, Option<i64>),
 }
 
 impl Condition {
     /// Texts from `first` to `last`, byte by byte.
     pub(crate) fn texts(column: &'static str, first: &str, last: &str) -> Self {
-        let bound = |text: &str| Some(Scalar::new(Arc::new(StringArray::from(vec![text])) as ArrayRef));
-        Self { column, first: bound(first), last: bound(last) }
+        Self { column, bounds: Bounds::Texts(first.to_owned(), last.to_owned()) }
     }
 
     /// Times in µs UTC.
     pub(crate) fn times(column: &'static str, first_us: Option<i64>, last_us: Option<i64>) -> Self {
-        let bound = |micros: i64| {
+        Self { column, bounds: Bounds::Times(first_us, last_us) }
+    }
+
+    /// Whether a file may hold a matching row, by its statistics.
+    pub(crate) fn may_be_in(&self, file: &Stats) -> bool {
+        match &self.bounds {
+            Bounds::Texts(first, last) => file.may_hold(self.column, first, last),
+            Bounds::Times(first, last) => {
+                let (earliest, latest) = file.times_us(self.column);
+                first.is_none_or(|first| first <= latest) && last.is_none_or(|last| earliest <= last)
+            }
+        }
+    }
+
+    /// The least and the largest matching value.
+    fn scalars(&self) -> [Option<Scalar<ArrayRef>>; 2] {
+        let text = |text: &String| Scalar::new(Arc::new(StringArray::from(vec![text.as_str()])) as ArrayRef);
+        let time = |micros: i64| {
             let time = TimestampMicrosecondArray::from(vec![micros]).with_timezone("UTC");
             Scalar::new(Arc::new(time) as ArrayRef)
         };
-        Self { column, first: first_us.map(bound), last: last_us.map(bound) }
+        match &self.bounds {
+            Bounds::Texts(first, last) => [first, last].map(|bound| Some(text(bound))),
+            Bounds::Times(first, last) => [first, last].map(|bound| bound.map(time)),
+        }
     }
 
     /// Mask of the matching values.
     pub(crate) fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
-        let values = self.comparable(values)?;
-        let first = self.first.as_ref().map(|first| gt_eq(&values, first)).transpose()?;
-        let last = self.last.as_ref().map(|last| lt_eq(&values, last)).transpose()?;
-        match (first, last) {
-            (Some(first), Some(last)) => and(&first, &last),
-            (Some(mask), None) | (None, Some(mask)) => Ok(mask),
-            (None, None) => Ok(vec![true; values.len()].into()),
+        // Another program may have given the values another form.
+        let values = match self.bounds {
+            Bounds::Texts(..) if values.data_type() == &dictionary() => Arc::clone(values),
+            Bounds::Texts(..) => cast(values, &DataType::Utf8)?,
+            Bounds::Times(..) => cast(values, &time_type())?,
+        };
+        let [first, last] = self.scalars();
+        let mut mask = BooleanArray::from(vec![true; values.len()]);
+        if let Some(first) = first {
+            mask = and(&mask, &gt_eq(&values, &first)?)?;
         }
-    }
-
-    /// Values in a form that compares with the bounds, whatever form another program gave them.
-    fn comparable(&self, values: &ArrayRef) -> Result<ArrayRef, ArrowError> {
-        use arrow::array::Datum;
-        let bound = self.first.as_ref().or(self.last.as_ref());
-        match bound.map(|bound| bound.get().0.data_type().clone()) {
-            Some(DataType::Utf8) if values.data_type() == &dictionary() => Ok(Arc::clone(values)),
-            Some(wanted) => cast(values, &wanted),
-            None => Ok(Arc::clone(values)),
+        if let Some(last) = last {
+            mask = and(&mask, &lt_eq(&values, &last)?)?;
         }
+        Ok(mask)
     }
 
     /// For each row group, whether its statistics rule out every row; `None` where they cannot be compared.
@@ -87,11 +111,12 @@ impl Condition {
             excluded.iter_mut().zip(&mask).for_each(|(excluded, outside)| *excluded |= outside == Some(true));
             Some(())
         };
-        if let Some(first) = &self.first {
-            exclude(lt(&stats.row_group_maxes(groups).ok()?, first))?;
+        let [first, last] = self.scalars();
+        if let Some(first) = first {
+            exclude(lt(&stats.row_group_maxes(groups).ok()?, &first))?;
         }
-        if let Some(last) = &self.last {
-            exclude(gt(&stats.row_group_mins(groups).ok()?, last))?;
+        if let Some(last) = last {
+            exclude(gt(&stats.row_group_mins(groups).ok()?, &last))?;
         }
         Some(excluded)
     }

@@ -13,7 +13,7 @@ use arrow::datatypes::{Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use records::{GapRecord, Status};
 
-use crate::delta::snapshot::{DataFile, Snapshot};
+use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::join::Join;
@@ -44,15 +44,16 @@ impl Selection {
     pub(crate) fn of(store: &Store, snapshot: &Snapshot, query: &Query, wanted: &SchemaRef) -> Self {
         let join = store.join.clone();
         let is_joined = |column: &str| join.is_some() && JOINED.contains(&column);
-        let may_hold =
-            |file: &&DataFile| file.has_rows() && query.may_be_in(&file.stats, |column| !is_joined(column));
-        let files: Vec<_> = snapshot.files.iter().filter(may_hold).collect();
         let (joined, mut stored): (Vec<_>, Vec<_>) =
             query.conditions().into_iter().partition(|condition| is_joined(condition.column));
+        let files: Vec<_> = snapshot
+            .files
+            .iter()
+            .filter(|file| file.has_rows() && stored.iter().all(|condition| condition.may_be_in(&file.stats)))
+            .collect();
         let withdrawn = Status::Withdrawn.as_str();
-        if files.iter().any(|file| file.stats.may_hold("status", withdrawn)) {
-            let [first, last] = [Status::Estimated, Status::Refused].map(Status::as_str);
-            stored.push(Condition::texts("status", first, last));
+        if files.iter().any(|file| file.stats.may_hold("status", withdrawn, withdrawn)) {
+            stored.push(not_withdrawn());
         }
         let read = if join.is_some() { widened(wanted) } else { Arc::clone(wanted) };
         let files = files.into_iter().map(|file| file.path.clone()).collect();
@@ -88,6 +89,11 @@ impl Selection {
             self.wanted.fields().iter().map(|field| batch.schema_ref().index_of(field.name())).collect();
         RecordBatch::try_new(Arc::clone(&self.wanted), batch.project(&columns?)?.columns().to_vec())
     }
+}
+
+/// Records that are not withdrawn.
+pub(crate) fn not_withdrawn() -> Condition {
+    Condition::texts("status", Status::Estimated.as_str(), Status::Refused.as_str())
 }
 
 /// The columns and those that a join needs; the latter as dictionaries where they are text.

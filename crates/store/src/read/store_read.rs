@@ -11,9 +11,8 @@ use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::frame;
-use crate::read::latest_rows::TextFilter;
 use crate::read::query::Query;
-use crate::read::scan;
+use crate::read::scan::{self, Condition};
 use crate::read::selection::Selection;
 use records::RecordKey;
 use records::row_schema::from_batch;
@@ -35,7 +34,7 @@ impl Store {
     /// The same as rows.
     ///
     /// # Errors
-    /// As [`Store::scan`]; [`Error::Value`] when a cell is not valid in its column.
+    /// As [`Store::scan`]; [`Error::Row`] when a cell is not valid in its column.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         Ok(from_batch(&self.scan(query)?)?)
     }
@@ -56,15 +55,9 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn accounts(&self) -> Result<Vec<LogRecord>, Error> {
-        let is_settled = |outcome: &str| LogOutcome::UNSETTLED.iter().all(|open| open.as_str() != outcome);
-        self.newest(
-            &self.logs,
-            Some(TextFilter { column: "outcome", is_wanted: &is_settled }),
-            |stats| {
-                !LogOutcome::UNSETTLED.iter().any(|outcome| stats.holds_only("outcome", outcome.as_str()))
-            },
-            |account: &LogRecord| account.log_path.clone(),
-        )
+        // In the order of their words: `done`, `error` and `known` settle a log, `not_reached` and `unaccounted` do not.
+        let settled = Condition::texts("outcome", LogOutcome::Done.as_str(), LogOutcome::Known.as_str());
+        self.newest(&self.logs, Some(settled), |account: &LogRecord| account.log_path.clone())
     }
 
     /// The data files of the records as of now, for engines that do not read Delta's log.

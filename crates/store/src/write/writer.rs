@@ -5,12 +5,12 @@ use std::slice;
 use std::sync::Arc;
 use std::time::Duration;
 
-use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
+use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::kernels::cmp::distinct;
 use arrow::compute::{filter_record_batch, or};
-use arrow::datatypes::{Float64Type, Int64Type, Schema, TimestampMicrosecondType};
+use arrow::datatypes::{Schema, TimestampMicrosecondType};
 use arrow::error::ArrowError;
-use records::{GapRecord, Status};
+use records::{GapRecord, Status, stored_row};
 
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
@@ -19,11 +19,12 @@ use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::scan;
+use crate::read::selection::not_withdrawn;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
 use records::LogRecord;
 use records::RecordKey;
-use records::row_schema::{FromCells, Row, to_batch};
+use records::row_schema::{self, FromCells, Row, from_batch, to_batch};
 
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,31 +37,51 @@ pub struct LogResult {
     pub moved_from: Vec<RecordKey>,
 }
 
-/// A stored record's log and settings.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct HeldRecord {
-    /// Path of the log that it was computed from.
-    pub log_path: String,
-    /// Digest of that log.
-    pub log_digest: String,
-    /// Whether it has a gap.
-    pub is_estimated: bool,
-    /// Both gaps, the load's quantiles and the number of samples, bit by bit: equal samples give equal bits.
-    pub fingerprint: [Option<u64>; 5],
+stored_row! {
+    /// The columns of a record that show from which log and from which samples it was computed.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct HeldRecord {
+        /// Path of the log that it was computed from.
+        pub log_path: String,
+        /// Digest of that log.
+        pub log_digest: String,
+        status: Status,
+        gap_m: Option<f64>,
+        gap_midrange_m: Option<f64>,
+        load_p05_n: Option<f64>,
+        load_p95_n: Option<f64>,
+        samples: i64,
+    }
 }
 
 impl HeldRecord {
     /// Of a record that is about to be stored.
     pub fn of(record: &GapRecord) -> Self {
-        let estimate = &record.estimate;
-        let numbers = [estimate.gap_m, estimate.gap_midrange_m, estimate.load_p05_n, estimate.load_p95_n];
-        let [gap, midrange, low, high] = numbers.map(|number| number.map(f64::to_bits));
+        let (estimate, provenance) = (&record.estimate, &record.provenance);
         Self {
-            log_path: record.provenance.log_path.clone(),
-            log_digest: record.provenance.log_digest.clone(),
-            is_estimated: estimate.status == Status::Estimated,
-            fingerprint: [gap, midrange, low, high, Some(estimate.samples as u64)],
+            log_path: provenance.log_path.clone(),
+            log_digest: provenance.log_digest.clone(),
+            status: estimate.status,
+            gap_m: estimate.gap_m,
+            gap_midrange_m: estimate.gap_midrange_m,
+            load_p05_n: estimate.load_p05_n,
+            load_p95_n: estimate.load_p95_n,
+            samples: estimate.samples,
         }
+    }
+
+    /// Whether it has a gap.
+    pub fn is_estimated(&self) -> bool {
+        self.status == Status::Estimated
+    }
+
+    /// Whether both were computed from the same log, or from the same samples: equal samples give equal bits.
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        let bits = |record: &Self| {
+            [record.gap_m, record.gap_midrange_m, record.load_p05_n, record.load_p95_n]
+                .map(|number| number.map(f64::to_bits))
+        };
+        self.log_digest == other.log_digest || (self.samples == other.samples && bits(self) == bits(other))
     }
 }
 
@@ -134,46 +155,21 @@ impl Writer {
     /// # Errors
     /// As [`Store::records`].
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
-        const COLUMNS: [&str; 11] = [
-            "departure_utc",
-            "tail_number",
-            "position",
-            "log_path",
-            "log_digest",
-            "status",
-            "gap_m",
-            "gap_midrange_m",
-            "load_p05_n",
-            "load_p95_n",
-            "samples",
-        ];
         let wanted: MergeDecisions<'_> =
             keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
         let snapshot = self.store.gaps.snapshot()?;
         let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
         let files: Vec<_> = snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
         self.store.check(&files)?;
-        let schema = GapRecord::schema();
-        let columns = COLUMNS.iter().map(|name| schema.index_of(name)).collect::<Result<Vec<_>, _>>()?;
+        let all = GapRecord::schema();
+        let names = row_schema::columns::<HeldRecord>().into_iter().map(|column| column.name);
+        let columns = RecordKey::COLUMNS.into_iter().chain(names).map(|name| all.index_of(name));
+        let schema = Arc::new(all.project(&columns.collect::<Result<Vec<_>, _>>()?)?);
         let mut held = BTreeMap::new();
-        for batch in scan::read_files(&files, &Arc::new(schema.project(&columns)?), &[])? {
-            let [logs, digests, statuses] = [3, 4, 5].map(|at| batch.column(at).as_string::<i32>());
-            let numbers = [6, 7, 8, 9].map(|at| batch.column(at).as_primitive::<Float64Type>());
-            let samples = batch.column(10).as_primitive::<Int64Type>();
-            for (row, key) in keys_of(&batch)?.into_iter().enumerate() {
-                let status = statuses.value(row);
-                if keys.contains(&key) && status != Status::Withdrawn.as_str() {
-                    let bits = numbers.map(|n| n.is_valid(row).then(|| n.value(row).to_bits()));
-                    let [gap, midrange, low, high] = bits;
-                    let record = HeldRecord {
-                        fingerprint: [gap, midrange, low, high, Some(samples.value(row) as u64)],
-                        log_path: logs.value(row).to_owned(),
-                        log_digest: digests.value(row).to_owned(),
-                        is_estimated: status == Status::Estimated.as_str(),
-                    };
-                    held.insert(key, record);
-                }
-            }
+        for batch in scan::read_files(&files, &schema, &[not_withdrawn()])? {
+            let is_wanted = keys_of(&batch)?.iter().map(|key| Some(keys.contains(key))).collect();
+            let batch = filter_record_batch(&batch, &is_wanted)?;
+            held.extend(keys_of(&batch)?.into_iter().zip(from_batch::<HeldRecord>(&batch)?));
         }
         Ok(held)
     }
@@ -295,7 +291,9 @@ fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
     let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
     let from = |departure_us| RecordKey { departure_us, tail_number: String::new(), position: String::new() };
     let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));
-    in_time.map(|(key, _)| key).any(|key| file.stats.may_hold("tail_number", &key.tail_number))
+    in_time
+        .map(|(key, _)| key)
+        .any(|key| file.stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
 }
 
 /// Mask of the rows that no merge decision takes away.
