@@ -79,10 +79,7 @@ impl Writer {
 }
 
 fn append<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(), Error> {
-    if rows.is_empty() {
-        return Ok(());
-    }
-    if !table.exists()? {
+    if !rows.is_empty() && !table.exists()? {
         table.create()?;
     }
     writer::account(table, rows)

@@ -95,9 +95,7 @@ impl Writer {
     /// # Errors
     /// As [`Writer::commit`].
     pub fn begin_run(&mut self, run: &RunRecord, logs: &[LogRecord]) -> Result<(), Error> {
-        if !logs.is_empty() {
-            writer::account(&self.store().logs, logs)?;
-        }
+        writer::account(&self.store().logs, logs)?;
         writer::account(&self.store().runs, slice::from_ref(run))
     }
 
@@ -124,9 +122,7 @@ impl Writer {
             run.finished_utc = reached.map(|log| log.processed_utc).max().or(Some(run.started_utc));
             let cut: Vec<LogRecord> =
                 logs.into_iter().filter(|log| log.outcome == LogOutcome::Unaccounted).collect();
-            if !cut.is_empty() {
-                writer::account(&self.store().logs, &cut)?;
-            }
+            writer::account(&self.store().logs, &cut)?;
             writer::account(&self.store().runs, slice::from_ref(run))?;
         }
         Ok(killed)

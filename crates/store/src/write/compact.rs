@@ -67,25 +67,12 @@ impl Writer {
     /// As [`Writer::commit`]; the tables are unchanged then.
     pub fn compact(&mut self) -> Result<Compaction, Error> {
         let store = self.store();
-        let by_unit = RewritePlan {
-            slice_by: "tail_number",
-            order: &["tail_number", "serial_number", "departure_utc"],
-        };
-        let by_log = RewritePlan { slice_by: "log_path", order: &["log_path", versioned::COMMIT] };
-        let by_run = RewritePlan { slice_by: "run_id", order: &[versioned::COMMIT] };
-        let by_alert = RewritePlan { slice_by: "alert_id", order: &["alert_id", versioned::COMMIT] };
-        let by_request = RewritePlan { slice_by: "request_id", order: &["number", versioned::COMMIT] };
-        let plan = |table: &Table| match table.name {
-            "gaps" => &by_unit,
-            "logs" => &by_log,
-            "alerts" => &by_alert,
-            "work" => &by_request,
-            _ => &by_run,
-        };
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
         for table in store.existing_tables() {
             let before = table.snapshot()?.files.len();
-            table.change(|snapshot| plan(table).change(table, snapshot, |files| store.check(files)))?;
+            table.change(|snapshot| {
+                RewritePlan::of(table).change(table, snapshot, |files| store.check(files))
+            })?;
             total.before += before;
             total.after += table.snapshot()?.files.len();
         }
@@ -112,6 +99,17 @@ struct RewritePlan {
 }
 
 impl RewritePlan {
+    fn of(table: &Table) -> Self {
+        let (slice_by, order): (_, &[_]) = match table.name {
+            "gaps" => ("tail_number", &["tail_number", "serial_number", "departure_utc"]),
+            "logs" => ("log_path", &["log_path", versioned::COMMIT]),
+            "alerts" => ("alert_id", &["alert_id", versioned::COMMIT]),
+            "work" => ("request_id", &["number", versioned::COMMIT]),
+            _ => ("run_id", &[versioned::COMMIT]),
+        };
+        Self { slice_by, order }
+    }
+
     fn change<'a>(
         &self,
         table: &Table,

@@ -115,15 +115,11 @@ impl Store {
         if check_marker(&self.location, MARKER)? < FORMAT {
             write_marker(&self.location)?;
         }
-        Ok(Writer::new(self.clone(), lock))
+        Ok(Writer { store: self.clone(), _lock: lock })
     }
 }
 
 impl Writer {
-    pub(crate) fn new(store: Store, lock: Option<Lock>) -> Self {
-        Self { store, _lock: lock }
-    }
-
     /// The store as readers see it.
     pub fn store(&self) -> &Store {
         &self.store
@@ -146,8 +142,7 @@ impl Writer {
         }
         let newest: BTreeMap<&str, &LogRecord> =
             results.iter().map(|result| (result.account.log_path.as_str(), &result.account)).collect();
-        let accounts: Vec<LogRecord> = newest.into_values().cloned().collect();
-        if accounts.is_empty() { Ok(()) } else { account(&self.store.logs, &accounts) }
+        account(&self.store.logs, &newest.into_values().cloned().collect::<Vec<_>>())
     }
 
     /// The stored records of some keys; withdrawn ones are left out.
@@ -266,8 +261,11 @@ fn differing_rows(before: &RecordBatch, after: &RecordBatch) -> Result<usize, Ar
     Ok(differs.true_count())
 }
 
-/// Appends rows to a table of which the newest counts.
+/// Appends rows to a table of which the newest counts; without a row there is no commit.
 pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(), Error> {
+    if rows.is_empty() {
+        return Ok(());
+    }
     table.change(|snapshot| {
         let version = snapshot.version + 1;
         let add = data_file::write(&table.location, version, &versioned::to_batch(rows, version)?, true)?;

@@ -2,15 +2,12 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array, RecordBatch};
-use arrow::datatypes::DataType;
+use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray};
+use arrow::datatypes::{DataType, Field};
 use jiff::Timestamp;
 use proptest::prelude::*;
 use records::row_schema::{from_batch, to_batch};
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
-    TailNumber,
-};
+use records::{GapEstimate, GapRecord};
 use store::{LogResult, Query, RecordKey};
 
 use crate::fixtures::{account, fresh, record};
@@ -34,69 +31,49 @@ fn number() -> impl Strategy<Value = Option<f64>> {
 }
 
 /// Whole microseconds, from before year 0 to beyond 9999.
-fn times() -> impl Strategy<Value = Timestamp> {
+fn times() -> impl Strategy<Value = i64> {
     let ends = Timestamp::MIN.as_microsecond() + 1..Timestamp::MAX.as_microsecond();
-    prop_oneof![ends, 0_i64..2_000_000_000_000_000].prop_map(|us| Timestamp::from_microsecond(us).unwrap())
+    prop_oneof![ends, 0_i64..2_000_000_000_000_000]
 }
 
-prop_compose! {
-    fn estimates()(
-        status in prop_oneof![Just(Status::Estimated), Just(Status::Refused)],
-        reason in prop::option::of(text()),
-        flags in prop::collection::vec(text(), 0..4),
-        n in prop::collection::vec(number(), 40),
-        counts in prop::array::uniform4(any::<i64>()),
-    ) -> GapEstimate {
-        let [load_reversals, samples, samples_upper, samples_lower] = counts;
-        GapEstimate {
-            status, reason, flags, load_reversals, samples, samples_upper, samples_lower,
-            ..with_numbers(&n)
+/// One cell of a column of the records.
+fn cell(field: &Field) -> BoxedStrategy<ArrayRef> {
+    let name_of_column = field.name().clone();
+    match (field.data_type(), field.name().as_str()) {
+        (DataType::Utf8, column) => {
+            let texts = match column {
+                "status" => prop::sample::select(vec!["estimated", "refused"])
+                    .prop_map(|word| Some(word.to_owned()))
+                    .boxed(),
+                "tail_number" | "flight_id" | "position" | "part_number" | "serial_number" => {
+                    name().prop_map(Some).boxed()
+                }
+                _ if field.is_nullable() => prop::option::of(text()).boxed(),
+                _ => text().prop_map(Some).boxed(),
+            };
+            texts.prop_map(|text| Arc::new(StringArray::from(vec![text])) as ArrayRef).boxed()
         }
+        (DataType::Float64, _) => number().prop_map(|n| Arc::new(Float64Array::from(vec![n])) as _).boxed(),
+        (DataType::Int64, _) => any::<i64>().prop_map(|n| Arc::new(Int64Array::from(vec![n])) as _).boxed(),
+        (DataType::Timestamp(..), _) => times()
+            .prop_map(|us| Arc::new(TimestampMicrosecondArray::from(vec![us]).with_timezone("UTC")) as _)
+            .boxed(),
+        // Of the lists, only flags have elements.
+        _ => prop::collection::vec(text(), 0..4)
+            .prop_map(move |flags| {
+                let estimate = to_batch(&[GapEstimate { flags, ..GapEstimate::default() }]).unwrap();
+                Arc::clone(estimate.column_by_name(&name_of_column).unwrap())
+            })
+            .boxed(),
     }
 }
 
-/// An estimate with a number of its own in each of its columns of numbers, those of later releases with them.
-fn with_numbers(numbers: &[Option<f64>]) -> GapEstimate {
-    let plain = to_batch(&[GapEstimate::default()]).unwrap();
-    let mut numbers = numbers.iter().cycle();
-    let schema = plain.schema();
-    let columns = schema.fields().iter().zip(plain.columns()).map(|(field, column)| {
-        let is_number = field.data_type() == &DataType::Float64;
-        if !is_number {
-            return Arc::clone(column);
-        }
-        Arc::new(Float64Array::from(vec![*numbers.next().unwrap()])) as ArrayRef
-    });
-    let columns: Vec<ArrayRef> = columns.collect();
-    from_batch(&RecordBatch::try_new(Arc::clone(&schema), columns).unwrap()).unwrap().remove(0)
-}
-
-prop_compose! {
-    fn records()(
-        names in prop::array::uniform5(name()),
-        texts in prop::array::uniform5(text()),
-        times in prop::array::uniform2(times()),
-        hours in prop::array::uniform3(number()),
-        estimate in estimates(),
-    ) -> GapRecord {
-        let [tail, flight, position, part, serial] = names;
-        let [log_path, log_digest, config_digest, program_version, run_id] = texts;
-        let [departure_utc, processed_utc] = times;
-        let [flight_hours, tail_hours_end, unit_hours] = hours;
-        GapRecord {
-            flight: Flight {
-                tail_number: TailNumber::new(tail).unwrap(),
-                flight_id: FlightId::new(flight).unwrap(),
-                departure_utc, flight_hours, tail_hours_end,
-            },
-            position: Position::new(position).unwrap(),
-            part_number: PartNumber::new(part).unwrap(),
-            serial_number: SerialNumber::new(serial).unwrap(),
-            unit_hours,
-            estimate,
-            provenance: Provenance { log_path, log_digest, config_digest, program_version, run_id, processed_utc },
-        }
-    }
+fn records() -> impl Strategy<Value = GapRecord> {
+    let schema = GapRecord::schema();
+    let cells: Vec<_> = schema.fields().iter().map(|field| cell(field)).collect();
+    cells.prop_map(move |cells| {
+        from_batch(&RecordBatch::try_new(Arc::clone(&schema), cells).unwrap()).unwrap().remove(0)
+    })
 }
 
 fn bits(records: &[GapRecord]) -> Vec<String> {
@@ -143,7 +120,6 @@ fn the_columns_are_those_of_the_contract_in_its_order() {
 
 #[test]
 fn a_time_beyond_the_calendar_is_an_error_and_never_wraps() {
-    use arrow::array::{ArrayRef, RecordBatch, TimestampMicrosecondArray};
     let batch = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
     let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
     let beyond = TimestampMicrosecondArray::from(vec![i64::MAX]).with_timezone("UTC");
