@@ -1,8 +1,8 @@
 //! Part parameters identified from logs: stiffness, sensor noise, friction. Compare them with the data sheet; they
 //! also replace a guess of the noise levels.
 
-use estimator::NoiseModel;
 use estimator::contact::ContactEstimate;
+use estimator::{NoiseModel, SensorNoise};
 use ingest::channel::noise_floor::{WhiteNoise, white_noise};
 use ingest::{ActuatorChannels, Geometry};
 
@@ -31,6 +31,16 @@ pub struct IdentifiedParams {
     /// Friction of the screw at the rms load, N: the force the model does not know.
     pub unknown_force_n: Option<f64>,
 }
+
+/// The keys of a linear and of a rotary part, below the part.
+const KEYS: [[&str; 2]; 6] = [
+    ["stiffness_n_per_m", "stiffness_nm_per_rad"],
+    ["noise.screw_rms_m", "noise.screw_rms_rad"],
+    ["noise.screw_resolution_m", "noise.screw_resolution_rad"],
+    ["noise.motor_rms_m", "noise.motor_rms_rad"],
+    ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
+    ["noise.unknown_force_n", "noise.unknown_torque_nm"],
+];
 
 /// A key of `[part."…"]`, its identified value, and its configured value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,63 +105,29 @@ impl IdentifiedParams {
             _ => None,
         };
         let stiffness = part.actuator.stiffness_n_per_m();
-        // Keys of a linear and of a rotary part, and what a radius makes of their units.
+        // The column of the keys, and what a radius makes of their units.
         let (column, length, force, rate) = match part.geometry {
             Geometry::Linear { .. } => (0, 1.0, 1.0, 1.0),
             Geometry::Rotary { reference_radius_m: r } => (1, r.recip(), r, r * r),
         };
-        let lines = [
-            (
-                ["stiffness_n_per_m", "stiffness_nm_per_rad"],
-                rate,
-                self.stiffness_n_per_m,
-                None,
-                Some(stiffness),
-            ),
-            (
-                ["noise.screw_rms_m", "noise.screw_rms_rad"],
-                length,
-                self.screw_rms_m,
-                self.screw_uncertainty_m,
-                sensors.map(|s| s.screw_rms_m),
-            ),
-            (
-                ["noise.screw_resolution_m", "noise.screw_resolution_rad"],
-                length,
-                self.screw_resolution_m,
-                None,
-                sensors.map(|s| s.screw_resolution_m),
-            ),
-            (
-                ["noise.motor_rms_m", "noise.motor_rms_rad"],
-                length,
-                self.motor_rms_m,
-                self.motor_uncertainty_m,
-                sensors.map(|s| s.motor_rms_m),
-            ),
-            (
-                ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
-                length,
-                self.motor_resolution_m,
-                None,
-                sensors.map(|s| s.motor_resolution_m),
-            ),
-            (
-                ["noise.unknown_force_n", "noise.unknown_torque_nm"],
-                force,
-                self.unknown_force_n,
-                None,
-                sensors.map(|s| s.unknown_force_n),
-            ),
+        let level = |of: fn(&SensorNoise) -> f64| sensors.as_ref().map(of);
+        let values = [
+            (rate, self.stiffness_n_per_m, None, Some(stiffness)),
+            (length, self.screw_rms_m, self.screw_uncertainty_m, level(|s| s.screw_rms_m)),
+            (length, self.screw_resolution_m, None, level(|s| s.screw_resolution_m)),
+            (length, self.motor_rms_m, self.motor_uncertainty_m, level(|s| s.motor_rms_m)),
+            (length, self.motor_resolution_m, None, level(|s| s.motor_resolution_m)),
+            (force, self.unknown_force_n, None, level(|s| s.unknown_force_n)),
         ];
-        let comparisons = lines.into_iter().map(|(keys, scale, identified, uncertainty, configured)| {
-            Some(ParamComparison {
-                key: keys[column],
-                identified: identified? * scale,
-                uncertainty: uncertainty.map(|v: f64| v * scale),
-                configured: configured.map(|v| v * scale),
-            })
-        });
+        let comparisons =
+            KEYS.iter().zip(values).map(|(keys, (scale, identified, uncertainty, configured))| {
+                Some(ParamComparison {
+                    key: keys[column],
+                    identified: identified? * scale,
+                    uncertainty: uncertainty.map(|v: f64| v * scale),
+                    configured: configured.map(|v| v * scale),
+                })
+            });
         comparisons.flatten().collect()
     }
 }

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
 
+use super::keys::with_nearest;
 use super::layers::Source;
 
 /// States of quantities other than the gap: of a unit, of a tail, of a part.
@@ -131,10 +131,7 @@ impl AlertChannel {
         let known: Vec<&str> = of_gap.into_iter().chain([NOT_ASSESSED]).chain(QUANTITY_STATES).collect();
         for state in self.states.iter().filter(|state| !known.contains(&state.as_str())) {
             let c = Diagnostic::new("unknown_state", format!("`{state}` is not a state of a unit"));
-            let c = match nearest(state, known.iter().copied()) {
-                Some(near) => c.hint(format!("`{near}`?")),
-                None => c.hint(format!("states are {}", known.join(", "))),
-            };
+            let c = with_nearest(c, state, known.iter().copied(), format!("states are {}", known.join(", ")));
             found.push(source.at(&["alerts", name, "states"], c));
         }
     }

@@ -16,9 +16,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::alerts::AlertChannel;
+use super::keys::with_nearest;
 use super::layers::Source;
 use super::validate_channels;
-use crate::config::limits;
 use crate::config::part::{PartSettings, WearAxis};
 use crate::config::quantity_limits::QuantityLimits;
 
@@ -341,8 +341,8 @@ impl Document {
         self.part.values().any(|part| part.output.is_locked())
     }
 
-    /// Everything that reads well but cannot be meant.
-    pub(super) fn check(&self, source: &Source<'_>) -> Vec<Diagnostic> {
+    /// Everything that reads well but cannot be meant, with the numbers that are not plausible in its place.
+    pub(super) fn check(&self, source: &Source<'_>, implausible: Vec<Diagnostic>) -> Vec<Diagnostic> {
         let mut found = Vec::new();
         if self.logs.files.is_empty() {
             let c = Diagnostic::new("no_logs", "`logs.files` has no pattern")
@@ -373,7 +373,7 @@ impl Document {
             }
         }
         self.check_identity(source, &mut found);
-        found.extend(limits::check(source));
+        found.extend(implausible);
         self.alerts.iter().for_each(|(name, channel)| channel.check(name, source, &mut found));
         self.check_parts(source, &mut found);
         found
@@ -421,10 +421,8 @@ impl Document {
                         "unknown_key",
                         format!("`{group}` in `identity.path` is no fact of a flight"),
                     );
-                    let c = match nearest(group, facts()) {
-                        Some(near) => c.hint(format!("`{near}`?")),
-                        None => c.hint(format!("its facts are {}", facts().collect::<Vec<_>>().join(", "))),
-                    };
+                    let all = format!("its facts are {}", facts().collect::<Vec<_>>().join(", "));
+                    let c = with_nearest(c, group, facts(), all);
                     found.push(source.at(&["identity", "path"], c));
                 }
             }
@@ -459,10 +457,8 @@ impl Document {
 fn no_zone(name: &str) -> Diagnostic {
     let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
     let diagnostic = Diagnostic::new("bad_zone", format!("unknown time zone `{name}`"));
-    match nearest(name, known.iter().map(String::as_str)) {
-        Some(near) => diagnostic.hint(format!("`{near}`?")),
-        None => diagnostic.hint("names such as `UTC`, `Europe/Istanbul`, `America/New_York`"),
-    }
+    let otherwise = "names such as `UTC`, `Europe/Istanbul`, `America/New_York`";
+    with_nearest(diagnostic, name, known.iter().map(String::as_str), otherwise)
 }
 
 fn check_layout(layout: &Layout, path: &[&str], source: &Source<'_>, found: &mut Vec<Diagnostic>) {

@@ -1,11 +1,6 @@
 //! What any setting's value must be.
 
-use std::ops::Range;
-
 use records::Diagnostic;
-use toml::de::{DeTable, DeValue};
-
-use super::layers::Source;
 
 /// Least and largest plausible value of each physical setting, by key: one to several orders of magnitude beyond any
 /// actuator, sensor or recorder. A value outside was given in another unit, and could leave the numbers of a filter.
@@ -80,42 +75,8 @@ const REFUSED_ELSEWHERE: [&str; 7] = [
     "scale",
 ];
 
-/// Every number of a configuration that no actuator, sensor, recorder or machine can have, at its key.
-pub(super) fn check(source: &Source<'_>) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    check_table(source.table(), source, &mut found);
-    found
-}
-
-fn check_table(table: &DeTable<'_>, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
-    for (key, value) in table {
-        check_value(key.get_ref(), &key.span(), value.get_ref(), source, found);
-    }
-}
-
-fn check_value(
-    key: &str,
-    span: &Range<usize>,
-    value: &DeValue<'_>,
-    source: &Source<'_>,
-    found: &mut Vec<Diagnostic>,
-) {
-    let number = match value {
-        DeValue::Table(table) => return check_table(table, source, found),
-        DeValue::Array(values) => {
-            return values.iter().for_each(|value| check_value(key, span, value.get_ref(), source, found));
-        }
-        DeValue::Float(number) => number.as_str().parse().ok(),
-        DeValue::Integer(number) => {
-            i128::from_str_radix(number.as_str(), number.radix()).ok().map(|number| number as f64)
-        }
-        _ => None,
-    };
-    found.extend(number.and_then(|number| implausible(key, number)).map(|c| source.at_span(span.clone(), c)));
-}
-
 /// What is wrong with the value of a key.
-fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
+pub(super) fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
     let range = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
     let is_signed = range.is_some_and(|(_, least, _)| *least == 0.0) || REFUSED_ELSEWHERE.contains(&key);
     let is_positive = POSITIVE.contains(&key) || range.is_some() && !is_signed;

@@ -2,13 +2,13 @@
 
 pub mod alerts;
 mod document;
+mod keys;
 mod layers;
 pub mod limits;
 mod overrides;
 pub mod part;
 mod quantity_limits;
 mod toml_errors;
-mod unknown_keys;
 mod validate_channels;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,7 +32,7 @@ use crate::METHOD_VERSION;
 use crate::config::part::{LimitedGap, Part};
 
 /// A checked configuration.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Config {
     /// The file as it was named by the user; several stand with ` + ` between them.
     pub file: PathBuf,
@@ -71,15 +71,7 @@ impl Config {
 
     /// A configuration without logs: defaults, to assess tables that other programs made.
     pub fn without_logs() -> Self {
-        Self {
-            file: PathBuf::new(),
-            folder: PathBuf::new(),
-            document: Document::default(),
-            parts: BTreeMap::new(),
-            flights: Arc::default(),
-            overrides: Overrides::none(),
-            layers: Arc::default(),
-        }
+        Self::default()
     }
 
     /// Reads the configuration as [`Config::read_settings`], and the flights table that it names.
@@ -110,19 +102,19 @@ impl Config {
         let read = |file: &PathBuf| {
             let file_name = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
-                let why = match e.kind() {
-                    ErrorKind::NotFound => "no such file".to_owned(),
-                    ErrorKind::IsADirectory => "this is a folder, not a file".to_owned(),
-                    ErrorKind::InvalidData => "it is no UTF-8 text".to_owned(),
-                    ErrorKind::PermissionDenied => "permission denied".to_owned(),
-                    _ => e.to_string(),
+                const OTHER: &str =
+                    "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
+                let text = e.to_string();
+                let (why, hint) = match e.kind() {
+                    ErrorKind::NotFound => ("no such file", OTHER),
+                    ErrorKind::IsADirectory => ("this is a folder, not a file", OTHER),
+                    ErrorKind::InvalidData => ("it is no UTF-8 text", "save the file as UTF-8"),
+                    ErrorKind::PermissionDenied => {
+                        ("permission denied", "run as a user with read access, or change the file mode")
+                    }
+                    _ => (text.as_str(), OTHER),
                 };
                 let what = format!("the configuration cannot be read: {why}");
-                let hint = match e.kind() {
-                    ErrorKind::InvalidData => "save the file as UTF-8",
-                    ErrorKind::PermissionDenied => "run as a user with read access, or change the file mode",
-                    _ => "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG",
-                };
                 vec![Diagnostic::new("config_unreadable", what).in_file(&file_name).hint(hint)]
             })?;
             if text.contains('\0') {
@@ -150,12 +142,9 @@ impl Config {
 
     fn from_layers(layers: Vec<ConfigLayer>, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let source = Source::parse(&layers).map_err(|diagnostic| vec![*diagnostic])?;
-        let unknown = unknown_keys::keys(&source, &Document::schema());
-        if !unknown.is_empty() {
-            return Err(unknown);
-        }
+        let implausible = keys::check(&source, &Document::schema())?;
         let document: Document = source.document().map_err(|diagnostic| vec![diagnostic])?;
-        let mut diagnostics = document.check(&source);
+        let mut diagnostics = document.check(&source, implausible);
         let mut parts = BTreeMap::new();
         for (number, settings) in &document.part {
             match (PartNumber::new(number), settings.check()) {

@@ -12,7 +12,7 @@ use super::layers::Source;
 use super::validate_channels;
 
 /// The checked overrides of a configuration, and the mappings that were derived from them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Overrides {
     base: Arc<Mapping>,
     overrides: Vec<ValidatedOverride>,
@@ -26,16 +26,11 @@ type MappingCache = BTreeMap<(Vec<usize>, Option<PartNumber>), Arc<str>>;
 
 impl Clone for Overrides {
     fn clone(&self) -> Self {
-        Self {
-            base: Arc::clone(&self.base),
-            overrides: self.overrides.clone(),
-            mappings: Mutex::default(),
-            cached: Mutex::default(),
-        }
+        Self { base: Arc::clone(&self.base), overrides: self.overrides.clone(), ..Self::default() }
     }
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct ValidatedOverride {
     tails: Vec<glob::Pattern>,
     parts: Vec<glob::Pattern>,
@@ -58,16 +53,6 @@ impl ValidatedOverride {
 }
 
 impl Overrides {
-    /// None.
-    pub(super) fn none() -> Self {
-        Self {
-            base: Arc::default(),
-            overrides: Vec::new(),
-            mappings: Mutex::default(),
-            cached: Mutex::default(),
-        }
-    }
-
     /// Reads the overrides and tries each alone on the rest of the configuration.
     pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Diagnostic>> {
         let base = document.mapping();
@@ -85,7 +70,7 @@ impl Overrides {
             return Err(found);
         }
         overrides.extend(locked_parts(document));
-        Ok(Self { base: Arc::new(base), overrides, mappings: Mutex::default(), cached: Mutex::default() })
+        Ok(Self { base: Arc::new(base), overrides, ..Self::default() })
     }
 
     /// How the logs of an aircraft are read, or the channels of a part on it.
@@ -153,8 +138,7 @@ fn locked_parts(document: &Document) -> Option<ValidatedOverride> {
     let exact_parts: BTreeSet<PartNumber> =
         locked.filter_map(|(number, _)| PartNumber::new(number).ok()).collect();
     let channel = toml::Table::from_iter([("output".to_owned(), toml::Value::from("locked"))]);
-    let clock = toml::Table::new();
-    let one = ValidatedOverride { tails: Vec::new(), parts: Vec::new(), exact_parts, clock, channel };
+    let one = ValidatedOverride { exact_parts, channel, ..ValidatedOverride::default() };
     (!one.exact_parts.is_empty()).then_some(one)
 }
 
@@ -175,9 +159,9 @@ fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
     Ok(ValidatedOverride {
         tails: patterns(&settings.tails)?,
         parts: patterns(&settings.parts)?,
-        exact_parts: BTreeSet::new(),
         clock: settings.clock.clone().unwrap_or_default(),
         channel: settings.channel.clone().unwrap_or_default(),
+        ..ValidatedOverride::default()
     })
 }
 

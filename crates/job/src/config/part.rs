@@ -192,8 +192,11 @@ pub struct Part {
     pub quantity_limits: QuantityLimits,
 }
 
+/// A key below the part's table.
+type Key = &'static [&'static str];
+
 /// A key below the part's table, and what is wrong with it.
-pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
+pub(crate) type SettingError = (Key, Diagnostic);
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -219,16 +222,11 @@ impl PartSettings {
         self.check_kind(&mut keys);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
-            keys.report(
-                &["watch_m"],
-                Diagnostic::new("limit_order", what).hint("set `watch_m` below `limit_m`"),
-            );
+            let c = Diagnostic::new("limit_order", what).hint("set `watch_m` below `limit_m`");
+            keys.report(&["watch_m"], c);
         }
         let noise = self.check_noise(&mut keys);
-        let actuator = match self.kind {
-            Kind::Linear => self.linear(&mut keys),
-            Kind::Rotary => self.rotary(&mut keys),
-        };
+        let actuator = self.actuator(&mut keys);
         match (actuator, noise, keys.found.is_empty()) {
             (Some((actuator, geometry)), Some(noise), true) => Ok(Part {
                 actuator,
@@ -249,61 +247,60 @@ impl PartSettings {
         }
     }
 
-    /// A key of the other kind is a misunderstanding, not a spare.
-    fn check_kind(&self, keys: &mut SettingsValidator) {
-        let linear: [(&'static [&'static str], Option<f64>); 4] = [
-            (&["stiffness_n_per_m"], self.stiffness_n_per_m),
-            (&["damping_n_s_per_m"], self.damping_n_s_per_m),
-            (&["screw_mass_kg"], self.screw_mass_kg),
-            (&["lead_m_per_rev"], self.lead_m_per_rev),
-        ];
-        let rotary: [(&'static [&'static str], Option<f64>); 4] = [
-            (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
-            (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
-            (&["inertia_kg_m2"], self.inertia_kg_m2),
-            (&["reference_radius_m"], self.reference_radius_m),
-        ];
-        let (stray, kind) = match self.kind {
-            Kind::Linear => (rotary, "linear"),
-            Kind::Rotary => (linear, "rotary"),
-        };
-        for (key, _) in stray.into_iter().filter(|(_, value)| value.is_some()) {
-            let what = format!("`{}` is not a key of a {kind} part", key[0]);
-            keys.report(
-                key,
-                Diagnostic::new("key_of_other_kind", what)
-                    .hint("`kind` is \"linear\" (default) or \"rotary\""),
-            );
+    /// Stiffness, damping, mass or inertia, and lead or reference radius of a kind of part, each with its key.
+    fn keys_of(&self, kind: Kind) -> [(Key, Option<f64>); 4] {
+        match kind {
+            Kind::Linear => [
+                (&["stiffness_n_per_m"], self.stiffness_n_per_m),
+                (&["damping_n_s_per_m"], self.damping_n_s_per_m),
+                (&["screw_mass_kg"], self.screw_mass_kg),
+                (&["lead_m_per_rev"], self.lead_m_per_rev),
+            ],
+            Kind::Rotary => [
+                (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
+                (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
+                (&["inertia_kg_m2"], self.inertia_kg_m2),
+                (&["reference_radius_m"], self.reference_radius_m),
+            ],
         }
     }
 
-    fn linear(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
-        let stiffness = keys.required(&["stiffness_n_per_m"], self.stiffness_n_per_m);
-        let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
-        let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
-        let actuator =
-            keys.made(&["stiffness_n_per_m"], estimator::ActuatorModel::linear(stiffness?, damping?, mass?))?;
-        Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
+    /// A key of the other kind is a misunderstanding, not a spare.
+    fn check_kind(&self, keys: &mut SettingsValidator) {
+        let (other, kind) = match self.kind {
+            Kind::Linear => (Kind::Rotary, "linear"),
+            Kind::Rotary => (Kind::Linear, "rotary"),
+        };
+        for (key, _) in self.keys_of(other).into_iter().filter(|(_, value)| value.is_some()) {
+            let what = format!("`{}` is not a key of a {kind} part", key[0]);
+            let hint = "`kind` is \"linear\" (default) or \"rotary\"";
+            keys.report(key, Diagnostic::new("key_of_other_kind", what).hint(hint));
+        }
     }
 
-    fn rotary(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
-        let stiffness = keys.required(&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad);
-        let damping = keys.required(&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad);
-        let inertia = keys.required(&["inertia_kg_m2"], self.inertia_kg_m2);
-        let radius = keys.required(&["reference_radius_m"], self.reference_radius_m)?;
-        let made = estimator::ActuatorModel::rotary(stiffness?, damping?, inertia?, radius);
-        let actuator = keys.made(&["stiffness_nm_per_rad"], made)?;
-        Some((actuator, Geometry::Rotary { reference_radius_m: radius }))
+    fn actuator(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
+        let [stiffness, damping, mass, lead_or_radius] = self.keys_of(self.kind);
+        let [k, f, m] = [stiffness, damping, mass].map(|(key, value)| keys.required(key, value));
+        let (model, geometry) = match self.kind {
+            Kind::Linear => (
+                estimator::ActuatorModel::linear(k?, f?, m?),
+                Geometry::Linear { lead_m_per_rev: lead_or_radius.1 },
+            ),
+            Kind::Rotary => {
+                let reference_radius_m = keys.required(lead_or_radius.0, lead_or_radius.1)?;
+                let model = estimator::ActuatorModel::rotary(k?, f?, m?, reference_radius_m);
+                (model, Geometry::Rotary { reference_radius_m })
+            }
+        };
+        let model = model.map_err(|e| keys.report(stiffness.0, Diagnostic::new("bad_parameter", e)));
+        Some((model.ok()?, geometry))
     }
 
     fn check_noise(&self, keys: &mut SettingsValidator) -> Option<estimator::NoiseModel> {
         let Some(noise) = &self.noise else {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
-            keys.report(
-                &[],
-                Diagnostic::new("key_missing", "the part has no `noise`, and there are no default levels")
-                    .hint(hint),
-            );
+            let what = "the part has no `noise`, and there are no default levels";
+            keys.report(&[], Diagnostic::new("key_missing", what).hint(hint));
             return None;
         };
         match noise.model {
@@ -392,23 +389,16 @@ struct SettingsValidator {
 }
 
 impl SettingsValidator {
-    fn report(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
+    fn report(&mut self, key: Key, diagnostic: Diagnostic) {
         self.found.push((key, diagnostic));
     }
 
-    fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
+    fn required<T>(&mut self, key: Key, value: Option<T>) -> Option<T> {
         if value.is_none() {
             let name = key.join(".");
-            self.report(
-                key,
-                Diagnostic::new("key_missing", format!("the part has no `{name}`"))
-                    .hint(format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)")),
-            );
+            let hint = format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)");
+            self.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")).hint(hint));
         }
         value
-    }
-
-    fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {
-        made.map_err(|e| self.report(key, Diagnostic::new("bad_parameter", e))).ok()
     }
 }

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use ingest::mapping::column_pattern::{PLACEHOLDER, nearest};
+use ingest::mapping::column_pattern::PLACEHOLDER;
 use ingest::mapping::units::Dimension;
 use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
 use records::Diagnostic;
 
+use super::keys::with_nearest;
 use super::layers::Source;
 
 /// Every diagnostic about the channels, each at its key.
@@ -207,8 +208,6 @@ fn unknown_group(
         "unknown_key",
         format!("`channel.{name}` names group `{group}`, and there is no `[group.{group}]`"),
     );
-    Some(match nearest(group, groups.keys().map(String::as_str)) {
-        Some(near) => c.hint(format!("`{near}`?")),
-        None => c.hint(format!("[group.{group}]\nfiles = [\"…\"]")),
-    })
+    let otherwise = format!("[group.{group}]\nfiles = [\"…\"]");
+    Some(with_nearest(c, group, groups.keys().map(String::as_str), otherwise))
 }

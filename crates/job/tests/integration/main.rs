@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod config;
+mod fixtures;
 mod method;
 mod part_identification;
 mod reference;

@@ -1,19 +1,13 @@
 //! What each method of `[estimate]` puts into a record, on the flights of another engine.
 
-use std::path::Path;
-
-use ingest::LogFiles;
-use ingest::tables::ColumnAliases;
+use job::Config;
 use job::config::Method;
-use job::{Config, FlightLog};
 use records::{GapEstimate, Status};
 
+use crate::fixtures::{flights, installations, open};
+
 fn estimate(config: &Config, log: &str) -> GapEstimate {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
-    let installations =
-        ingest::tables::installations(&folder.join("installations.csv"), &ColumnAliases::new()).unwrap();
-    let file = LogFiles::one(folder.join(format!("{log}.parquet")));
-    let opened = FlightLog::open(&file, log, config, &installations).unwrap();
+    let (opened, installations) = (open(log, config).unwrap(), installations());
     let at = opened.actuators(&installations).next().unwrap();
     let (_, part) = opened.unit(at, config, &installations).unwrap();
     opened.estimate(at, part, config).unwrap()
@@ -22,8 +16,7 @@ fn estimate(config: &Config, log: &str) -> GapEstimate {
 /// Only the published statistic is there; a load that never reverses is refused without the regression, too.
 #[test]
 fn midrange_has_no_column_of_the_regression() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
-    let contact = Config::read(&folder.join("pipeline.toml")).unwrap();
+    let contact = Config::read(&flights().join("pipeline.toml")).unwrap();
     let mut midrange = contact.clone();
     midrange.document.estimate.method = Method::Midrange;
 

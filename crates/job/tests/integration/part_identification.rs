@@ -1,30 +1,20 @@
 //! Part parameters identified from logs, against the parameters with which another engine made the logs.
 
-use std::path::{Path, PathBuf};
-
-use ingest::LogFiles;
 use job::part_identification::IdentifiedParams;
-use job::{Config, FlightLog, flight_log};
+use job::{Config, flight_log};
 use records::PartNumber;
 
-fn flights() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights")
-}
+use crate::fixtures::{flights, installations, open};
 
 /// `truth.json`: noise of 3 and 1 µm, steps of 2.3 and 0.3 µm, K of 5·10⁷ and 4.6·10⁷ N/m.
 #[test]
 fn noise_resolution_and_stiffness_are_read_off_the_logs() {
     let config = Config::read(&flights().join("pipeline.toml")).unwrap();
-    let installations = ingest::tables::installations(
-        &flights().join("installations.csv"),
-        &ingest::tables::ColumnAliases::new(),
-    )
-    .unwrap();
+    let installations = installations();
     for (log, part, stiffness) in
         [("A_nominal", "A", 5e7), ("B_worn_stiffness_assumed_15pc_high", "B", 4.6e7)]
     {
-        let file = flights().join(format!("{log}.parquet"));
-        let opened = FlightLog::open(&LogFiles::one(file), log, &config, &installations).unwrap();
+        let opened = open(log, &config).unwrap();
         let part = flight_log::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
         let at = opened.actuators(&installations).next().unwrap();
         let channels = opened.channels(at, part).unwrap();

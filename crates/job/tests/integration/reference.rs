@@ -133,25 +133,16 @@ fn kind(value: &Value) -> String {
 
 /// The allowed words.
 fn words(value: &Value) -> Option<String> {
-    let listed =
-        value.get("enum").and_then(Value::as_array).map(|all| all.iter().filter_map(Value::as_str).collect());
-    let values = || {
-        let all = value.get("oneOf")?.as_array()?;
-        let each = |v: &'_ Value| -> Vec<String> {
-            let one = v.get("const").and_then(Value::as_str).map(str::to_owned);
-            let many = v.get("enum").and_then(Value::as_array).into_iter().flatten();
-            one.into_iter().chain(many.filter_map(Value::as_str).map(str::to_owned)).collect()
-        };
-        Some(all.iter().flat_map(each).collect::<Vec<_>>())
+    let listed = |value: &Value| -> Vec<String> {
+        let many = value.get("enum").and_then(Value::as_array).into_iter().flatten();
+        let words = many.chain(value.get("const")).filter_map(Value::as_str);
+        words.map(|word| format!("`{word}`")).collect()
     };
-    let words: Vec<String> = match listed {
-        Some(listed) => {
-            let listed: Vec<&str> = listed;
-            listed.into_iter().map(str::to_owned).collect()
-        }
-        None => values()?,
+    let words: Vec<String> = match value.get("oneOf").and_then(Value::as_array) {
+        Some(all) => all.iter().flat_map(listed).collect(),
+        None => listed(value),
     };
-    Some(words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "))
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 /// The doc comment as one line of a table.

@@ -1,16 +1,11 @@
 //! Logs and parts at the edge of what can be estimated: slow logs, and outputs that cannot move.
 
-use std::path::{Path, PathBuf};
-
-use ingest::LogFiles;
 use ingest::log::in_memory::ChannelArrays;
 use job::estimate::{estimate, filter};
-use job::{Config, FlightLog, flight_log};
+use job::{Config, flight_log};
 use records::{PartNumber, Position};
 
-fn flights() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights")
-}
+use crate::fixtures::{flights, installations, open};
 
 fn config_text() -> String {
     std::fs::read_to_string(flights().join("pipeline.toml")).unwrap()
@@ -48,20 +43,17 @@ fn the_logs_of_a_locked_output_need_no_screw_position() {
     let broken = Config::parse(&without, &flights().join("pipeline.toml"), &flights()).unwrap_err();
     assert_eq!(broken[0].code, "key_missing");
     let config = parse(&without.replace("[part.A]\n", "[part.A]\noutput = \"locked\"\n"));
-    let names = ingest::tables::ColumnAliases::new();
-    let installations = ingest::tables::installations(&flights().join("installations.csv"), &names).unwrap();
-    let open = |log: &str| {
-        let file = flights().join(format!("{log}.parquet"));
-        FlightLog::open(&LogFiles::one(file), log, &config, &installations)
-    };
-    let opened = open("A_nominal").unwrap();
+    let opened = open("A_nominal", &config).unwrap();
     let part = flight_log::part_of(&config, &PartNumber::new("A").unwrap()).unwrap();
     assert!(part.output_locked);
-    let at = opened.actuators(&installations).next().unwrap();
+    let at = opened.actuators(&installations()).next().unwrap();
     let channels = opened.channels(at, part).unwrap();
     let is_minus_motor = |(dx, motor): (&f64, &f64)| dx.to_bits() == (0.0 - motor).to_bits();
     assert!(channels.output_locked && channels.dx_m.iter().zip(&channels.motor_m).all(is_minus_motor));
     let found = estimate(&channels, part, &config.document.estimate).unwrap();
     assert_ne!(found.reason.as_deref(), Some("channel_zero"));
-    assert!(open("B_worn_stiffness_assumed_15pc_high").is_err(), "part B moves, and its screw is not mapped");
+    assert!(
+        open("B_worn_stiffness_assumed_15pc_high", &config).is_err(),
+        "part B moves, and its screw is not mapped"
+    );
 }

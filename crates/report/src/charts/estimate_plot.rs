@@ -384,13 +384,4 @@ mod tests {
         let page = estimate_plot_html(&[plot()], None).unwrap();
         assert!(!page.contains("src=\"") && !page.contains("<link rel=\"stylesheet\""));
     }
-
-    /// A pause of 1.6 s after sample 3000, which the stamps show.
-    #[test]
-    fn times_after_a_break_are_the_log_s_own() {
-        let plot = EstimatePlot { step_s: 0.004, breaks: vec![(3000, 13.6)], ..EstimatePlot::default() };
-        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
-        assert!(close(plot.time_s(2999.0), 11.996) && close(plot.time_s(3000.0), 13.6));
-        assert!(close(plot.time_s(3001.5), 13.606));
-    }
 }
