@@ -88,7 +88,7 @@ impl Diagnostic {
 /// Masks the credentials of addresses in a text: `user:password@` before a host or bucket, and signed queries.
 ///
 /// A diagnostic may quote a line of the configuration, and ends up on terminals, in logs and in tickets.
-pub fn mask_credentials(text: &str) -> Cow<'_, str> {
+fn mask_credentials(text: &str) -> Cow<'_, str> {
     const SIGNATURES: [&str; 5] = ["sig=", "signature=", "-signature=", "token=", "secret="];
     let (mut masked, mut rest) = (String::new(), text);
     while let Some(at) = rest.find("://") {

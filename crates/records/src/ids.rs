@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of an identifier: it stands in every record, file name and message.
-pub const ID_BYTES: usize = 256;
+const ID_BYTES: usize = 256;
 
 /// A text that is no identifier; `what` is its kind, e.g. `tail number`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -14,7 +14,7 @@ pub enum IdError {
     #[error("a {what} must not be empty")]
     #[allow(missing_docs, reason = "the text of the error says what it is")]
     Empty { what: &'static str },
-    /// It is longer than [`ID_BYTES`].
+    /// It is longer than 256 bytes.
     #[error("a {what} of {bytes} bytes is longer than {ID_BYTES}")]
     #[allow(missing_docs, reason = "the text of the error says what they are")]
     TooLong { what: &'static str, bytes: usize },
@@ -31,7 +31,7 @@ macro_rules! identifier {
             /// Creates the identifier from text; surrounding white space is removed.
             ///
             /// # Errors
-            /// [`IdError`] when the text is blank or longer than [`ID_BYTES`].
+            /// [`IdError`] when the text is blank or longer than 256 bytes.
             pub fn new(text: impl AsRef<str>) -> Result<Self, IdError> {
                 let text = text.as_ref().trim();
                 match text.len() {

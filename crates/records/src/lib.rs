@@ -4,15 +4,15 @@
 //! be passed where a serial number is expected.
 
 pub mod assessment;
-pub mod diagnostic;
-pub mod flight;
-pub mod follow_up;
-pub mod gap_record;
+mod diagnostic;
+mod flight;
+mod follow_up;
+mod gap_record;
 pub mod ids;
 pub mod installation;
-pub mod log_record;
+mod log_record;
 pub mod row_schema;
-pub mod run_record;
+mod run_record;
 pub mod sanitize;
 pub mod time;
 pub mod uncertainty;

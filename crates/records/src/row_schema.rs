@@ -166,22 +166,14 @@ macro_rules! stored_row {
     (
         $(#[$attribute:meta])*
         $vis:vis struct $name:ident {
-            $(
-                $(#[doc = $doc:literal])*
-                $(#[serde($($serde:tt)*)])?
-                $field_vis:vis $field:ident: $type:ty
-            ),* $(,)?
+            $($(#[$($meta:tt)*])* $field_vis:vis $field:ident: $type:ty),* $(,)?
         }
         $(order = $order:expr)?
     ) => {
         $crate::row! {
             $(#[$attribute])*
             $vis struct $name {
-                $(
-                    $(#[doc = $doc])*
-                    $(#[serde($($serde)*)])?
-                    $field_vis $field: $type
-                ),*
+                $($(#[$($meta)*])* $field_vis $field: $type),*
             }
             $(order = $order)?
         }
@@ -470,7 +462,7 @@ impl<T> Cells for NoColumn<T> {
 }
 
 /// Element of a list of texts, as Delta Lake names it.
-pub fn list_element() -> Arc<Field> {
+fn list_element() -> Arc<Field> {
     Arc::new(Field::new("element", DataType::Utf8, true))
 }
 

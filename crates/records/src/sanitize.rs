@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 /// The longest text of one field of a diagnostic, in characters.
-pub const MAX_FIELD_CHARS: usize = 2000;
+pub(crate) const MAX_FIELD_CHARS: usize = 2000;
 
 /// Whether a character has an effect without being seen: controls, direction marks and overrides, zero widths, fillers,
 /// variation selectors and tags (Unicode Standard Annex 9; UTR 36; `Default_Ignorable_Code_Point`).
@@ -52,12 +52,7 @@ pub fn escape_cell(text: &str) -> Cow<'_, str> {
 }
 
 /// Truncates a text to a number of characters, and appends how many were omitted.
-///
-/// ```
-/// # use records::sanitize::limit_length;
-/// assert_eq!(limit_length("0123456789", 4), "0123… (6 more characters)");
-/// ```
-pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
+pub(crate) fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
     match text.char_indices().nth(max_chars) {
         None => Cow::Borrowed(text),
         Some((end, _)) => {

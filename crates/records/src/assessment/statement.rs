@@ -117,7 +117,7 @@ impl TrendRow {
 }
 
 /// A probability for readers: `87 %`, `< 1 %`, `> 99 %`.
-pub fn percent(share: f64) -> String {
+fn percent(share: f64) -> String {
     match 100.0 * share {
         ..1.0 => "< 1 %".to_owned(),
         percent if percent > 99.0 => "> 99 %".to_owned(),

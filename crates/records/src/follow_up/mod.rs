@@ -1,5 +1,5 @@
 //! What follows from a finding: alerts about changes of state, and work requests.
 
-pub mod alert_record;
-pub mod work_event;
-pub mod work_request;
+pub(crate) mod alert_record;
+pub(crate) mod work_event;
+pub(crate) mod work_request;
