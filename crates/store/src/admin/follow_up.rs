@@ -48,7 +48,7 @@ impl Store {
     }
 
     fn rows<R: Row + FromCells>(&self, table: &Table, name: impl Fn(&R) -> String) -> Result<Vec<R>, Error> {
-        if table.exists()? { self.newest(table, None, name) } else { Ok(Vec::new()) }
+        if table.exists()? { self.newest(table, &[], name) } else { Ok(Vec::new()) }
     }
 }
 

@@ -28,7 +28,7 @@ impl Store {
     /// As [`Store::records`].
     pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogRecord>, Error> {
         let of_run = Condition::texts("run_id", run_id, run_id);
-        let logs = self.newest(&self.logs, Some(of_run), |account: &LogRecord| account.log_path.clone())?;
+        let logs = self.newest(&self.logs, &[of_run], |account: &LogRecord| account.log_path.clone())?;
         let mut logs: BTreeMap<String, LogRecord> =
             logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
         let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
@@ -48,7 +48,7 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn runs(&self) -> Result<Vec<RunRecord>, Error> {
-        let mut runs = self.newest(&self.runs, None, |run: &RunRecord| run.run_id.clone())?;
+        let mut runs = self.newest(&self.runs, &[], |run: &RunRecord| run.run_id.clone())?;
         for run in runs.iter_mut().filter(|run| !run.has_ended()) {
             add_up(run, &self.run_logs(&run.run_id)?);
         }
@@ -63,7 +63,7 @@ impl Store {
     /// As [`Store::records`].
     pub fn tables_digest(&self) -> Result<Option<String>, Error> {
         // Under one name, the newest row of all.
-        let latest = self.newest(&self.runs, None, |_: &RunRecord| String::new())?.pop();
+        let latest = self.newest(&self.runs, &[], |_: &RunRecord| String::new())?.pop();
         Ok(latest.and_then(|run| run.tables_digest))
     }
 

@@ -131,7 +131,7 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
     };
     match table.snapshot() {
         Ok(snapshot) => {
-            findings.extend(snapshot.files.iter().filter_map(|file| check_file(table, file).err()))
+            findings.extend(snapshot.files.iter().filter_map(|file| check_file(table, file).err()));
         }
         // A damaged log file is named already.
         Err(Error::LogDamaged { .. }) if !findings.is_empty() => {}

@@ -18,17 +18,17 @@ use crate::read::scan::{self, Condition};
 use records::row_schema::{self, FromCells, Row};
 
 impl Store {
-    /// Of the rows that meet a condition, the newest of each name, by name; files that cannot hold one are passed over.
+    /// Of the rows that meet some conditions, the newest of each name, by name; files that cannot hold one are passed over.
     ///
     /// # Errors
     /// As [`Store::records`].
     pub(crate) fn newest<R: Row + FromCells>(
         &self,
         table: &Table,
-        wanted: Option<Condition>,
+        wanted: &[Condition],
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
-        let (snapshot, wanted) = (table.snapshot()?, wanted.as_slice());
+        let snapshot = table.snapshot()?;
         let may_hold = |file: &&DataFile| file.has_rows() && wanted.iter().all(|w| w.may_be_in(&file.stats));
         let files: Vec<PathBuf> =
             snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();

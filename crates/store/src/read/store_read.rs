@@ -57,7 +57,7 @@ impl Store {
     pub fn accounts(&self) -> Result<Vec<LogRecord>, Error> {
         // In the order of their words: `done`, `error` and `known` settle a log, `not_reached` and `unaccounted` do not.
         let settled = Condition::texts("outcome", LogOutcome::Done.as_str(), LogOutcome::Known.as_str());
-        self.newest(&self.logs, Some(settled), |account: &LogRecord| account.log_path.clone())
+        self.newest(&self.logs, &[settled], |account: &LogRecord| account.log_path.clone())
     }
 
     /// The data files of the records as of now, for engines that do not read Delta's log.
