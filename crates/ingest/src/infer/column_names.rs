@@ -28,7 +28,7 @@ pub(super) fn place_in(list: &str, word: &str) -> Option<usize> {
     list.split(' ').position(|known| known == word)
 }
 
-fn has_word_of(name: &str, list: &str) -> bool {
+pub(super) fn has_word_of(name: &str, list: &str) -> bool {
     words(name).iter().any(|(_, word)| place_in(list, &word.to_lowercase()).is_some())
 }
 

@@ -15,7 +15,7 @@ use arrow::datatypes::DataType;
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::Error;
-use crate::infer::column_names::{ParsedName, is_of_day, is_time, is_unit, place_in, time_unit};
+use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, is_unit, place_in, time_unit};
 use crate::infer::identity_sources::{fact_of, facts_of, folders};
 use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
@@ -63,8 +63,8 @@ pub struct InferredMapping {
 const NAME_COLUMNS: &str =
     "parameter parameter_name param name channel channel_name signal signal_name mnemonic label variable tag";
 const VALUE_COLUMNS: &str = "value val reading data measurement sample v";
-/// Names of columns that name the position of a row, beyond those of a fact.
-const POSITION_COLUMNS: &str = "unit location ema servo actuator_id side";
+/// Words in the names of columns that name the position of a row, beyond those of a fact.
+const POSITION_WORDS: &str = "unit location ema servo actuator side surface lru";
 
 /// Looks at one log.
 ///
@@ -171,7 +171,7 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
         |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
     for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
         let is_position =
-            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, POSITION_COLUMNS);
+            fact_of(&leaf.name) == Some(IdentityField::Position) || has_word_of(&leaf.name, POSITION_WORDS);
         let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
         if texts.len() > 1 && !texts.iter().all(|text| is_unit(text)) {
             layout.position_column = Some(leaf.name.clone());
@@ -268,7 +268,8 @@ fn channels(names: &[&str], root: &str) -> (InferredMapping, BTreeSet<String>) {
     let are_positions = of_motor.len() > 1
         && Role::NEEDED.iter().all(|role| sensors(*role) == of_motor)
         && tagged.iter().all(|(_, guess)| guess.position.is_none());
-    let guesses = if are_positions { parse(false) } else { tagged };
+    let mut guesses = if are_positions { parse(false) } else { tagged };
+    share_positions(&mut guesses);
     let found = choose(guesses.iter().map(|(_, guess)| guess));
     let is_chosen = |guess: &ParsedName| {
         let all = found.channels.values().chain(found.alternatives.values().flatten());
@@ -282,6 +283,27 @@ fn channels(names: &[&str], root: &str) -> (InferredMapping, BTreeSet<String>) {
 
 /// A pattern of a channel: the places where it fits a column, its unit, and which of redundant sensors it is.
 type Pattern<'g> = (BTreeSet<&'g str>, Option<Unit>, Option<usize>);
+
+/// Gives all channels of an actuator its position: `AIL_L.hinge_load` speaks of AIL_L where another channel does.
+fn share_positions(guesses: &mut [(String, ParsedName)]) {
+    let places = |role: Role| -> BTreeSet<String> {
+        let of_role = guesses.iter().filter(|(_, guess)| guess.role == role);
+        of_role.filter_map(|(_, guess)| guess.position.clone()).collect()
+    };
+    let known = places(Role::Motor).intersection(&places(Role::Screw)).cloned().collect::<BTreeSet<_>>();
+    for (_, guess) in guesses {
+        let Some(own) = guess.position.as_ref().filter(|own| !known.contains(*own)) else { continue };
+        let is_word = |rest: &str| !rest.starts_with(char::is_alphanumeric);
+        let shorter = known.iter().find_map(|place| {
+            let rest = own.strip_prefix(place.as_str()).filter(|rest| is_word(rest))?;
+            Some((place.clone(), format!("{PLACEHOLDER}{rest}")))
+        });
+        if let Some((place, pattern)) = shorter {
+            guess.pattern = guess.pattern.replace(PLACEHOLDER, &pattern);
+            guess.position = Some(place);
+        }
+    }
+}
 
 /// The pattern of each channel that fits most columns, its redundant ones, and the positions that all of them know.
 fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping {
@@ -360,6 +382,9 @@ mod tests {
         let found = of(&["ail_l_motor_a_deg", "ail_l_motor_b_deg", "ail_l_screw_mm", "ail_l_load_n"]);
         assert_eq!(found.channels[&Role::Motor].0, "{position}_motor_a_deg");
         assert_eq!(found.alternatives[&Role::Motor][0].0, "{position}_motor_b_deg");
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
+        let found = of(&["ail_l.motor_angle", "ail_l.screw_pos", "ail_l.hinge_load", "ail_lh.load"]);
+        assert_eq!(found.channels[&Role::Load].0, "{position}.hinge_load");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
         let numbers = ["motor_1_deg", "motor_2_deg", "screw_1_mm", "screw_2_mm", "load_1_n", "load_2_n"];
         let found = of(&numbers);
