@@ -27,6 +27,26 @@ use crate::model::positive;
 ///
 /// What lies beyond the outermost bins counts in them, and is no less exact while the mid-range stays
 /// within. 256 bins take 4 KiB.
+///
+/// ```
+/// use estimator::{ActuatorModel, Filter, NoiseModel, Stream, StreamingGap};
+///
+/// let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0)?;
+/// let noise = NoiseModel::Continuous {
+///     force_psd_n2_s: 100.0,
+///     backlash_rate_psd_m2_per_s: 1e-9,
+///     v_d_m2: 1e-11,
+/// };
+/// let mut stream = Stream::constant_time(&Filter::new(&actuator, 1e-3, &noise)?);
+/// let mut gap = StreamingGap::<256>::new(2e-6)?;
+/// // Ten seconds at 1 kHz: a gap of 80 µm whose side follows a load of ± 8 kN at 0.5 Hz.
+/// for k in 0..10_000 {
+///     let load_n = 8e3 * (f64::from(k) * 1e-3 * std::f64::consts::PI).sin();
+///     gap.push(stream.push(load_n / 5e7 + 40e-6 * load_n.signum(), load_n)?.s_m());
+/// }
+/// assert!((gap.read()?.gap_m - 80e-6).abs() < 4e-6);
+/// # Ok::<(), estimator::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct StreamingGap<const BINS: usize> {
     bin_m: f64,
