@@ -84,18 +84,12 @@ impl Output {
     }
 
     /// Writes a result for people to stdout, its invisible characters as code points.
-    ///
-    /// # Errors
-    /// If stdout is closed or full.
     pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
         let text = escape_invisible(text);
         if self.color { self.write_exact(&with_coloured_states(&text)) } else { self.write_exact(&text) }
     }
 
     /// Writes a result for programs to stdout, character by character.
-    ///
-    /// # Errors
-    /// If stdout is closed or full.
     #[expect(clippy::unused_self, reason = "only who holds the output may write")]
     pub(crate) fn write_exact(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();

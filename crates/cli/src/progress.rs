@@ -6,11 +6,24 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use pipeline::Event;
 
 use crate::output::{Output, escape, is_attended};
 
 /// Minimum interval between progress lines without a terminal.
 const SPARSE: Duration = Duration::from_secs(30);
+
+/// Shows the progress of some work by its events, until it is done.
+pub(crate) fn shown<T>(
+    name: &'static str,
+    output: &Output,
+    work: impl FnOnce(&(dyn Fn(Event) + Sync)) -> T,
+) -> T {
+    let progress = Progress::new(name, output);
+    let done = work(&|event| progress.follow(&event));
+    progress.end();
+    done
+}
 
 /// Progress of one command.
 pub(crate) struct Progress<'t> {
@@ -32,7 +45,7 @@ struct State {
 }
 
 impl<'t> Progress<'t> {
-    /// Starts hidden, until [`Progress::total`] is called.
+    /// Starts hidden, until the number of items is known.
     pub(crate) fn new(name: &'static str, output: &'t Output) -> Self {
         let terminal = is_attended();
         let target = if output.shows_progress() && terminal {
@@ -59,8 +72,20 @@ impl<'t> Progress<'t> {
         }
     }
 
+    /// Shows an event.
+    pub(crate) fn follow(&self, event: &Event) {
+        match event {
+            Event::Planned { logs, .. } => self.total(*logs),
+            Event::Started { log } => self.started(log),
+            Event::Finished { log, refused, diagnostics, .. } => {
+                self.finished(log, *refused, diagnostics.len());
+            }
+            Event::Stored { .. } | Event::Trends { .. } => {}
+        }
+    }
+
     /// Sets the number of items.
-    pub(crate) fn total(&self, total: usize) {
+    fn total(&self, total: usize) {
         self.update(|state| {
             state.total = total as u64;
             state.begun = Instant::now();
@@ -78,14 +103,14 @@ impl<'t> Progress<'t> {
     }
 
     /// Records that a worker started an item.
-    pub(crate) fn started(&self, piece: &str) {
+    fn started(&self, piece: &str) {
         self.update(|state| {
             state.in_hand.insert(piece.to_owned());
         });
     }
 
     /// Records that an item is finished.
-    pub(crate) fn finished(&self, piece: &str, refused: usize, errors: usize) {
+    fn finished(&self, piece: &str, refused: usize, errors: usize) {
         let message = self.update(|state| {
             state.in_hand.remove(piece);
             state.done += 1;

@@ -20,9 +20,6 @@ use crate::exit::Failure;
 use crate::output::Output;
 
 /// Writes `table` or `batch` in the selected format to stdout or a file.
-///
-/// # Errors
-/// If the output cannot be written.
 pub(crate) fn write_rows(
     format: &RowFormatArgs,
     output: &Output,
@@ -181,17 +178,11 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
 }
 
 /// Rows as a batch, every column nullable.
-///
-/// # Errors
-/// If there are more rows than a batch can hold.
 pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
     to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
 }
 
 /// Columns of a batch in the order of their names; `texts` are columns that it does not have.
-///
-/// # Errors
-/// If a name is unknown.
 pub(crate) fn columns(
     batch: &RecordBatch,
     names: &[&str],

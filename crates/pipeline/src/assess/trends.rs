@@ -27,7 +27,7 @@ use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_chan
 use crate::fleet::bookkeeping::inspections::InspectionIndex;
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::usage::UsageSources;
-use crate::fleet::builder;
+use crate::fleet::builder::{self, FlightColumns};
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
@@ -127,7 +127,7 @@ pub fn assess_store_with_quantities(
 
 /// Assessments of the units of a run.
 #[derive(Debug, Default)]
-pub struct RunAssessments {
+pub(crate) struct RunAssessments {
     /// Assessments at the newest date in the store.
     pub now: Vec<TrendRow>,
     /// Changes against the states after the run before.
@@ -152,10 +152,7 @@ pub struct RunAssessments {
 
 /// Assesses the fleet after a run: the units whose records it changed, the work list of all units, and what differs from the
 /// states after the run before.
-///
-/// # Errors
-/// As [`assess_store`].
-pub fn assess_run(
+pub(crate) fn assess_run(
     config: &Config,
     installations: &Installations,
     store: &Store,
@@ -166,7 +163,7 @@ pub fn assess_run(
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
     let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
     let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
-    let (mut now, tail_wide) = fleet.statements_with_steps(fleet.units.keys().copied(), as_of)?;
+    let (mut now, tail_wide) = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
         recent,
@@ -216,9 +213,6 @@ pub(crate) struct ReportAssessments {
 }
 
 /// Assesses the selected units at the date, and at earlier dates given in days before.
-///
-/// # Errors
-/// As [`assess_histories`].
 pub(crate) fn assess_for_report(
     config: &Config,
     installations: &Installations,
@@ -243,7 +237,7 @@ pub(crate) fn assess_for_report(
         .iter()
         .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
         .collect::<Result<_, Error>>()?;
-    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
+    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?.0));
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let selected: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let priors = |part: Option<&str>| {
@@ -286,12 +280,11 @@ fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
 /// # Errors
 /// When the store cannot be read.
 pub fn load_histories(store: &Store) -> Result<Histories, Error> {
-    read_histories(store, &Query::default())
-}
-
-fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
-    let scan = store.scan_columns(query, &builder::stored_columns())?;
-    Ok(builder::histories(unit_rows::of_store(&scan, builder::add_stored)?, true).0)
+    let scan = store.scan_columns(&Query::default(), &builder::stored_columns())?;
+    let flights = unit_rows::of_store(&scan, |rows, chunk, batch| {
+        FlightColumns::stored(chunk, batch)?.add_to(rows, |_| ())
+    })?;
+    Ok(builder::histories(flights, true).0)
 }
 
 /// One assessment for each selected unit, by part and serial number.
@@ -427,9 +420,11 @@ impl<'a> FleetContext<'a> {
         given: Option<Timestamp>,
         config: &Config,
     ) -> StoreAssessment {
+        let units: BTreeSet<UnitKey> = now.iter().map(TrendRow::unit).collect();
+        let faults = self.mapping_faults.iter().filter(|fault| !fault.units.is_disjoint(&units));
         StoreAssessment {
-            followed: self.followed_of(&now, tail_wide),
-            mapping_faults: self.mapping_faults_of(&now),
+            followed: self.followed_of(&now, &units, tail_wide),
+            mapping_faults: faults.cloned().collect(),
             notes: self.notes(&now, given, config),
             now,
         }
@@ -446,16 +441,13 @@ impl<'a> FleetContext<'a> {
         notes
     }
 
-    /// The wrong mappings that concern some assessed units.
-    fn mapping_faults_of(&self, rows: &[TrendRow]) -> Vec<MappingFault> {
-        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
-        let concerns = |fault: &&MappingFault| !fault.units.is_disjoint(&units);
-        self.mapping_faults.iter().filter(concerns).cloned().collect()
-    }
-
     /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
-    fn followed_of(&self, rows: &[TrendRow], tail_wide: &[QuantityChange]) -> FollowedQuantities {
-        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+    fn followed_of(
+        &self,
+        rows: &[TrendRow],
+        units: &BTreeSet<UnitKey>,
+        tail_wide: &[QuantityChange],
+    ) -> FollowedQuantities {
         let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
         let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
         let mut of_units: Vec<QuantityRow> = rows.iter().map(gap_row).collect();
@@ -477,8 +469,7 @@ impl<'a> FleetContext<'a> {
     /// The selected assessments.
     fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Statements, Error> {
         let names = self.units.keys().copied();
-        let (mut rows, tail_wide) =
-            self.statements_with_steps(names.filter(|name| ask.names(name)), as_of)?;
+        let (mut rows, tail_wide) = self.statements(names.filter(|name| ask.names(name)), as_of)?;
         // A unit that flew later than the date asked for did not exist then; one whose records are all dated ahead of
         // today's clock does, and nothing is known of it.
         let now = Timestamp::now();
@@ -488,16 +479,8 @@ impl<'a> FleetContext<'a> {
         Ok((rows, tail_wide))
     }
 
+    /// Assessments of some units, and one change of the gap for each step of a whole tail.
     fn statements<'b>(
-        &self,
-        names: impl Iterator<Item = &'b UnitKey>,
-        as_of: Timestamp,
-    ) -> Result<Vec<TrendRow>, Error> {
-        Ok(self.statements_with_steps(names, as_of)?.0)
-    }
-
-    /// The same, with one change of the gap for each step of a whole tail.
-    fn statements_with_steps<'b>(
         &self,
         names: impl Iterator<Item = &'b UnitKey>,
         as_of: Timestamp,

@@ -40,7 +40,7 @@ pub struct Finding {
 
 impl Finding {
     /// Findings about the followed quantities of units, each `normal` where it has no state of its own.
-    pub fn of_quantities(rows: &[QuantityRow]) -> impl Iterator<Item = Self> {
+    pub(crate) fn of_quantities(rows: &[QuantityRow]) -> impl Iterator<Item = Self> {
         rows.iter().map(|row| Self {
             unit: row.unit(),
             tail_number: row.tail_number.clone(),
@@ -54,7 +54,10 @@ impl Finding {
     }
 
     /// Findings about changes that tails or parts made.
-    pub fn of_common_changes(changes: &[QuantityChange], as_of_utc: Timestamp) -> impl Iterator<Item = Self> {
+    pub(crate) fn of_common_changes(
+        changes: &[QuantityChange],
+        as_of_utc: Timestamp,
+    ) -> impl Iterator<Item = Self> {
         changes.iter().filter(|change| change.serial_number.is_none()).map(move |change| Self {
             unit: (change.part_number.clone(), String::new()),
             tail_number: change.tail_number.clone(),

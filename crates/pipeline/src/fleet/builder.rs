@@ -42,29 +42,6 @@ pub(crate) fn stored_columns() -> Vec<&'static str> {
     stored.chain([OTHER_GAP, SETTINGS]).collect()
 }
 
-/// Adds rows of an estimates table.
-///
-/// # Errors
-/// A column that must be there and is not, and the first cell that cannot be read.
-pub(crate) fn add_external(
-    rows: &mut RowsByUnit<(StoredFlight, ())>,
-    chunk: &TableBatch,
-) -> Result<(), ingest::Error> {
-    FlightColumns::external(chunk)?.add_to(rows, |_| ())
-}
-
-/// Adds rows of the store.
-///
-/// # Errors
-/// The first cell that cannot be read.
-pub(crate) fn add_stored(
-    rows: &mut RowsByUnit<(StoredFlight, ())>,
-    chunk: &TableBatch,
-    batch: &RecordBatch,
-) -> Result<(), ingest::Error> {
-    FlightColumns::stored(chunk, batch)?.add_to(rows, |_| ())
-}
-
 /// The histories of units, and what else `R` holds of each flight, by unit in the order of the flights.
 pub(crate) fn histories<R: Send>(
     parts: PartsByUnit<(StoredFlight, R)>,
@@ -118,9 +95,6 @@ impl<'a> FlightColumns<'a> {
     }
 
     /// Those of the store's records.
-    ///
-    /// # Errors
-    /// As [`FlightColumns::external`].
     pub(crate) fn stored(chunk: &'a TableBatch, batch: &RecordBatch) -> Result<Self, ingest::Error> {
         let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
         Self::of(chunk, Flags::Stored(flags))
@@ -254,11 +228,11 @@ mod tests {
     }
 
     fn add_batch(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        add_stored(rows, &chunk(batch), batch)
+        FlightColumns::stored(&chunk(batch), batch)?.add_to(rows, |_| ())
     }
 
     fn add_plain(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        add_external(rows, &chunk(batch))
+        FlightColumns::external(&chunk(batch))?.add_to(rows, |_| ())
     }
 
     /// The histories of a table in batches.
@@ -306,17 +280,6 @@ mod tests {
         RecordBatch::try_from_iter(texts.chain(numbers)).unwrap()
     }
 
-    #[test]
-    fn rows_of_the_store_and_of_a_foreign_table_are_what_each_of_them_is_by_itself() {
-        let rows = rows();
-        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        // In other parts names have other codes.
-        let parts = |texts| rows.chunks(230).map(|some| batch(some, texts)).collect::<Vec<_>>();
-        let expected = one_by_one(&rows);
-        assert_eq!(row_texts(&of_batches(&parts(&coded), add_batch)), expected);
-        assert_eq!(row_texts(&of_batches(&parts(&DataType::Utf8), add_plain)), expected);
-    }
-
     /// The histories of rows that are read each by itself.
     fn one_by_one(rows: &[Cells]) -> Vec<String> {
         let batches: Vec<_> = rows.chunks(1).map(|row| batch(row, &DataType::Utf8)).collect();
@@ -334,17 +297,20 @@ mod tests {
         histories.iter().map(of_unit).collect()
     }
 
-    /// The order of parts decides, not that of the workers, of whom there may be more than parts or units.
+    /// Rows of the store and of an estimates table. The order of parts decides, not that of the workers, of whom there may be
+    /// more than parts or units; in other parts names have other codes.
     #[test]
-    fn any_number_of_workers_brings_together_what_one_does() {
+    fn any_number_of_workers_and_parts_brings_together_what_each_row_is_by_itself() {
         let rows = rows();
         let expected = one_by_one(&rows);
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
-            let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
+            let parts = |texts| rows.chunks(rows_of_part).map(|some| batch(some, texts)).collect::<Vec<_>>();
+            let (stored, plain) = (parts(&coded), parts(&DataType::Utf8));
             let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
-            let found = pool.install(|| of_batches(&parts, add_batch));
-            assert!(row_texts(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
+            let found = pool.install(|| [of_batches(&stored, add_batch), of_batches(&plain, add_plain)]);
+            let is_same = found.iter().all(|found| row_texts(found) == expected);
+            assert!(is_same, "{rows_of_part} rows a part, {workers} workers");
         }
         assert!(of_parts::<StoredFlight>(0, |_, _| Ok(())).unwrap().is_empty());
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
-use crate::fleet::builder;
+use crate::fleet::builder::{self, FlightColumns};
 use crate::fleet::histories::Histories;
 use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::unit_rows::of_parts;
@@ -31,7 +31,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
     let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS)?;
     let parts = of_parts(table.len(), |rows, part| {
         let mut chunks = table.batches(part..part + 1)?;
-        Ok(chunks.try_for_each(|chunk| builder::add_external(rows, &chunk?))?)
+        Ok(chunks.try_for_each(|chunk| FlightColumns::external(&chunk?)?.add_to(rows, |_| ()))?)
     })?;
     Ok(builder::histories(parts, false).0)
 }
@@ -41,7 +41,9 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    let parts = of_parts(chunks.len(), |rows, part| Ok(builder::add_external(rows, &chunks[part])?))?;
+    let parts = of_parts(chunks.len(), |rows, part| {
+        Ok(FlightColumns::external(&chunks[part])?.add_to(rows, |_| ())?)
+    })?;
     Ok(builder::histories(parts, false).0)
 }
 

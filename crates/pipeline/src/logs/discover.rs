@@ -13,8 +13,8 @@ use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
 use crate::error::{Error, is_passing};
-use crate::logs::discover_remote::{self};
-use crate::logs::file_stat::SeenObjects;
+use crate::logs::discover_remote;
+use crate::logs::file_stat::{FileStat, SeenObjects};
 use crate::logs::local_files;
 use crate::logs::table_folders::{TableFolders, TableMembership};
 use crate::logs::temporary_files::{is_temporary, parts_written_out};
@@ -280,52 +280,49 @@ fn matching(
         Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
     };
     for pattern in patterns {
+        let faults = unlisted.len();
+        let mut files: Vec<(PathBuf, Option<FileStat>)> = Vec::new();
         if object_io::is_address(pattern) {
-            let (mut tables, mut objects) = (TableFolders::default(), Vec::new());
+            let mut tables = TableFolders::default();
             let listed = discover_remote::each(pattern, &mut tables, |entry| {
                 if !ours(&entry.path) && !is_temporary(&entry.path, Path::new(pattern)) {
-                    objects.push(entry);
+                    files.push((entry.path.clone(), Some(entry.into())));
                 }
             })?;
             listed.map_err(|e| invalid(pattern, &e))?;
-            let faults = unlisted.len();
-            objects.retain(|entry| is_log(config, &entry.path, tables.object(&entry.path), unlisted));
-            if objects.is_empty() && unlisted.len() == faults {
-                silent.insert(pattern.as_str());
-            }
-            for entry in objects {
-                found.insert(log_path(config, &entry.path), entry.path.clone());
-                seen.insert(entry.path.clone(), entry.into());
-            }
-            continue;
-        }
-        let local = local_files::matching(&config.folder, pattern).map_err(|e| invalid(pattern, &e.msg))?;
-        let written = config.folder.join(pattern);
-        let mut files = Vec::new();
-        let faults = unlisted.len();
-        let faulty = local.faults.into_iter().map(Err);
-        for found in local.paths.into_iter().map(Ok).chain(faulty) {
-            let checked = found.and_then(|path| match is_file(&path) {
-                Ok(is_file) => Ok((path, is_file)),
-                Err(e) => Err((path, e)),
-            });
-            match checked {
-                Ok((path, is_file)) => {
-                    let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
-                    files.extend(is_kept.then_some(path));
-                }
-                Err((path, e)) => {
-                    let log_path = log_path(config, &path);
-                    unlisted.insert(log_path.clone(), (path.clone(), unreadable(&path, &log_path, &e)));
+            files.retain(|(path, _)| is_log(config, path, tables.object(path), unlisted));
+        } else {
+            let local =
+                local_files::matching(&config.folder, pattern).map_err(|e| invalid(pattern, &e.msg))?;
+            let written = config.folder.join(pattern);
+            let faulty = local.faults.into_iter().map(Err);
+            for found in local.paths.into_iter().map(Ok).chain(faulty) {
+                let checked = found.and_then(|path| match is_file(&path) {
+                    Ok(is_file) => Ok((path, is_file)),
+                    Err(e) => Err((path, e)),
+                });
+                match checked {
+                    Ok((path, is_file)) => {
+                        let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
+                        files.extend(is_kept.then_some((path, None)));
+                    }
+                    Err((path, e)) => {
+                        let log_path = log_path(config, &path);
+                        let fault = unreadable(&path, &log_path, &e);
+                        unlisted.insert(log_path, (path, fault));
+                    }
                 }
             }
+            let written_out = folder_written_out(&written);
+            files.retain(|(path, _)| is_log(config, path, tables.local(path, &written_out), unlisted));
         }
-        let written_out = folder_written_out(&written);
-        files.retain(|path| is_log(config, path, tables.local(path, &written_out), unlisted));
         if files.is_empty() && unlisted.len() == faults {
             silent.insert(pattern.as_str());
         }
-        found.extend(files.into_iter().map(|path| (log_path(config, &path), path)));
+        for (path, stat) in files {
+            seen.extend(stat.map(|stat| (path.clone(), stat)));
+            found.insert(log_path(config, &path), path);
+        }
     }
     // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
     if silent.is_empty() {

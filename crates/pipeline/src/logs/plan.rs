@@ -216,12 +216,12 @@ pub fn plan(
     let unidentified = job::flight_log::digest_without_identity(config, installations);
     let planner =
         Planner { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
-    let verdicts: Vec<Verdict> = found
+    let verdicts: Vec<Result<WorkItem, Skipped>> = found
         .par_iter()
         .map(|(log_path, log)| planner.plan_log(log_path, log, accounts.get(log_path)))
         .collect();
-    let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
-    let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
+    let not_asked = verdicts.iter().filter(|v| **v == Err(Skipped::NotAsked)).count();
+    let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Result::ok).collect();
     let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
     work.sort_by(|a, b| {
         let by_size = || size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path));
@@ -267,7 +267,7 @@ pub fn plan(
 }
 
 /// Digests of a log that was processed without an error.
-pub fn digests(account: &LogRecord) -> Option<(String, String)> {
+pub(crate) fn digests(account: &LogRecord) -> Option<(String, String)> {
     account
         .outcome
         .is_success()
@@ -276,12 +276,12 @@ pub fn digests(account: &LogRecord) -> Option<(String, String)> {
 }
 
 /// Whether two logs are of one flight: one departure of one aircraft.
-pub fn is_same_flight(one: &LogRecord, other: &LogRecord) -> bool {
+pub(crate) fn is_same_flight(one: &LogRecord, other: &LogRecord) -> bool {
     (&one.tail_number, one.departure_utc) == (&other.tail_number, other.departure_utc)
 }
 
 /// Flight of a log record, where its log was identified.
-pub fn flight_of(account: &LogRecord) -> Option<Flight> {
+pub(crate) fn flight_of(account: &LogRecord) -> Option<Flight> {
     Some(Flight {
         tail_number: TailNumber::new(account.tail_number.as_ref()?).ok()?,
         flight_id: FlightId::new(account.flight_id.as_ref()?).ok()?,
@@ -291,20 +291,13 @@ pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     })
 }
 
-/// Decision about one log in this run.
-enum Verdict {
+/// Why a log is not processed in this run.
+#[derive(Debug, PartialEq)]
+enum Skipped {
+    /// It is up to date.
     Known,
+    /// The request selects other flights.
     NotAsked,
-    Process(Box<WorkItem>),
-}
-
-impl Verdict {
-    fn work(self) -> Option<WorkItem> {
-        match self {
-            Self::Process(work) => Some(*work),
-            Self::Known | Self::NotAsked => None,
-        }
-    }
 }
 
 /// Inputs of the decision about a log.
@@ -323,11 +316,11 @@ impl Planner<'_> {
         log_path: &str,
         (files, fault): &(LogFiles, Option<Diagnostic>),
         before: Option<&LogRecord>,
-    ) -> Verdict {
+    ) -> Result<WorkItem, Skipped> {
         let stat = FileStat::of_log(files, self.seen, &self.config.document.identity);
         let is_unlisted = fault.as_ref().is_some_and(|fault| is_unlisted(&fault.code));
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
-        let Some(why) = why else { return Verdict::Known };
+        let why = why.ok_or(Skipped::Known)?;
         // A log that cannot be identified is always processed, or its error would never be reported.
         let flight = || {
             before
@@ -337,10 +330,10 @@ impl Planner<'_> {
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
         if !asked {
-            return Verdict::NotAsked;
+            return Err(Skipped::NotAsked);
         }
         let (files, fault, log_path) = (files.clone(), fault.clone(), log_path.to_owned());
-        Verdict::Process(Box::new(WorkItem { files, fault, log_path, stat, why, before: before.cloned() }))
+        Ok(WorkItem { files, fault, log_path, stat, why, before: before.cloned() })
     }
 
     /// Why this log is processed in this run, or nothing when it is up to date.

@@ -197,16 +197,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_with_someone_elses_work_is_left_alone() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        fs::create_dir(&out).unwrap();
-        fs::write(out.join("thesis.txt"), "years").unwrap();
-        assert!(matches!(write(&Report::default(), Vec::new(), &out, &|_| ()), Err(Error::Refused(_))));
-        assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "years");
-    }
-
-    #[test]
     fn a_report_takes_the_place_of_the_one_before_and_leaves_nothing_beside_it() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");

@@ -18,7 +18,7 @@ use job::Config;
 use records::row_schema::{from_batch, to_batch};
 use records::{GapRecord, Installations};
 use serde::{Deserialize, Serialize};
-use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
+use store::{LogOutcome, LogRecord, LogResult, RecordKey, RunRecord, Writer};
 
 use crate::error::Error;
 use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
@@ -73,6 +73,7 @@ pub fn process_task(
         config: config.clone(),
         installations: installations.clone(),
         plan: Plan::default(),
+        planned: (RunRecord::default(), Vec::new()),
         run_id: task.run_id.clone(),
         program_version: program_version.to_owned(),
     };
@@ -122,8 +123,8 @@ pub fn run(
     at_a_time: usize,
     engine: &mut Engine<'_>,
 ) -> Result<RunSummary, Error> {
-    execute_run(config, request, context, 0, |inputs, intent, writer, report| {
-        intent.state(writer)?;
+    execute_run(config, request, context, 0, |inputs, writer, report| {
+        inputs.begin(writer)?;
         let budget = MemoryBudget::new(config.document.run.memory_mib);
         let steps = StepCount::default();
         let worker = &WorkerContext { inputs, budget: &budget, steps: &steps };

@@ -119,9 +119,6 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// Converts the outcome of a log to rows, and counts it.
-    ///
-    /// # Errors
-    /// When the stored records of its flight cannot be read.
     pub(crate) fn resolve(
         &mut self,
         done: ProcessedLog,

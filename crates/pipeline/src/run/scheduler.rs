@@ -91,8 +91,8 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<RunSummary, Error> {
     let workers = workers(request);
-    execute_run(config, request, context, workers, |inputs, intent, writer, report| {
-        process_all(inputs, context, workers, (intent, writer, report))
+    execute_run(config, request, context, workers, |inputs, writer, report| {
+        process_all(inputs, context, workers, writer, report)
     })
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn execute_run(
     request: &Request,
     context: &Context<'_>,
     workers: usize,
-    work: impl FnOnce(&Arc<RunInputs>, &RunPlanRows, &mut Writer, &mut RunSummary) -> Result<Touched, Error>,
+    work: impl FnOnce(&Arc<RunInputs>, &mut Writer, &mut RunSummary) -> Result<Touched, Error>,
 ) -> Result<RunSummary, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
@@ -146,15 +146,15 @@ pub(crate) fn execute_run(
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
     let inputs = Arc::new(RunInputs {
         config: config.clone(),
         installations,
         plan,
+        planned: (report.row(context.program_version, &config_path, None), to_do),
         run_id: report.run_id.clone(),
         program_version: context.program_version.to_owned(),
     });
-    let Touched { mut units, renamed } = work(&inputs, &intent, &mut writer, &mut report)?;
+    let Touched { mut units, renamed } = work(&inputs, &mut writer, &mut report)?;
     report.absent = report.absent.saturating_sub(renamed.len());
     let tables = Bookkeeping::new(config, &inputs.installations);
     report.moved = tables.write(&mut writer, &renamed)?.moved;
@@ -204,19 +204,6 @@ fn run_id(started_utc: Timestamp) -> String {
     format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
 }
 
-/// Planned log rows of a run, which are stored before its first result.
-pub(crate) struct RunPlanRows {
-    run: RunRecord,
-    to_do: Vec<LogRecord>,
-}
-
-impl RunPlanRows {
-    /// Writes the planned status, before any other commit.
-    pub(crate) fn state(&self, writer: &mut Writer) -> Result<(), Error> {
-        Ok(writer.begin_run(&self.run, &self.to_do)?)
-    }
-}
-
 /// Keeps freed memory for the next estimate. The GNU allocator returns blocks of 128 KiB or more to the
 /// system as soon as they are freed, and each page costs a fault when it is allocated again, until a
 /// larger block was freed: its size is the new threshold (mallopt(3), `M_MMAP_THRESHOLD`). Other systems: no effect.
@@ -230,11 +217,18 @@ pub(crate) struct RunInputs {
     pub(crate) config: Config,
     pub(crate) installations: Installations,
     pub(crate) plan: Plan,
+    /// The row of the run and those of its logs, which are stored before its first result.
+    pub(crate) planned: (RunRecord, Vec<LogRecord>),
     pub(crate) run_id: String,
     pub(crate) program_version: String,
 }
 
 impl RunInputs {
+    /// Writes the planned status, before any other commit.
+    pub(crate) fn begin(&self, writer: &mut Writer) -> Result<(), Error> {
+        Ok(writer.begin_run(&self.planned.0, &self.planned.1)?)
+    }
+
     /// Outcome of a log that exceeded its time limit.
     pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> ProcessedLog {
         let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
@@ -250,7 +244,8 @@ fn process_all(
     inputs: &Arc<RunInputs>,
     context: &Context<'_>,
     workers: usize,
-    (intent, writer, report): (&RunPlanRows, &mut Writer, &mut RunSummary),
+    writer: &mut Writer,
+    report: &mut RunSummary,
 ) -> Result<Touched, Error> {
     raise_mmap_threshold();
     let shared = Arc::clone(inputs);
@@ -269,7 +264,7 @@ fn process_all(
     };
     let mut pool = WorkerPool::start(settings, Box::new(process_log))?;
     // The workers read meanwhile; what they bring waits.
-    let written = intent.state(writer).and_then(|()| write(inputs, context, &mut pool, writer, report));
+    let written = inputs.begin(writer).and_then(|()| write(inputs, context, &mut pool, writer, report));
     report.not_reached_logs = pool.not_reached();
     report.not_reached = report.not_reached_logs.len();
     written

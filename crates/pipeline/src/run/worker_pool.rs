@@ -179,9 +179,6 @@ pub(crate) struct WorkerPool<'a> {
 
 impl<'a> WorkerPool<'a> {
     /// Starts the workers.
-    ///
-    /// # Errors
-    /// When threads cannot be started.
     pub(crate) fn start(settings: PoolSettings<'a>, process_log: Box<ProcessLog>) -> Result<Self, Error> {
         let logs = settings.plan.work.len();
         let process_log: Arc<ProcessLog> = Arc::from(process_log);

@@ -52,9 +52,14 @@ fn unit(record: &GapRecord) -> i32 {
     record.serial_number.as_str()[1..].parse().unwrap()
 }
 
+/// Assessments of all units at a date, by default that of the newest record.
+fn assess_with(config: &Config, flown: &[GapRecord], as_of_utc: Option<Timestamp>) -> Vec<TrendRow> {
+    let ask = UnitSelection { as_of_utc, ..UnitSelection::default() };
+    trends::assess_histories(config, &Installations::default(), histories(flown), &ask).unwrap()
+}
+
 fn assess(flown: &[GapRecord], as_of: Timestamp) -> Vec<TrendRow> {
-    let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
-    trends::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
+    assess_with(&config(), flown, Some(as_of))
 }
 
 #[test]
@@ -171,10 +176,7 @@ fn booked(file: &str) -> Config {
 
 #[test]
 fn recorded_maintenance_is_a_change_point_from_its_date_on() {
-    let nobody = Installations::default();
-    let ask = UnitSelection { as_of_utc: Some(day(199)), ..UnitSelection::default() };
-    let rows =
-        trends::assess_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
+    let rows = assess_with(&booked("maintenance.csv"), &flown(200), Some(day(199)));
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -201,10 +203,7 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
 #[test]
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
-        let nobody = Installations::default();
-        let rows =
-            trends::assess_histories(config, &nobody, histories(&flown(60)), &UnitSelection::default())
-                .unwrap();
+        let rows = assess_with(config, &flown(60), None);
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
     let of_all = "[trend]\naxis = \"flights\"";
@@ -258,16 +257,13 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
 /// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
 #[test]
 fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
-    let nobody = Installations::default();
     let mut rows = flown(228);
     for row in rows.iter_mut().filter(|row| unit(row) == 5 && row.flight.departure_utc >= day(200)) {
         row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap - 12e-6);
     }
     let known: Vec<GapRecord> =
         rows.iter().filter(|row| row.flight.departure_utc < day(200)).cloned().collect();
-    let assess = |rows: &[GapRecord]| {
-        trends::assess_histories(&config(), &nobody, histories(rows), &UnitSelection::default()).unwrap()
-    };
+    let assess = |rows: &[GapRecord]| assess_with(&config(), rows, None);
     let states = |rows: &[GapRecord]| -> Vec<records::UnitState> {
         assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
     };

@@ -1,13 +1,12 @@
 //! `normalize`: writes the normalized log of each actuator.
 
 use ingest::LogFiles;
-use pipeline::Event;
 use pipeline::logs::discover;
 
 use crate::args::{Global, NormalizeArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress;
 use crate::row_output;
 use crate::table::count;
 
@@ -25,23 +24,10 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
     } else {
         discover::named_logs(&config, &args.logs)?
     };
-    let progress = Progress::new("normalize", output);
-    let watch = |event: Event| match event {
-        Event::Planned { logs, .. } => progress.total(logs),
-        Event::Finished { log, diagnostics, .. } => progress.finished(&log, 0, diagnostics.len()),
-        _ => {}
-    };
-    let place = (args.output.as_path(), args.encoding.into());
-    let done = pipeline::inspect::normalize::normalize(
-        &config,
-        &installations,
-        &logs,
-        place,
-        args.jobs.map(usize::from),
-        &watch,
-    );
-    progress.end();
-    let done = done?;
+    let (place, jobs) = ((args.output.as_path(), args.encoding.into()), args.jobs.map(usize::from));
+    let done = progress::shown("normalize", output, |watch| {
+        pipeline::inspect::normalize::normalize(&config, &installations, &logs, place, jobs, watch)
+    })?;
     output.write_result(&format!(
         "{} of {} below {}\n",
         count(done.written.len(), "normalized log"),

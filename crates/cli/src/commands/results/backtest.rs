@@ -20,9 +20,6 @@ const SHARES: [(f64, f64, &str); 4] = [
 ];
 
 /// Prints a summary table, or one row per past forecast in the machine-readable formats.
-///
-/// # Errors
-/// If configuration, tables or store cannot be read.
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {

@@ -22,9 +22,6 @@ use crate::commands::context::{KnownNames, called, check_range, load_with_instal
 use crate::commands::results::trend;
 
 /// Prints the matching records, oldest first.
-///
-/// # Errors
-/// If configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
     let (config, installations) = load_with_installations(global)?;

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use pipeline::Event;
+
 use pipeline::report::{compose, data, flight_plots, publish};
 
 use crate::args::{Global, ReportArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress;
 use crate::row_output;
 use crate::table::count;
 
@@ -53,15 +53,8 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     if args.data {
         files.extend(data::tables(&report)?);
     }
-    let progress = Progress::new("report", output);
-    let watch = |event: Event| match event {
-        Event::Planned { logs, .. } => progress.total(logs),
-        Event::Finished { log, .. } => progress.finished(&log, 0, 0),
-        _ => {}
-    };
-    let written = publish::write(&report, files, &args.output, &watch);
-    progress.end();
-    let written = written?;
+    let written =
+        progress::shown("report", output, |watch| publish::write(&report, files, &args.output, &watch))?;
     let index = display_path(&args.output.join("index.html"));
     let size = written.bytes as f64 / 1e6;
     let units = count(report.units.len(), "unit");

@@ -22,9 +22,6 @@ use crate::table::{self, count, number, or_dash, state_mark, text, unit_name};
 use crate::commands::context::{KnownNames, load_trend_context, note_future};
 
 /// Prints one row per unit, or per query.
-///
-/// # Errors
-/// If configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     note_future(args.as_of, output);
     let (config, installations) = load_trend_context(&args.external, global, output)?;

@@ -10,18 +10,12 @@ use crate::exit::{Code, Failure};
 use crate::row_output::to_file;
 
 /// Writes the metrics to a temporary file and renames it, so that a scraper never reads half of them.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn write(file: &Path, report: &RunSummary, code: Code) -> Result<(), Failure> {
     let text = text(report, code, value_in(file, "freeplay_run_completed_timestamp_seconds "));
     to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
 }
 
 /// After a run without a summary: its end and exit code, and the other values of the last run that had one.
-///
-/// # Errors
-/// If the file cannot be written.
 pub(crate) fn write_failed(file: &Path, started_utc: Timestamp, code: Code) -> Result<(), Failure> {
     const REPLACED: [&str; 3] =
         ["run_started_timestamp_seconds", "run_ended_timestamp_seconds", "run_exit_code"];

@@ -25,9 +25,6 @@ use crate::table::{self, count, number, text};
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
 
 /// Runs the pipeline.
-///
-/// # Errors
-/// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let started_utc = Timestamp::now();
     let ended = execute(args, global, output, started_utc);
@@ -72,7 +69,7 @@ fn execute(
             enter(&phase, Phase::Processing);
         }
         output.event(&event);
-        follow(&event, &progress);
+        progress.follow(&event);
     };
     let context = Context {
         program_version: VERSION,
@@ -179,17 +176,6 @@ fn answer_interrupt(
             Phase::Ended => {}
         }
     });
-}
-
-fn follow(event: &Event, progress: &Progress<'_>) {
-    match event {
-        Event::Planned { logs, .. } => progress.total(*logs),
-        Event::Started { log } => progress.started(log),
-        Event::Finished { log, refused, diagnostics, .. } => {
-            progress.finished(log, *refused, diagnostics.len());
-        }
-        Event::Stored { .. } | Event::Trends { .. } => {}
-    }
 }
 
 /// Whether any unit of the store is in a state or worse, updated by this run or not.

@@ -11,12 +11,12 @@ use pipeline::logs::temporary_files::is_temporary;
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
+use crate::progress;
 use crate::row_output;
 use crate::table::count;
 
 use crate::commands::context::display_path;
 use crate::commands::setup::proposal::Proposal;
-use crate::commands::setup::simulate::with_progress;
 
 const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
 
@@ -74,7 +74,7 @@ fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
         return Err(exists(&path));
     }
     fs::create_dir_all(dir)?;
-    let logs = with_progress(output, |watch| write_sample(dir, watch))?;
+    let logs = progress::shown("simulate", output, |watch| write_sample(dir, watch))?;
     let data = display_path(&dir.join(SAMPLE_FOLDER));
     output.write_result(&format!(
         "wrote {}\nwrote {data}: {}, installations, flights, maintenance, inspections and the true gaps\n",

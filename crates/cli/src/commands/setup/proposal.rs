@@ -214,9 +214,6 @@ pub(crate) struct Proposal {
 
 impl Proposal {
     /// Looks at a sample of the logs.
-    ///
-    /// # Errors
-    /// When none of the sample can be read.
     pub(crate) fn of(folder: &Path, logs: &[PathBuf]) -> Result<Self, Failure> {
         let found = variants(sampled(logs))?;
         let looked_at = found.iter().map(|variant| variant.logs).sum();
@@ -304,9 +301,6 @@ impl Proposal {
     }
 
     /// Template with the mapping of the logs below a folder, to be verified with `check`.
-    ///
-    /// # Errors
-    /// When the current folder is not known.
     pub(crate) fn configuration(&self, template: &str, folder: &Path, dir: &Path) -> Result<String, Failure> {
         let (head, rest) = template.split_once("# Which flight a log is.").unwrap_or((template, ""));
         let (_, rest) = rest.split_once("[estimate]").unwrap_or(("", rest));

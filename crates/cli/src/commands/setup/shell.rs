@@ -8,9 +8,6 @@ use crate::exit::{Code, Failure};
 use crate::output::Output;
 
 /// Writes the script by which a shell asks this program for completions.
-///
-/// # Errors
-/// If stdout is closed or full.
 pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
     let shells = Shells::builtins();
@@ -22,9 +19,6 @@ pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Cod
 }
 
 /// Writes the manual page: the program, then each of its commands.
-///
-/// # Errors
-/// If stdout is closed or full.
 pub(crate) fn man(output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
     let command = Args::command();

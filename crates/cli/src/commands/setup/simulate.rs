@@ -1,12 +1,11 @@
 //! `simulate`: simulates a fleet with known gaps.
 
-use pipeline::Event;
 use pipeline::inspect::simulate as fleet;
 
 use crate::args::SimulateArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress;
 use crate::row_output;
 use crate::table::count;
 
@@ -29,30 +28,12 @@ pub(crate) fn simulate(args: &SimulateArgs, output: &Output) -> Result<Code, Fai
     let spec = fleet::spec(args.spec.as_deref(), args.seed)?;
     std::fs::create_dir_all(&args.output)?;
     let jobs = args.jobs.map(usize::from);
-    let logs = with_progress(output, |watch| fleet::simulate(&spec, &args.output, jobs, watch))?;
+    let logs =
+        progress::shown("simulate", output, |watch| fleet::simulate(&spec, &args.output, jobs, watch))?;
     let (folder, count) = (display_path(&args.output), count(logs, "log"));
     output.write_result(&format!(
         "{count} in {folder}, with their tables, truth.parquet and pipeline.toml\n"
     ))?;
     output.note(&format!("next: freeplay run --config {folder}/pipeline.toml"));
     Ok(Code::Success)
-}
-
-/// Simulates with a progress bar, one step for each log.
-///
-/// # Errors
-/// Those of the simulation.
-pub(crate) fn with_progress(
-    output: &Output,
-    simulate: impl FnOnce(&(dyn Fn(Event) + Sync)) -> Result<usize, pipeline::Error>,
-) -> Result<usize, Failure> {
-    let progress = Progress::new("simulate", output);
-    let watch = |event: Event| match event {
-        Event::Planned { logs, .. } => progress.total(logs),
-        Event::Finished { log, .. } => progress.finished(&log, 0, 0),
-        _ => {}
-    };
-    let logs = simulate(&watch);
-    progress.end();
-    Ok(logs?)
 }

@@ -14,9 +14,6 @@ use crate::row_output;
 use crate::table::{self, count, number, or_dash, text, unit_name};
 
 /// Lists alerts.
-///
-/// # Errors
-/// If the store cannot be read.
 pub(crate) fn alerts(
     store: &Store,
     is_unsent: bool,
@@ -79,9 +76,6 @@ pub(crate) fn drop_unsent(
 }
 
 /// Makes an unconfirmed alert due again.
-///
-/// # Errors
-/// If the store cannot be read or written, or no message with the identifier is unconfirmed.
 pub(crate) fn resend(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
     let mut writer = store.lock(&Holder::this_process(), None)?;
     let mut rows = store.alerts()?;

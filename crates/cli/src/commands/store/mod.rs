@@ -25,9 +25,6 @@ use crate::commands::context::load_config;
 use crate::commands::results::query;
 
 /// Runs a command on the configured store.
-///
-/// # Errors
-/// If configuration or store cannot be read or written.
 pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let config = load_config(global)?;
     let store = Store::open(config.store())?;

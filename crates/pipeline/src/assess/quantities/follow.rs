@@ -445,12 +445,7 @@ fn of_common(
     let (from, size) = (median(from), median(size));
     let change_se = member(first).fit.as_ref().map_or(f64::NAN, |fit| fit.steps[first.step].size_se);
     let of_tail = step.scope == ChangeScope::Tail;
-    let mut positions: Vec<String> = if of_tail {
-        step.members.iter().filter_map(|m| member(m).position()).map(str::to_owned).collect()
-    } else {
-        Vec::new()
-    };
-    positions.sort();
+    let members = step.members.iter().filter(|_| of_tail).map(member);
     let flight = facts
         .flight_id(member(first).name, step.departure_us)
         .map(|f| format!(", flight {f}"))
@@ -463,7 +458,7 @@ fn of_common(
         part_number: (!of_tail).then(|| step.name.clone()),
         tail_number: of_tail.then(|| step.name.clone()),
         serial_number: None,
-        positions,
+        positions: positions(members),
         units: step.members.len() as i64,
         units_able: step.able as i64,
         since_utc,
@@ -484,6 +479,13 @@ fn of_common(
     }
 }
 
+/// The positions of some units, in order.
+fn positions<'s>(units: impl Iterator<Item = &'s Subject<'s>>) -> Vec<String> {
+    let mut positions: Vec<String> = units.filter_map(Subject::position).map(str::to_owned).collect();
+    positions.sort();
+    positions
+}
+
 /// A drift that the units of a tail share.
 fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Quantity) -> QuantityChange {
     let known: Vec<(&Subject<'_>, &QuantityChanges)> =
@@ -494,15 +496,12 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
     );
     let shares: Vec<f64> = known.iter().map(|(s, f)| f.change / s.scale).collect();
     let middle = |values: &[QuantityValue]| values.get(values.len() / 2).and_then(|v| utc(v.departure_us));
-    let mut positions: Vec<String> =
-        known.iter().filter_map(|(s, _)| s.position()).map(str::to_owned).collect();
-    positions.sort();
     QuantityChange {
         quantity: quantity.as_str(),
         scope: ChangeScope::Tail.as_str(),
         kind: "drift",
         tail_number: Some(tail.to_owned()),
-        positions,
+        positions: positions(known.iter().map(|(subject, _)| *subject)),
         units: known.len() as i64,
         units_able: known.len() as i64,
         since_utc: known.first().and_then(|(s, _)| middle(&s.values)).unwrap_or_default(),

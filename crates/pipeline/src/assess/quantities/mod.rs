@@ -4,9 +4,9 @@
 //! records ─values→ series of units ─follow→ steps and drift ─attribution→ unit, tail or part ─→ rows and changes
 //! ```
 
-pub mod attribution;
+mod attribution;
 pub mod follow;
-pub mod limits;
+mod limits;
 pub(crate) mod peers;
-pub mod subject;
-pub mod values;
+mod subject;
+pub(crate) mod values;

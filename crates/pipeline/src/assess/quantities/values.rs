@@ -68,9 +68,6 @@ impl UnitValues {
 pub(crate) type FleetValues = BTreeMap<UnitKey, UnitValues>;
 
 /// Reads the values of the last three years before a time, with it.
-///
-/// # Errors
-/// When the store cannot be read.
 pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error> {
     let query = Query {
         since_utc: until.checked_sub(WINDOW).ok(),

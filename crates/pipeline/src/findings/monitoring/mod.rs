@@ -2,7 +2,7 @@
 
 pub mod coverage;
 pub mod mapping_faults;
-pub mod recent;
+pub(crate) mod recent;
 pub mod recorder_change;
 pub mod repeated_samples;
 

@@ -17,35 +17,30 @@ const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 
 /// One flight of one place.
 #[derive(Debug, Clone, Default, PartialEq)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct FlightDiagnostics {
-    pub departure_utc: Timestamp,
-    pub flight_id: Box<str>,
-    pub nis: Option<f64>,
+pub(crate) struct FlightDiagnostics {
+    pub(crate) departure_utc: Timestamp,
+    pub(crate) flight_id: Box<str>,
+    pub(crate) nis: Option<f64>,
     /// Stiffness fitted in the flight, N/m.
-    pub stiffness_n_per_m: Option<f64>,
+    pub(crate) stiffness_n_per_m: Option<f64>,
     /// Rejection code of a flight without a gap.
-    pub rejection: Option<Box<str>>,
+    pub(crate) rejection: Option<Box<str>>,
 }
 
 /// Where which unit sits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct PositionKey {
-    pub tail_number: String,
-    pub position: String,
-    pub part_number: String,
-    pub serial_number: String,
+pub(crate) struct PositionKey {
+    pub(crate) tail_number: String,
+    pub(crate) position: String,
+    pub(crate) part_number: String,
+    pub(crate) serial_number: String,
 }
 
 /// Flights of a unit at one position, by departure.
-pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
+pub(crate) type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 
 /// The last months until a time, with it.
-///
-/// # Errors
-/// When the store cannot be read.
-pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
+pub(crate) fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
     const COLUMNS: [&str; 10] = [
         "tail_number",
         "position",

@@ -76,9 +76,6 @@ pub(crate) struct InspectionIndex(HashMap<String, Vec<InspectionRow>>);
 
 impl InspectionIndex {
     /// The configured inspections.
-    ///
-    /// # Errors
-    /// As [`read`].
     pub(crate) fn read(config: &Config) -> Result<Self, Error> {
         let mut rows = read(config)?.unwrap_or_default();
         rows.sort_by_key(|row| row.date_utc);

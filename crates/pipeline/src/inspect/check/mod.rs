@@ -36,8 +36,8 @@ pub struct LogCheck {
     /// Its channels.
     pub channels: Vec<ChannelCheck>,
     diagnostics: Vec<Diagnostic>,
-    identified: Vec<(PartNumber, IdentifiedParams)>,
-    rejections: Vec<(PartNumber, Option<&'static str>)>,
+    /// Parameters and rejection of each actuator.
+    identified: Vec<(PartNumber, IdentifiedParams, Option<&'static str>)>,
 }
 
 /// What was found in logs.
@@ -94,11 +94,9 @@ pub fn check_logs(
     }
     let mut rejections: BTreeMap<PartNumber, Vec<Option<&'static str>>> = BTreeMap::new();
     for log in &mut seen.logs {
-        for (part, found) in log.identified.drain(..) {
+        for (part, found, rejection) in log.identified.drain(..) {
+            rejections.entry(part.clone()).or_default().push(rejection);
             seen.identified.entry(part).or_default().push(found);
-        }
-        for (part, found) in log.rejections.drain(..) {
-            rejections.entry(part).or_default().push(found);
         }
     }
     seen.mapping_faults = rejections.iter().filter_map(mapping_fault).collect();
@@ -137,8 +135,7 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
                     let unlike = identified.stiffness_n_per_m.zip(configured);
                     let unlike = unlike.filter(|(fitted, own)| rejection::is_stiffness_unlike(*fitted, *own));
                     let code = refused.or(unlike.map(|_| rejection::STIFFNESS_UNLIKE));
-                    seen.rejections.push((part.clone(), code));
-                    seen.identified.push((part, identified));
+                    seen.identified.push((part, identified, code));
                 }
             }
             // A fault of the whole log is reported for each of its actuators.
