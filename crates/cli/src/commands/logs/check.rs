@@ -45,7 +45,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     let table = || {
         format!(
             "{page}{}{}{}",
-            ColumnTypes::of(&seen.logs).drift(),
+            drift(&seen.logs),
             proposals(&seen.identified, &config),
             summary(count, &channels, &seen.diagnostics)
         )
@@ -183,60 +183,36 @@ fn layout(channels: &[ChannelCheck]) -> String {
     table::of(channels, columns)
 }
 
-/// Column types by log, to find columns whose type changes between logs.
-#[derive(Default)]
-struct ColumnTypes {
-    logs: usize,
-    /// Column → type → number of logs, and the first of them.
-    columns: BTreeMap<String, BTreeMap<String, (usize, String)>>,
-}
-
-impl ColumnTypes {
-    fn of(logs: &[LogCheck]) -> Self {
-        let mut types = Self::default();
-        logs.iter().for_each(|log| types.enter(&log.name, &log.column_types));
-        types
-    }
-
-    fn enter(&mut self, log: &str, columns: &[(String, String)]) {
-        self.logs += 1;
-        for (name, kind) in columns {
-            let seen = self.columns.entry(name.clone()).or_default();
-            seen.entry(kind.clone()).or_insert_with(|| (0, log.to_owned())).0 += 1;
+/// Lists columns that are missing or have another type in some logs; each log is read with its own types.
+fn drift(logs: &[LogCheck]) -> String {
+    const SHOWN: usize = 12;
+    // Column → type → number of logs, and the first of them.
+    let mut columns = BTreeMap::<&str, BTreeMap<&str, (usize, &str)>>::new();
+    for log in logs {
+        for (name, kind) in &log.column_types {
+            columns.entry(name).or_default().entry(kind).or_insert((0, &log.name)).0 += 1;
         }
     }
-
-    /// Lists columns that are missing or have another type in some logs; each log is read with its own types.
-    fn drift(&self) -> String {
-        const SHOWN: usize = 12;
-        let differs = |kinds: &BTreeMap<String, (usize, String)>| {
-            kinds.len() > 1 || kinds.values().any(|(count, _)| *count < self.logs)
-        };
-        let lines: Vec<String> = self
-            .columns
-            .iter()
-            .filter(|(_, kinds)| differs(kinds))
-            .map(|(name, kinds)| {
-                let kinds: Vec<String> = kinds
-                    .iter()
-                    .map(|(kind, (count, first))| format!("{kind} in {count} (first {first})"))
-                    .collect();
-                format!("  {}\n", escape(&format!("`{name}`: {}", kinds.join(", "))))
-            })
-            .collect();
-        if lines.is_empty() {
-            return String::new();
-        }
-        let more = match lines.len().saturating_sub(SHOWN) {
-            0 => String::new(),
-            n => format!("  and {n} more columns\n"),
-        };
-        let shown: String = lines.into_iter().take(SHOWN).collect();
-        format!(
-            "columns that are missing or whose type differs between {} logs (each log is read with its own types):\n{shown}{more}",
-            self.logs
-        )
+    columns.retain(|_, kinds| kinds.len() > 1 || kinds.values().any(|(count, _)| *count < logs.len()));
+    let line = |(name, kinds): (&str, BTreeMap<&str, (usize, &str)>)| {
+        let kind =
+            |(kind, (count, first)): (&str, (usize, &str))| format!("{kind} in {count} (first {first})");
+        let kinds: Vec<String> = kinds.into_iter().map(kind).collect();
+        format!("  {}\n", escape(&format!("`{name}`: {}", kinds.join(", "))))
+    };
+    let lines: Vec<String> = columns.into_iter().map(line).collect();
+    if lines.is_empty() {
+        return String::new();
     }
+    let more = match lines.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        n => format!("  and {n} more columns\n"),
+    };
+    let shown: String = lines.into_iter().take(SHOWN).collect();
+    format!(
+        "columns that are missing or whose type differs between {} logs (each log is read with its own types):\n{shown}{more}",
+        logs.len()
+    )
 }
 
 /// Compares the parameters identified from the logs with the configured ones, by part number.

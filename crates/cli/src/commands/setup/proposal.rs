@@ -141,9 +141,7 @@ fn variants(sample: Vec<PathBuf>) -> Result<Vec<Variant>, Failure> {
             }
         };
         if offer.tails.is_empty() {
-            offer
-                .tails
-                .extend(folder_of(&log, &offer, IdentityField::TailNumber).or_else(|| path_tail(&log)));
+            offer.tails.extend(tail_of(&log, &offer));
         }
         let one = Variant { offer, log, logs: 1 };
         match found.iter_mut().find(|known| known.mapped() == one.mapped()) {
