@@ -2,21 +2,13 @@
 
 use trend::{Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess};
 
+use crate::histories::{self, DAY_US};
 use crate::random::Random;
-
-const DAY_US: i64 = 86_400_000_000;
 
 /// A unit that flies 2 h a day.
 fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
-    let rows = (0..days).map(|day| Observation {
-        departure_us: day * DAY_US,
-        flight_hours: Some(2.0),
-        tail_hours_end: Some(2.0 * (day + 1) as f64),
-        load_reversals: Some(100),
-        gap_m: Some((gap_um(2.0 * (day + 1) as f64) + Random::new(day as u64).normal()) * 1e-6),
-        gap_se_m: Some(1e-6),
-        ..Observation::default()
-    });
+    let measured_um = |day: i64| gap_um(2.0 * (day + 1) as f64) + Random::new(day as u64).normal();
+    let rows = (0..days).map(|day| histories::row(day, DAY_US, 2.0, measured_um(day), 1.0));
     Series::new(rows, &UsageDefaults { unit_hours_at_start: Some(0.0), ..UsageDefaults::default() }).unwrap()
 }
 
@@ -67,6 +59,11 @@ fn silence_clears_no_alarm() {
             "{silent:?}"
         );
     }
+    // The last flight of a calm unit departs on day 399, and a record is stale after 30 days.
+    let calm = unit(400, |h| 20.0 + 0.02 * h);
+    assert_eq!((state_of(&calm, 429).state, state_of(&calm, 430).state), (State::Normal, State::Unassessed));
+    let text = state_of(&calm, 430).reason.to_string();
+    assert!(text.starts_with("no sound record for 31 days"), "{text}");
 }
 
 #[test]
@@ -111,16 +108,11 @@ fn a_repair_is_on_record_whatever_the_number_of_flights_without_a_log() {
     const HOUR_US: i64 = 3_600_000_000;
     let row = |flight: i64| {
         let um = if flight < 300 { 90.0 } else { 20.0 } + 0.2 * (1.7 * flight as f64).sin();
-        Observation {
-            departure_us: 8 * HOUR_US * flight,
-            flight_hours: Some(2.0),
-            gap_m: (flight % 10 == 0).then_some(um * 1e-6),
-            gap_se_m: (flight % 10 == 0).then_some(0.3e-6),
-            ..Observation::default()
-        }
+        let row = histories::row(flight, 8 * HOUR_US, 2.0, um, 0.3);
+        Observation { gap_m: row.gap_m.filter(|_| flight % 10 == 0), ..row }
     };
     let repair = trend::MaintenanceEvent { utc_us: 8 * HOUR_US * 285, renews: true };
-    let series = Series::new((0..600).map(row), &UsageDefaults::default()).unwrap();
+    let series = histories::series((0..600).map(row));
     let settings = Settings::for_limit(150e-6);
     let with = series.clone().with_maintenance(vec![repair]);
     let resets = |series: &Series| {

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use trend::{ChangePointKind, Observation, Series, UnitOnTail, UsageDefaults, assess, tail_wide_steps};
+use trend::{Series, UnitOnTail, assess, tail_wide_steps};
 
-use crate::histories::{DAY_US, settings};
+use crate::histories::{self, DAY_US, settings};
 use crate::random::Random;
 
 /// A unit whose neighbouring flights share most of their error, with a step every few hundred flights.
@@ -14,15 +14,10 @@ fn unit(seed: u64, flights: i64, rho: f64, step_um: f64) -> Series {
     let row = |flight: i64| {
         error_um = rho * error_um + (1.0 - rho * rho).sqrt() * random.normal();
         let stepped_um = step_um * ((flight / 300) % 2) as f64;
-        Observation {
-            departure_us: flight * DAY_US / 2,
-            flight_hours: Some(2.0),
-            gap_m: Some((40.0 + 0.002 * flight as f64 + stepped_um + error_um) * 1e-6),
-            gap_se_m: Some(1e-6),
-            ..Observation::default()
-        }
+        let gap_um = 40.0 + 0.002 * flight as f64 + stepped_um + error_um;
+        histories::row(flight, DAY_US / 2, 2.0, gap_um, 1.0)
     };
-    Series::new((0..flights).map(row), &UsageDefaults::default()).unwrap()
+    histories::series((0..flights).map(row))
 }
 
 /// Shortest of several times of two works, which take turns, s.
@@ -56,40 +51,6 @@ fn time_grows_in_proportion_to_flights() {
         println!("{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}", short * 50.0, long * 50.0);
         assert!(exponent <= 1.5, "{name}: {exponent}");
     }
-}
-
-/// Tails of four units that all step by 15 µm at flight 60: one finding for each tail, and four times the units take four
-/// times the time. A scan of the fleet for each step takes sixteen times.
-#[test]
-fn time_grows_in_proportion_to_units_whose_tails_step() {
-    let unit = |seed: u64| {
-        let mut random = Random::new(seed);
-        let row = |flight: i64| Observation {
-            departure_us: flight * DAY_US / 2,
-            flight_hours: Some(2.0),
-            gap_m: Some((40.0 + if flight < 60 { 0.0 } else { 15.0 } + random.normal()) * 1e-6),
-            gap_se_m: Some(1e-6),
-            ..Observation::default()
-        };
-        Series::new((0..120).map(row), &UsageDefaults::default()).unwrap()
-    };
-    let fleets = [125, 500].map(|units| (0..units).map(unit).collect::<Vec<_>>());
-    let mut found = [0, 0];
-    let [small, large] = shortest(|of| {
-        let on_tail = |series: &Series| {
-            let changes = assess(series, i64::MAX / 2, &settings(), None).unwrap().changes;
-            let steps = changes.iter().filter(|change| change.kind == ChangePointKind::Step);
-            let steps = steps.map(|change| (change.departure_us, change.step_m)).collect();
-            UnitOnTail { first_us: 0, last_us: 119 * DAY_US / 2, steps }
-        };
-        let units: Vec<UnitOnTail> = fleets[of].iter().map(on_tail).collect();
-        found[of] = units.chunks(4).map(|tail| tail_wide_steps(tail).len()).sum();
-    });
-    // The last tail of 125 units has one, which makes no step together.
-    assert_eq!(found, [31, 125]);
-    let exponent = (large / small).log(4.0);
-    println!("units whose tails step: {:.0} ms, {:.0} ms, exponent {exponent:.2}", small * 1e3, large * 1e3);
-    assert!(exponent <= 1.5, "{exponent}");
 }
 
 /// One tail with a step of all of its four units every ten days: four times the steps take four times the time.

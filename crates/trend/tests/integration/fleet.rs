@@ -2,12 +2,12 @@
 
 use trend::{
     Assessment, ChangePoint, ChangePointKind, Executor, FleetPrior, MaintenanceEvent, Observation, Series,
-    Settings, UsageAxis, UsageDefaults, WearStatus, assess,
+    Settings, UsageAxis, WearStatus, assess,
 };
 
+use crate::histories::{self, DAY_US, series};
 use crate::random::Random;
 
-const DAY_US: i64 = 86_400_000_000;
 const LIMIT_M: f64 = 1e-4;
 
 /// Share of the life's growth at a share of the life.
@@ -27,7 +27,7 @@ const STRANGE: [WearLaw; 4] = [
 
 /// A unit of two flights a day at 1.7 h, four in five of which leave an estimate.
 struct Unit {
-    series: Series,
+    rows: Vec<Observation>,
     /// True hours at which the gap meets the limit, from the first flight.
     crossing_hours: f64,
     life_hours: f64,
@@ -53,20 +53,13 @@ fn unit(seed: u64, law: WearLaw, flights: i64) -> Unit {
         if flight < flights && random.uniform() < 0.8 {
             let se_um = random.between(1.5, 4.0);
             let outlier = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
-            rows.push(Observation {
-                departure_us: flight * DAY_US / 2,
-                flight_hours: Some(1.7),
-                tail_hours_end: Some(hours),
-                load_reversals: Some(150),
-                gap_m: Some((gap_um + se_um * random.normal() + outlier) * 1e-6),
-                gap_se_m: Some(se_um * 1e-6),
-                ..Observation::default()
-            });
+            let measured_um = gap_um + se_um * random.normal() + outlier;
+            rows.push(histories::row(flight, DAY_US / 2, 1.7, measured_um, se_um));
         } else if flight >= flights && crossing_hours.is_finite() {
             break;
         }
     }
-    Unit { series: Series::new(rows, &UsageDefaults::default()).unwrap(), crossing_hours, life_hours }
+    Unit { rows, crossing_hours, life_hours }
 }
 
 fn assessment(series: &Series, as_of_us: i64, prior: Option<&FleetPrior>) -> Assessment {
@@ -86,20 +79,8 @@ fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
     for share in shares {
         // Every unit cut at its own share of life, so that the prior has seen no crossing.
         let day = |u: &Unit| day_of(share * u.crossing_hours.min(2.0 * u.life_hours));
-        let cut = |u: &Unit| {
-            let known = u.series.flights_until(day(u) * DAY_US);
-            let row = |f: &trend::series::Flight| Observation {
-                departure_us: f.departure_us,
-                installation: f.installation,
-                flight_hours: Some(1.7),
-                tail_hours_end: Some(f.hours),
-                load_reversals: Some(150),
-                gap_m: f.gap.map(|g| g.gap_m),
-                gap_se_m: f.gap.map(|g| g.se_m),
-                is_doubtful: false,
-            };
-            Series::new(known.iter().map(row), &UsageDefaults::default()).unwrap()
-        };
+        let is_known = |u: &Unit, row: &Observation| row.departure_us <= day(u) * DAY_US;
+        let cut = |u: &Unit| series(u.rows.iter().copied().filter(|row| is_known(u, row)));
         let known: Vec<Series> = fleet.iter().map(cut).collect();
         let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M, None);
         for (unit, series) in fleet.iter().zip(&known) {
@@ -142,39 +123,23 @@ fn rows(seed: u64, change_um: impl Fn(i64, f64) -> f64) -> Vec<Observation> {
     (0..500)
         .map(|flight| {
             let hours = 1.7 * (flight + 1) as f64;
-            Observation {
-                departure_us: flight * DAY_US / 2,
-                flight_hours: Some(1.7),
-                tail_hours_end: Some(hours),
-                load_reversals: Some(150),
-                gap_m: Some((change_um(flight, 20.0 + 0.01 * hours) + 2.0 * random.normal()) * 1e-6),
-                gap_se_m: Some(2e-6),
-                ..Observation::default()
-            }
+            let gap_um = change_um(flight, 20.0 + 0.01 * hours) + 2.0 * random.normal();
+            histories::row(flight, DAY_US / 2, 1.7, gap_um, 2.0)
         })
         .collect()
 }
 
 fn changes(rows: Vec<Observation>) -> Vec<ChangePoint> {
-    assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None).changes
-}
-
-#[test]
-fn a_re_shim_is_a_reset_found_at_its_flight() {
-    let found = changes(rows(1, |flight, gap| if flight < 300 { gap + 30.0 } else { gap - 5.0 }));
-    let [change] = found[..] else { panic!("{found:?}") };
-    assert_eq!(change.kind, ChangePointKind::Reset);
-    assert!((change.departure_us - 150 * DAY_US).abs() <= DAY_US, "{change:?}");
-    assert!((change.step_m + 35e-6).abs() < 2e-6, "{change:?}");
+    assessment(&series(rows), 250 * DAY_US, None).changes
 }
 
 #[test]
 fn a_rise_that_no_record_explains_is_a_step_and_stays_in_the_level() {
-    let series = |rise_um: f64| {
+    let risen = |rise_um: f64| {
         let rows = rows(2, |flight, gap| if flight < 200 { gap } else { gap + rise_um });
-        assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None)
+        assessment(&series(rows), 250 * DAY_US, None)
     };
-    let (moved, still) = (series(9.0), series(0.0));
+    let (moved, still) = (risen(9.0), risen(0.0));
     assert_eq!(moved.changes.iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangePointKind::Step]);
     let off_m = moved.level.unwrap().gap_m - still.level.unwrap().gap_m - 9e-6;
     assert!(off_m.abs() < 2e-6, "{off_m:e}");
@@ -201,25 +166,19 @@ fn wear_that_begins_late_is_an_onset_and_no_step() {
 
 #[test]
 fn units_that_do_not_wear_are_seldom_called_wearing() {
-    let wearing = (0..60)
-        .filter(|&seed| {
-            let rows = rows(1000 + seed, |_, _| 20.0);
-            assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None).wear
-                == WearStatus::Wearing
-        })
-        .count();
+    let wear = |seed: u64| assessment(&series(rows(1000 + seed, |_, _| 20.0)), 250 * DAY_US, None).wear;
+    let wearing = (0..60).filter(|&seed| wear(seed) == WearStatus::Wearing).count();
     assert!(wearing <= 2, "{wearing} of 60");
 }
 
 #[test]
 fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units() {
-    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 800)).collect();
-    let day = 200 * DAY_US;
-    let whole = FleetPrior::learn(fleet.iter().map(|u| &u.series), day, LIMIT_M, None);
-    let reversed = FleetPrior::learn(fleet.iter().rev().map(|u| &u.series), day, LIMIT_M, None);
+    let fleet = |flights| (0..6).map(move |seed| series(unit(seed, |t| t, flights).rows));
+    let learned = |fleet: &[Series]| FleetPrior::learn(fleet, 200 * DAY_US, LIMIT_M, None);
+    let whole = learned(&fleet(800).collect::<Vec<_>>());
+    let reversed = learned(&fleet(800).rev().collect::<Vec<_>>());
     assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
-    let short: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 401)).collect();
-    let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M, None);
+    let cut = learned(&fleet(401).collect::<Vec<_>>());
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
 }
 
@@ -240,11 +199,10 @@ impl Executor for Backwards {
 
 #[test]
 fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
-    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 400)).collect();
-    let series = || fleet.iter().map(|u| &u.series);
+    let fleet: Vec<Series> = (0..6).map(|seed| series(unit(seed, |t| t, 400).rows)).collect();
     let day = 200 * DAY_US;
-    let in_turn = FleetPrior::learn(series(), day, LIMIT_M, None);
-    let apart = FleetPrior::learn_with(series(), day, LIMIT_M, None, &Backwards);
+    let in_turn = FleetPrior::learn(&fleet, day, LIMIT_M, None);
+    let apart = FleetPrior::learn_with(&fleet, day, LIMIT_M, None, &Backwards);
     assert_eq!(format!("{in_turn:?}"), format!("{apart:?}"));
 }
 
@@ -254,15 +212,13 @@ fn a_booked_re_shim_is_the_books_own_and_begins_the_unit_anew() {
     let at = 300;
     let fell = rows(11, |flight, gap| if flight < at { gap + 30.0 } else { gap + 22.0 });
     let departure_us = fell[at as usize].departure_us;
-    let assessment = |renews: Option<bool>| {
+    let booked = |renews: Option<bool>| {
         let maintenance = renews.map(|renews| MaintenanceEvent { utc_us: departure_us - 1, renews });
-        let series = Series::new(fell.clone(), &UsageDefaults::default())
-            .unwrap()
-            .with_maintenance(maintenance.into_iter().collect());
-        assess(&series, 250 * DAY_US, &Settings::for_limit(LIMIT_M), None).unwrap()
+        let series = series(fell.clone()).with_maintenance(maintenance.into_iter().collect());
+        assessment(&series, 250 * DAY_US, None)
     };
     let kinds = |trend: &Assessment| trend.changes.iter().map(|c| c.kind).collect::<Vec<_>>();
-    let (single_unit, rigged, renewed) = (assessment(None), assessment(Some(false)), assessment(Some(true)));
+    let (single_unit, rigged, renewed) = (booked(None), booked(Some(false)), booked(Some(true)));
     assert!(!kinds(&single_unit).contains(&ChangePointKind::Recorded), "{:?}", single_unit.changes);
     assert_eq!(kinds(&rigged), [ChangePointKind::Recorded]);
     // The level is measured either way.
@@ -275,23 +231,14 @@ fn reshimmed(is_booked: bool) -> Vec<Series> {
     let one = |seed: u64| {
         let mut random = Random::new(seed + 500);
         let new_um = 20.0 + 2.0 * random.normal();
-        let rows: Vec<Observation> = (0..2 * HALF)
-            .map(|flight| {
-                let hours = 1.5 * (flight + 1) as f64;
-                let shim_um = if flight < HALF { 0.0 } else { 8.0 };
-                Observation {
-                    departure_us: flight * DAY_US,
-                    flight_hours: Some(1.5),
-                    tail_hours_end: Some(hours),
-                    gap_m: Some((new_um + 0.05 * hours - shim_um + 1.5 * random.normal()) * 1e-6),
-                    gap_se_m: Some(1.5e-6),
-                    ..Observation::default()
-                }
-            })
-            .collect();
+        let row = |flight: i64| {
+            let shim_um = if flight < HALF { 0.0 } else { 8.0 };
+            let gap_um = new_um + 0.075 * (flight + 1) as f64 - shim_um + 1.5 * random.normal();
+            Observation { load_reversals: None, ..histories::row(flight, DAY_US, 1.5, gap_um, 1.5) }
+        };
         let entry = MaintenanceEvent { utc_us: HALF * DAY_US - DAY_US / 2, renews: true };
         let maintenance = if is_booked { vec![entry] } else { Vec::new() };
-        Series::new(rows, &UsageDefaults::default()).unwrap().with_maintenance(maintenance)
+        series((0..2 * HALF).map(row)).with_maintenance(maintenance)
     };
     (0..30).map(one).collect()
 }

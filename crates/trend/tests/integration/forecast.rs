@@ -1,11 +1,10 @@
 //! The plotted forecast agrees with the assessment, and its level follows the true gap.
 
-use trend::series::Observation;
-use trend::{Crossing, Forecast, Series, Settings, UsageDefaults, assess, forecast};
+use trend::{Crossing, Forecast, Series, Settings, assess, forecast};
 
+use crate::histories::{self, DAY_US};
 use crate::random::Random;
 
-const DAY_US: i64 = 86_400_000_000;
 const HOURS: f64 = 2.0;
 const LIMIT_M: f64 = 60e-6;
 
@@ -15,14 +14,8 @@ fn true_um(day: i64) -> f64 {
 }
 
 fn series(days: i64) -> Series {
-    let row = |day| Observation {
-        departure_us: day * DAY_US,
-        flight_hours: Some(HOURS),
-        gap_m: Some((true_um(day) + Random::new(day as u64).normal()) * 1e-6),
-        gap_se_m: Some(1e-6),
-        ..Observation::default()
-    };
-    Series::new((0..days).map(row), &UsageDefaults::default()).unwrap()
+    let measured_um = |day| true_um(day) + Random::new(day as u64).normal();
+    histories::series((0..days).map(|day| histories::row(day, DAY_US, HOURS, measured_um(day), 1.0)))
 }
 
 fn drawn(days: i64, hours: &[f64]) -> (Crossing, Forecast) {

@@ -3,26 +3,17 @@
 use trend::{FleetPrior, Observation, Series, Settings, UsageDefaults, assess, forecast};
 
 use self::edits::number;
+use crate::histories::{self, DAY_US, series};
 
 #[path = "../../../../tests/fuzz/edits.rs"]
 mod edits;
-
-const DAY_US: i64 = 86_400_000_000;
 
 /// Bytes of one change to a row.
 const EDIT: usize = 12;
 
 fn wearing(flights: i64) -> Vec<Observation> {
-    let flight = |day: i64| Observation {
-        departure_us: day * DAY_US,
-        flight_hours: Some(1.5),
-        tail_hours_end: Some(1.5 * (day + 1) as f64),
-        load_reversals: Some(100),
-        gap_m: Some(30e-6 + 2e-7 * day as f64 + 1e-6 * (day as f64).sin()),
-        gap_se_m: Some(1e-6),
-        ..Observation::default()
-    };
-    (0..flights).map(flight).collect()
+    let gap_um = |day: i64| 30.0 + 0.2 * day as f64 + (day as f64).sin();
+    (0..flights).map(|day| histories::row(day, DAY_US, 1.5, gap_um(day), 1.0)).collect()
 }
 
 /// Rows, settings and date after the changes that the bytes describe.
@@ -71,8 +62,7 @@ fn changed(bytes: &[u8]) -> (Vec<Observation>, Settings, UsageDefaults, i64) {
 fn assess_any(bytes: &[u8]) {
     let (rows, settings, usage, as_of_us) = changed(bytes);
     let Ok(series) = Series::new(rows, &usage) else { return };
-    let fleet: Vec<Series> =
-        [40, 90].map(|n| Series::new(wearing(n), &UsageDefaults::default()).unwrap()).into();
+    let fleet = [40, 90].map(|n| histories::series(wearing(n)));
     let prior = bytes
         .len()
         .is_multiple_of(2)
@@ -99,7 +89,7 @@ fn extreme_dates_and_horizons_leave_numbers() {
     let mut rows = wearing(100);
     rows[0].departure_us = i64::MIN;
     rows[99].departure_us = i64::MAX;
-    let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+    let series = series(rows);
     let plain = Settings::for_limit(1e-4);
     for (as_of_us, horizon_hours) in [(i64::MAX, 20_000.0), (99 * DAY_US, 0.5), (99 * DAY_US, 1.0), (0, 1e-3)]
     {

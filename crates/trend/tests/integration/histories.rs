@@ -11,6 +11,24 @@ pub(crate) const LIMIT_UM: f64 = 150.0;
 /// Hours of a flight.
 pub(crate) const HOURS: f64 = 2.0;
 
+/// A flight of a unit that departs once in a period and has an hour meter; its gap and the stated error, µm.
+pub(crate) fn row(number: i64, period_us: i64, hours: f64, gap_um: f64, error_um: f64) -> Observation {
+    Observation {
+        departure_us: number * period_us,
+        flight_hours: Some(hours),
+        tail_hours_end: Some(hours * (number + 1) as f64),
+        load_reversals: Some(150),
+        gap_m: Some(gap_um * 1e-6),
+        gap_se_m: Some(error_um * 1e-6),
+        ..Observation::default()
+    }
+}
+
+/// The unit of some flights, with the usual defaults.
+pub(crate) fn series(rows: impl IntoIterator<Item = Observation>) -> Series {
+    Series::new(rows, &UsageDefaults::default()).unwrap()
+}
+
 /// A history that is being drawn.
 pub(crate) struct Drawn {
     random: Random,
@@ -54,6 +72,12 @@ impl Drawn {
         for k in 0..count {
             self.log(gap_um((k + 1) as f64 / count as f64));
         }
+    }
+
+    /// So many logs by chance, of a gap that grows from one value to another.
+    pub(crate) fn some_logs(&mut self, least: usize, most: usize, gap_um: impl Fn(f64) -> f64) {
+        let count = self.count(least, most);
+        self.logs(count, gap_um);
     }
 
     /// Flags the last records.
@@ -105,8 +129,7 @@ impl Drawn {
     }
 
     pub(crate) fn series(&self) -> Series {
-        let series = Series::new(self.rows.iter().copied(), &UsageDefaults::default()).unwrap();
-        series.with_maintenance(self.maintenance.clone())
+        series(self.rows.clone()).with_maintenance(self.maintenance.clone())
     }
 
     /// The state that the last records of the present installation call for by the two plain rules, at least.

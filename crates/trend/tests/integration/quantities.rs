@@ -5,9 +5,8 @@ use trend::quantity::changes::{self, QuantityChanges};
 use trend::quantity::common_curve::CommonCurve;
 use trend::quantity::covariates::Slopes;
 
+use crate::histories::DAY_US;
 use crate::random::Random;
-
-const DAY_US: i64 = 86_400_000_000;
 
 /// Flights at three a day, 2 h each, with a relative scatter and an autocorrelation between neighbours.
 fn flights(random: &mut Random, count: usize, scatter: f64, rho: f64) -> Vec<QuantityValue> {

@@ -1,10 +1,10 @@
 //! Lengths enter by the limit alone: a fleet of parts ten times as large gets the same results.
 
-use trend::{Assessment, FleetPrior, Observation, Series, Settings, UsageDefaults, assess};
+use trend::{Assessment, FleetPrior, Observation, Series, Settings, assess};
 
+use crate::histories::{self, DAY_US};
 use crate::random::Random;
 
-const DAY_US: i64 = 86_400_000_000;
 const LIMIT_M: f64 = 1e-4;
 const UNITS: u64 = 24;
 const DAYS: i64 = 260;
@@ -26,15 +26,12 @@ fn rows(seed: u64) -> Vec<Observation> {
             let outlier_um = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
             let measured_um = gap_um + rig_um + se_um * random.normal() + outlier_um;
             let installation = u32::from(seed.is_multiple_of(3) && flight > 200);
+            let row = histories::row(flight, DAY_US / 2, 1.7, measured_um, se_um);
             (random.uniform() < 0.8).then_some(Observation {
-                departure_us: flight * DAY_US / 2,
                 installation,
-                flight_hours: Some(1.7),
-                tail_hours_end: Some(1.7 * (flight + 1) as f64 + 5000.0 * f64::from(installation)),
-                load_reversals: Some(150),
-                gap_m: Some(measured_um * 1e-6),
-                gap_se_m: states_errors.then_some(se_um * 1e-6),
-                is_doubtful: false,
+                tail_hours_end: row.tail_hours_end.map(|hours| hours + 5000.0 * f64::from(installation)),
+                gap_se_m: row.gap_se_m.filter(|_| states_errors),
+                ..row
             })
         })
         .collect()
@@ -45,10 +42,9 @@ fn assessments(factor: f64) -> Vec<Assessment> {
     let scaled = |row: Observation| Observation {
         gap_m: row.gap_m.map(|m| factor * m),
         gap_se_m: row.gap_se_m.map(|m| factor * m),
-        is_doubtful: false,
         ..row
     };
-    let series = |seed| Series::new(rows(seed).into_iter().map(scaled), &UsageDefaults::default()).unwrap();
+    let series = |seed| histories::series(rows(seed).into_iter().map(scaled));
     let fleet: Vec<Series> = (0..UNITS).map(series).collect();
     let settings = Settings::for_limit(factor * LIMIT_M);
     let prior = FleetPrior::learn(&fleet, DAYS * DAY_US, settings.limit_m, None);

@@ -3,32 +3,26 @@
 use proptest::prelude::*;
 use trend::{Observation, Series, UsageDefaults};
 
+use crate::histories::{self, DAY_US};
+
 fn row(day: i64, installation: u32, hours: Option<f64>, meter: Option<f64>) -> Observation {
     Observation {
-        departure_us: day * 86_400_000_000,
         installation,
         flight_hours: hours,
         tail_hours_end: meter,
         load_reversals: Some(100),
-        gap_m: Some(1e-5),
-        gap_se_m: Some(1e-6),
-        is_doubtful: false,
+        ..histories::row(day, DAY_US, 2.0, 10.0, 1.0)
     }
 }
 
 fn hours(rows: &[Observation]) -> Vec<f64> {
-    Series::new(rows.iter().copied(), &UsageDefaults::default())
-        .unwrap()
-        .flights()
-        .iter()
-        .map(|f| f.hours)
-        .collect()
+    histories::series(rows.iter().copied()).flights().iter().map(|f| f.hours).collect()
 }
 
 #[test]
 fn flights_without_a_row_count_through_the_hour_meter() {
     let rows = [row(0, 1, Some(2.0), Some(102.0)), row(9, 1, Some(2.0), Some(112.0))];
-    let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+    let series = histories::series(rows);
     let last = series.flights()[1];
     // 2 h, then 8 h unseen and 2 h more: four flights of 2 h, hence four times 100 reversals, went unseen.
     assert_eq!((last.hours, last.flights, last.reversals), (12.0, 6.0, 600.0));
@@ -85,24 +79,24 @@ proptest! {
         (rows, shuffled) in prop::collection::vec(any_row(), 0..40)
             .prop_flat_map(|rows| (Just(rows.clone()), Just(rows).prop_shuffle()))
     ) {
-        let series = |rows: Vec<Observation>| format!("{:?}", Series::new(rows, &UsageDefaults::default()).unwrap());
+        let series = |rows: Vec<Observation>| format!("{:?}", histories::series(rows));
         prop_assert_eq!(series(rows), series(shuffled));
     }
 
     /// A backtest cuts a series; what is left must be what was known then.
     #[test]
     fn a_series_cut_at_a_day_is_the_series_of_that_day(rows in prop::collection::vec(any_row(), 0..40), day in 0_i64..30) {
-        let as_of_us = day * 86_400_000_000;
+        let as_of_us = day * DAY_US;
         let known = rows.iter().copied().filter(|r| r.departure_us <= as_of_us);
-        let then = Series::new(known, &UsageDefaults::default()).unwrap();
-        let now = Series::new(rows.iter().copied(), &UsageDefaults::default()).unwrap();
+        let then = histories::series(known);
+        let now = histories::series(rows.iter().copied());
         prop_assert_eq!(format!("{:?}", now.flights_until(as_of_us)), format!("{:?}", then.flights()));
     }
 
     /// Wear does not unhappen.
     #[test]
     fn usage_never_falls(rows in prop::collection::vec(any_row(), 0..40)) {
-        let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+        let series = histories::series(rows);
         for pair in series.flights().windows(2) {
             prop_assert!(pair[0].hours <= pair[1].hours && pair[0].flights < pair[1].flights && pair[0].reversals <= pair[1].reversals);
         }

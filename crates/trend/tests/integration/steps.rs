@@ -1,10 +1,10 @@
 //! Steps and resets: when they happened, how large they were.
 
-use trend::{Observation, Series, Settings, UsageDefaults, assess};
+use trend::{Observation, Series, Settings, assess};
 
+use crate::histories::{self, DAY_US};
 use crate::random::Random;
 
-const DAY_US: i64 = 86_400_000_000;
 const NOISE_UM: f64 = 1.0;
 
 /// A sparsely logged unit: one log in eleven days, in which it wears by `growth_um`, with a fall before a flight.
@@ -12,18 +12,12 @@ fn series(seed: u64, flights: i64, growth_um: f64, (at, fall_um): (i64, f64)) ->
     let mut random = Random::new(seed);
     let row = |flight: i64| {
         let gap_um = 30.0 + growth_um * flight as f64 - if flight < at { 0.0 } else { fall_um };
-        Observation {
-            departure_us: 11 * flight * DAY_US,
-            flight_hours: Some(2.0),
-            tail_hours_end: Some(44.0 * (flight + 1) as f64),
-            load_reversals: Some(100),
-            gap_m: Some((gap_um + NOISE_UM * random.normal()) * 1e-6),
-            gap_se_m: Some(NOISE_UM * 1e-6),
-            ..Observation::default()
-        }
+        let measured_um = gap_um + NOISE_UM * random.normal();
+        // Flights without a log are in the meter alone.
+        let row = histories::row(flight, 11 * DAY_US, 44.0, measured_um, NOISE_UM);
+        Observation { flight_hours: Some(2.0), ..row }
     };
-    let rows: Vec<Observation> = (0..flights).map(row).collect();
-    Series::new(rows, &UsageDefaults::default()).unwrap()
+    histories::series((0..flights).map(row))
 }
 
 /// Dates of at least 95 of 100 falls within one flight of where they happened, and sizes without the growth from one
