@@ -186,8 +186,9 @@ type Results = fn(&GearBenchLog) -> [f64; 2];
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
 fn gear_bench_table(rows: &[GearBenchLog]) -> String {
     let mut table = "| method | ramps | logs | phases | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|---|---|\n".to_owned();
-    let methods: [(&str, Results); 4] = [
+    let methods: [(&str, Results); 5] = [
         (METHODS[0], |g| g.contact_deg),
+        ("its loop width", |g| g.loop_deg),
         (METHODS[1], |g| g.midrange_deg),
         (METHODS[2], |g| g.lines_deg),
         (METHODS[3], |g| g.spread_deg),
@@ -202,6 +203,9 @@ fn gear_bench_table(rows: &[GearBenchLog]) -> String {
                 phase.1.push(of(gear)[k]);
             }
             let logs: usize = phases.values().map(|(_, found)| found.len()).sum();
+            if logs == 0 {
+                continue;
+            }
             let pairs: Vec<(f64, f64)> = phases
                 .into_values()
                 .map(|(play, found)| (play, found.iter().sum::<f64>() / found.len() as f64))

@@ -24,6 +24,8 @@ pub struct GearBenchLog {
     pub authors_deg: f64,
     /// Contact regression over the ramps to 4 N·m, and over all, those to 40 N·m included; NaN where it refuses.
     pub contact_deg: [f64; 2],
+    /// Loop width at zero load, over the same; NaN where there is none.
+    pub loop_deg: [f64; 2],
     /// The paper's statistic over the ramps to 4 N·m, and over all, those to 40 N·m included.
     pub midrange_deg: [f64; 2],
     /// Load lines, over the same.
@@ -99,11 +101,16 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
         let segment = 0..end;
         let samples = samples(step_s, [&motor_m, &dx_m, &load_n], &segment);
         let outcome = contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))?;
-        Ok::<f64, String>(outcome.map_or(f64::NAN, |found| (found.gap_m / RADIUS_M).to_degrees()))
+        let degrees = |length_m: Option<f64>| length_m.map_or(f64::NAN, |m| (m / RADIUS_M).to_degrees());
+        let found = outcome.ok();
+        let lengths_m = [found.as_ref().map(|found| found.gap_m), found.and_then(|found| found.loop_width_m)];
+        Ok::<[f64; 2], String>(lengths_m.map(degrees))
     };
+    let [[small_gap, small_loop], [whole_gap, whole_loop]] = [regression(parts[0])?, regression(parts[1])?];
     Ok(GearBenchLog {
         authors_deg,
-        contact_deg: [regression(parts[0])?, regression(parts[1])?],
+        contact_deg: [small_gap, whole_gap],
+        loop_deg: [small_loop, whole_loop],
         midrange_deg: [published(parts[0])?, published(parts[1])?],
         lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),
         spread_deg: parts.map(|end| spread_m(&dx_rad[..end]).to_degrees()),

@@ -59,7 +59,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
         median_and_error_m(inner.filter_map(|k| position(side, k)))
     };
     let (upper, lower) = (branch_m(1.0)?, branch_m(-1.0)?);
-    Some((upper.0 - lower.0, upper.1.hypot(lower.1)))
+    Some((upper.0 - lower.0, upper.1.hypot(lower.1).hypot(contact.unexplained_m)))
 }
 
 /// Lost motion at zero load, friction taken off, from the lightly loaded rows, which the straight fit never saw, m.

@@ -285,6 +285,41 @@ fn errors_periodic_in_position_become_terms() {
     assert!(found.gap_se_m < 0.7 * without.gap_se_m, "{found:?} against {without:?}");
 }
 
+/// A bench with a locked output whose motor ramps to ± 4000 N: the gap of each repeat, m, against dry friction of 300 N.
+fn bench(gaps_m: &[f64]) -> ContactEstimate {
+    let (stiffness_n_per_m, friction_n, step_s) = (5e7, 300.0, 0.01);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let (mut motor_m, mut load_n, mut coupling_n) = (Vec::new(), Vec::new(), 0.0_f64);
+    for (k, gap_m) in (0..400 * gaps_m.len()).map(|k| (k, gaps_m[k / 400])) {
+        let phase = (k % 400) as f64 / 100.0;
+        let ramp = if phase < 1.0 { phase } else { (2.0 - phase).max(phase - 4.0) };
+        // The motor moves as far as its force overcomes friction: what is left winds the coupling up.
+        coupling_n = coupling_n.clamp(4000.0 * ramp - friction_n, 4000.0 * ramp + friction_n);
+        let flank = if coupling_n == 0.0 { 0.0 } else { coupling_n.signum() };
+        motor_m.push(0.5 * flank * gap_m + coupling_n / stiffness_n_per_m + 1e-7 * rng.random_range(-1.0..1.0));
+        load_n.push(-4000.0 * ramp);
+    }
+    let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
+    let segments = [0..dx_m.len()];
+    let samples =
+        Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
+    let prior = PartPrior { output_locked: true, ..PartPrior::of_stiffness(stiffness_n_per_m) };
+    *contact::estimate(&samples, &prior).unwrap().unwrap()
+}
+
+/// By hand: at zero load friction still holds 300 N in the coupling on either side, so that the loop is 12 µm wider than the
+/// gap. A gap that changes from repeat to repeat is no reason to refuse a bench, and the interval holds all of them.
+#[test]
+fn a_bench_shows_gap_and_loop_and_how_far_they_change() {
+    let steady = bench(&[100e-6; 10]);
+    assert!((steady.gap_m - 100e-6).abs() < 3.0 * steady.gap_se_m, "{steady:?}");
+    assert!(steady.gap_se_m < 5e-6, "{steady:?}");
+    assert!((steady.loop_width_m.unwrap() - 112e-6).abs() < 2e-6, "{steady:?}");
+    let changing = bench(&[40e-6, 40e-6, 40e-6, 600e-6].repeat(3));
+    assert!(changing.flags.contains(&QualityFlag::Imprecise), "{changing:?}");
+    assert!(changing.gap_bounds_m.0 < 40e-6 && changing.gap_bounds_m.1 > 600e-6, "{changing:?}");
+}
+
 /// By hand: 100 µm and twice 4000 N over 5·10⁷ N/m are 260 µm; at zero load the gap and twice the screw's dry friction of
 /// 150 N over it remain, 106 µm.
 #[test]
