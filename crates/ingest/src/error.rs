@@ -142,7 +142,7 @@ pub(crate) enum ErrorKind {
     NoClock,
     #[error("time runs backwards")]
     #[strum(
-        message = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does; if the rows stand in no order, set `clock.max_back_s` to the length of a flight"
+        message = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
     )]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
     #[error("the log seems to hold two flights")]
