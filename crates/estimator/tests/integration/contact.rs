@@ -296,13 +296,13 @@ fn bench(gaps_m: &[f64]) -> ContactEstimate {
         // The motor moves as far as its force overcomes friction: what is left winds the coupling up.
         coupling_n = coupling_n.clamp(4000.0 * ramp - friction_n, 4000.0 * ramp + friction_n);
         let flank = if coupling_n == 0.0 { 0.0 } else { coupling_n.signum() };
-        motor_m.push(0.5 * flank * gap_m + coupling_n / stiffness_n_per_m + 1e-7 * rng.random_range(-1.0..1.0));
+        motor_m
+            .push(0.5 * flank * gap_m + coupling_n / stiffness_n_per_m + 1e-7 * rng.random_range(-1.0..1.0));
         load_n.push(-4000.0 * ramp);
     }
     let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
     let segments = [0..dx_m.len()];
-    let samples =
-        Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
+    let samples = Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
     let prior = PartPrior { output_locked: true, ..PartPrior::of_stiffness(stiffness_n_per_m) };
     *contact::estimate(&samples, &prior).unwrap().unwrap()
 }
