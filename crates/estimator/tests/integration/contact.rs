@@ -301,8 +301,9 @@ fn bench(gaps_m: &[f64]) -> ContactEstimate {
         load_n.push(-4000.0 * ramp);
     }
     let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
-    let segments = [0..dx_m.len()];
-    let samples = Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
+    let whole = 0..dx_m.len();
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = PartPrior { output_locked: true, ..PartPrior::of_stiffness(stiffness_n_per_m) };
     *contact::estimate(&samples, &prior).unwrap().unwrap()
 }
