@@ -10,7 +10,7 @@ pub struct StateBadge(Option<State>);
 impl StateBadge {
     /// Parses the `state` of an assessment; `None` is a removed unit, an unknown word an unassessed one.
     pub fn from_state(word: Option<&str>) -> Self {
-        Self(word.map(|word| State::from_word(word).unwrap_or(State::Unassessed)))
+        Self(word.map(|word| word.parse().unwrap_or(State::Unassessed)))
     }
 
     /// Rank by urgency, the most urgent first; a removed unit last.

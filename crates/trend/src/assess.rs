@@ -4,7 +4,7 @@ use crate::data::series::{DAY_US, Flight, Series};
 use crate::error::Error;
 use crate::math::distributions::{self, NORMAL_95};
 use crate::measured::exceedance::Exceedance;
-use crate::measured::level::MeasuredLevel;
+use crate::measured::level::Level;
 use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
@@ -12,7 +12,7 @@ use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
-use crate::statement::types::{Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus};
+use crate::statement::types::{Crossing, ForecastMethod, Rate, Utilization, WearStatus};
 use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// Number of last days that give the utilisation.
@@ -60,16 +60,8 @@ pub fn assess(
         flights: flights.len(),
         estimates: unit.history.estimates.len(),
         unit_hours: series.unit_hours_at_start().zip(flights.last()).map(|(start, last)| start + last.hours),
-        level: unit.measured.level.map(|level| Level {
-            gap_m: level.gap_m,
-            se_m: level.se_m,
-            records: level.records,
-        }),
-        latest: unit.measured.latest.map(|record| LatestRecord {
-            departure_us: record.departure_us,
-            gap_m: record.gap_m,
-            se_m: record.error_m,
-        }),
+        level: unit.measured.level,
+        latest: unit.measured.latest,
         installation_sd_m: prior.bias_sd_m,
         rate: forecast.rate,
         wear: forecast.wear,
@@ -111,7 +103,9 @@ impl Forecasts {
             (Some(fit), rise) => {
                 let mut forecasts = Self::by_laws(fit, unit, flights, settings, elapsed_hours);
                 if let (Some(crossing), Some(rise)) = (&mut forecasts.crossing, rise) {
-                    *crossing = not_after(*crossing, rise.p05_hours);
+                    // No earliest time lies after that of the line through the last records.
+                    let by_line = rise.p05_hours;
+                    crossing.p05_hours = Some(crossing.p05_hours.map_or(by_line, |hours| hours.min(by_line)));
                 }
                 forecasts
             }
@@ -168,16 +162,10 @@ impl Forecasts {
 }
 
 /// Probability that a measured level, with the spread that its installation adds, is at or above the limit.
-fn over_limit(level: Option<MeasuredLevel>, installation_sd_m: f64, limit_m: f64) -> Option<f64> {
+fn over_limit(level: Option<Level>, installation_sd_m: f64, limit_m: f64) -> Option<f64> {
     let level = level?;
     let error_m = level.se_m.hypot(installation_sd_m).max(f64::MIN_POSITIVE);
     Some(distributions::cdf((level.gap_m - limit_m) / error_m))
-}
-
-/// The crossing with an earliest time that is not after that of the line through the last records.
-fn not_after(crossing: Crossing, p05_hours: f64) -> Crossing {
-    let earliest = crossing.p05_hours.map_or(p05_hours, |hours| hours.min(p05_hours));
-    Crossing { p05_hours: Some(earliest), ..crossing }
 }
 
 /// The crossing without times beyond the horizon.

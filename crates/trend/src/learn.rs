@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::data::steps::installation_steps;
-use crate::executor::{Executor, SerialExecutor};
+use crate::executor::Executor;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
 use crate::prior::fleet_prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
@@ -42,18 +42,9 @@ impl FleetPrior {
     /// order of the units does not change the result, and nothing later than the day is used; a prior of an
     /// earlier day may replace a later one.
     ///
-    /// Wear follows `axis` where it is given and the fleet has counted it, else the likeliest one.
+    /// Wear follows `axis` where it is given and the fleet has counted it, else the likeliest one. The executor does the
+    /// work on each unit and changes no bit of the result.
     pub fn learn<'a>(
-        fleet: impl IntoIterator<Item = &'a Series>,
-        as_of_us: i64,
-        limit_m: f64,
-        axis: Option<UsageAxis>,
-    ) -> Self {
-        Self::learn_with(fleet, as_of_us, limit_m, axis, &SerialExecutor)
-    }
-
-    /// As [`FleetPrior::learn`], with the work on each unit done by an executor: bitwise identical.
-    pub fn learn_with<'a>(
         fleet: impl IntoIterator<Item = &'a Series>,
         as_of_us: i64,
         limit_m: f64,
@@ -72,7 +63,7 @@ impl FleetPrior {
     }
 
     /// The median life of units, from new to the act limit, flight hours, from their first-pass
-    /// prior: enough to separate designs, at a fifth of the cost of [`FleetPrior::learn_with`].
+    /// prior: enough to separate designs, at a fifth of the cost of [`FleetPrior::learn`].
     pub fn rough_median_life_hours<'a>(
         fleet: impl IntoIterator<Item = &'a Series>,
         as_of_us: i64,
@@ -134,15 +125,6 @@ fn assumed(training_set: &TrainingSet<'_>, limit_m: f64, executor: &impl Executo
     assumed
 }
 
-/// The same along an axis, by the hours that its unit is worth.
-fn on_axis(training_set: &TrainingSet<'_>, axis: UsageAxis, assumed: &FleetPrior) -> Option<FleetPrior> {
-    let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
-        training_set.units.iter().filter_map(|unit| unit.flights.last()).map(of).sum()
-    };
-    let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
-    hours_per_unit.is_finite().then(|| FleetPrior { axis, hours_per_unit, ..assumed.clone() })
-}
-
 /// The axis prior with the largest evidence, the first of equals.
 fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
@@ -189,7 +171,14 @@ impl AxisPrior {
         assumed: &FleetPrior,
         executor: &impl Executor,
     ) -> Option<Self> {
-        let assumed = on_axis(training_set, axis, assumed)?;
+        let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
+            training_set.units.iter().filter_map(|unit| unit.flights.last()).map(of).sum()
+        };
+        let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
+        if !hours_per_unit.is_finite() {
+            return None;
+        }
+        let assumed = FleetPrior { axis, hours_per_unit, ..assumed.clone() };
         let histories = training_set.on_axis(&assumed, executor);
         let learned = assumed.clone();
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))

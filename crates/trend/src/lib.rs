@@ -7,7 +7,7 @@
 //! [`assess()`] fits a bank of wear curves to the series under that prior.
 //!
 //! ```
-//! use trend::{FleetPrior, Observation, Series, Settings, State, UsageDefaults, assess};
+//! use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, State, UsageDefaults, assess};
 //!
 //! // One flight of 1.5 h a day; the gap grows from 30 µm by 10 nm per flight, with a scatter of 1 µm.
 //! let day_us = |day: i64| day * 86_400_000_000;
@@ -24,7 +24,7 @@
 //! let series = Series::new((0..500).map(flight), &UsageDefaults::default())?;
 //!
 //! let settings = Settings::for_limit(100e-6);
-//! let prior = FleetPrior::learn([&series], day_us(500), settings.limit_m, None);
+//! let prior = FleetPrior::learn([&series], day_us(500), settings.limit_m, None, &SerialExecutor);
 //! let assessment = assess(&series, day_us(500), &settings, Some(&prior))?;
 //! let level = assessment.level.ok_or("no record")?;
 //! assert!((level.gap_m - 35e-6).abs() < 1e-6);
@@ -58,18 +58,18 @@ mod unit_fit;
 mod wear;
 
 pub use assess::assess;
-pub use data::series;
 pub use data::series::{MaintenanceEvent, Observation, RowFaults, Series, UsageDefaults, UsageSource};
 pub use error::Error;
 pub use executor::{Executor, SerialExecutor};
 pub use forecast::{Forecast, Interval, forecast};
+pub use measured::level::Level;
+pub use measured::record::Record;
 pub use prior::fleet_prior::{FleetPrior, UsageAxis};
 pub use settings::Settings;
 pub use statement::assessment::Assessment;
 pub use statement::state::{Reason, State};
 pub use statement::types::{
-    ChangePoint, ChangePointKind, Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization,
-    WearStatus,
+    ChangePoint, ChangePointKind, Crossing, ForecastMethod, Rate, Utilization, WearStatus,
 };
 pub use tail_wide::{TailWideStep, UnitOnTail, tail_wide_steps};
 pub use wear::bank::WearClass;

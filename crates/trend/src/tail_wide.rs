@@ -75,11 +75,11 @@ pub fn tail_wide_steps(units: &[UnitOnTail]) -> Vec<TailWideStep> {
             begin += 1;
             continue;
         }
-        let mut sizes_m: Vec<f64> = steps[begin..end].iter().map(|step| step.2).collect();
+        let sizes_m: Vec<f64> = steps[begin..end].iter().map(|step| step.2).collect();
         found.push(TailWideStep {
             first_us,
             last_us: steps[end - 1].0,
-            step_m: median(&mut sizes_m).unwrap_or_default(),
+            step_m: median(sizes_m).unwrap_or_default(),
             units: stepped.len(),
             units_able: able.max(stepped.len()),
         });

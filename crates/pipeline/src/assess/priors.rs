@@ -158,6 +158,6 @@ impl<'a> PriorTrainer<'a, '_> {
     fn learn(&self, cutoff_us: i64, parts: &[Option<&str>]) -> FleetPrior {
         let first = parts.first().copied().flatten();
         let (limit_m, axis) = (self.limits.limit_m(first), self.limits.axis(first));
-        FleetPrior::learn_with(self.of_parts(parts), cutoff_us, limit_m, axis, &RayonExecutor)
+        FleetPrior::learn(self.of_parts(parts), cutoff_us, limit_m, axis, &RayonExecutor)
     }
 }

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use records::row_schema::NoColumn;
 use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
-use trend::{Assessment, ForecastMethod, Reason, Series, State};
+use trend::{Assessment, Reason, Series, State};
 
 use crate::assess::tail_wide_steps::TailWide;
 use crate::findings::monitoring::mapping_faults::MappingFault;
@@ -64,7 +64,7 @@ pub(crate) fn row(
         gap_records: trend.level.map(|l| l.records as i64),
         latest_utc: trend.latest.and_then(|record| utc(record.departure_us)),
         latest_gap_m: trend.latest.map(|record| record.gap_m),
-        latest_gap_se_m: trend.latest.map(|record| record.se_m),
+        latest_gap_se_m: trend.latest.map(|record| record.error_m),
         installation_sd_m: Some(trend.installation_sd_m),
         estimates: trend.estimates as i64,
         outliers: trend.outliers_us.len() as i64,
@@ -72,7 +72,7 @@ pub(crate) fn row(
         rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
         rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
         rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
-        trend: wear(trend.wear),
+        trend: trend.wear.into(),
         growth_probability: trend.growth_probability,
         wear_law: trend.law.map(|(law, _)| law.to_string()),
         wear_law_probability: trend.law.map(|(_, share)| share),
@@ -90,7 +90,7 @@ pub(crate) fn row(
         not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
         likely_utc: day(crossing.and_then(|c| c.p50_hours)),
         not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
-        forecast_method: trend.method.filter(|_| is_judged).map(ForecastMethod::as_str),
+        forecast_method: trend.method.filter(|_| is_judged).map(Into::into),
         check_probability: trend.check_probability.filter(|_| is_judged),
         over_limit_probability: trend.over_limit_probability.filter(|_| is_judged),
         hours_per_day: use_now.map(|u| u.hours_per_day),
@@ -213,18 +213,10 @@ fn change_point(change: &trend::ChangePoint, history: &History, wide: &TailWide)
     Some(ChangePoint {
         departure_utc,
         flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
-        kind: change.kind.as_str(),
+        kind: change.kind.into(),
         step_m: change.step_m,
         step_se_m: change.se_m,
         certainty: change.certainty,
         tail_wide: wide.tail(change, history).is_some(),
     })
-}
-
-fn wear(wear: trend::WearStatus) -> &'static str {
-    match wear {
-        trend::WearStatus::Wearing => "wearing",
-        trend::WearStatus::Steady => "steady",
-        trend::WearStatus::Unknown => "unknown",
-    }
 }

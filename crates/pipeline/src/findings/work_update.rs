@@ -190,7 +190,7 @@ fn wants_work(state: Option<&str>) -> bool {
 
 /// Order of states; a removed unit is as urgent as a normal one.
 fn rank(state: Option<&str>) -> State {
-    state.and_then(State::from_word).unwrap_or(State::Normal)
+    state.and_then(|word| word.parse().ok()).unwrap_or(State::Normal)
 }
 
 impl<'a> Tables<'a> {

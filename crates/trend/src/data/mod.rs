@@ -4,5 +4,5 @@ pub(crate) mod bins;
 pub(crate) mod noise;
 pub(crate) mod outliers;
 pub(crate) mod segment;
-pub mod series;
+pub(crate) mod series;
 pub(crate) mod steps;

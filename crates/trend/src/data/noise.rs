@@ -57,8 +57,8 @@ impl Noise {
     /// one: an unknown scatter between flights bounds the weight of a single flight.
     pub(crate) fn of(values: &[f64], stated: &[f64], assumed: &Assumed) -> Self {
         let is_stated = |error: &f64| error.is_finite() && *error > 0.0;
-        let mut known: Vec<f64> = stated.iter().copied().filter(is_stated).collect();
-        let typical = median(&mut known).unwrap_or(assumed.unstated);
+        let known: Vec<f64> = stated.iter().copied().filter(is_stated).collect();
+        let typical = median(known).unwrap_or(assumed.unstated);
         let error = |stated: &f64| {
             let error = if is_stated(stated) { stated.max(0.5 * typical) } else { typical };
             // No panic where a limit that cannot be makes the least error the larger one.
@@ -147,8 +147,7 @@ fn successive(values: &[f64], errors: &[f64]) -> Option<f64> {
     let bend = |([a, b, c], [ea, eb, ec]): (&[f64; 3], &[f64; 3])| {
         (a - 2.0 * b + c).abs() / (ea * ea + 4.0 * eb * eb + ec * ec).sqrt()
     };
-    let bent =
-        median(&mut windows.map(bend).collect::<Vec<f64>>()).map(|middle| (SD_OVER_MAD * middle).powi(2));
+    let bent = median(windows.map(bend).collect()).map(|middle| (SD_OVER_MAD * middle).powi(2));
     Some(bent.filter(|bent| *bent < CHANGING_RATE * found).unwrap_or(found))
 }
 
@@ -157,9 +156,9 @@ fn successive(values: &[f64], errors: &[f64]) -> Option<f64> {
 fn first_differences(values: &[f64], errors: &[f64], is_centred: bool) -> Option<f64> {
     let windows = values.array_windows().zip(errors.array_windows());
     let mut ratios: Vec<f64> = windows.map(|([a, b], [ea, eb])| (b - a) / ea.hypot(*eb)).collect();
-    let middle = if is_centred { median(&mut ratios)? } else { 0.0 };
+    let middle = if is_centred { median(ratios.clone())? } else { 0.0 };
     ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - middle).abs());
-    Some((SD_OVER_MAD * median(&mut ratios)?).powi(2))
+    Some((SD_OVER_MAD * median(ratios)?).powi(2))
 }
 
 /// Change from one flight to the next around a value: the median of pairwise slopes (Theil 1950) of near flights, few of
@@ -167,8 +166,8 @@ fn first_differences(values: &[f64], errors: &[f64], is_centred: bool) -> Option
 fn local_rate(values: &[f64], at: usize) -> f64 {
     let near = &values[at.saturating_sub(RATE_NEIGHBOURS)..(at + 1 + RATE_NEIGHBOURS).min(values.len())];
     let apart = |k: usize| near.iter().zip(&near[k..]).map(move |(a, b)| (b - a) / k as f64);
-    let mut slopes: Vec<f64> = (1..=NEIGHBOURS.min(near.len() - 1)).flat_map(apart).collect();
-    median(&mut slopes).unwrap_or_default()
+    let slopes: Vec<f64> = (1..=NEIGHBOURS.min(near.len() - 1)).flat_map(apart).collect();
+    median(slopes).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -96,13 +96,6 @@ pub struct MaintenanceEvent {
     pub renews: bool,
 }
 
-impl MaintenanceEvent {
-    /// By what entries are ordered.
-    pub(crate) fn order(&self) -> (i64, bool) {
-        (self.utc_us, self.renews)
-    }
-}
-
 /// The flights of one serial number, by departure.
 ///
 /// Usage follows these rules, each of which uses earlier flights only, so that a series cut at a date is
@@ -119,8 +112,7 @@ impl MaintenanceEvent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
-    unit_hours_at_start: Option<f64>,
-    source: UsageSource,
+    usage: UsageDefaults,
     maintenance: Vec<MaintenanceEvent>,
     faults: RowFaults,
 }
@@ -155,19 +147,13 @@ impl Series {
             "flights are in order of departure"
         );
         debug_assert!(flights.is_sorted_by(|a, b| a.hours <= b.hours), "hours do not decrease");
-        Ok(Self {
-            flights,
-            unit_hours_at_start: usage.unit_hours_at_start,
-            source: usage.source,
-            maintenance: Vec::new(),
-            faults,
-        })
+        Ok(Self { flights, usage: *usage, maintenance: Vec::new(), faults })
     }
 
     /// The same with the recorded maintenance of the unit, in any order.
     #[must_use]
     pub fn with_maintenance(mut self, mut maintenance: Vec<MaintenanceEvent>) -> Self {
-        maintenance.sort_unstable_by_key(MaintenanceEvent::order);
+        maintenance.sort_unstable_by_key(|entry| (entry.utc_us, entry.renews));
         self.maintenance = maintenance;
         self
     }
@@ -206,12 +192,12 @@ impl Series {
 
     /// Where the unit's hours are known from.
     pub fn usage_source(&self) -> UsageSource {
-        self.source
+        self.usage.source
     }
 
     /// The unit's own hours when its first flight here began, if known.
-    pub fn unit_hours_at_start(&self) -> Option<f64> {
-        self.unit_hours_at_start
+    pub(crate) fn unit_hours_at_start(&self) -> Option<f64> {
+        self.usage.unit_hours_at_start
     }
 }
 

@@ -41,7 +41,7 @@ const RATE_SPREAD: f64 = 5e-4;
 pub(crate) const WEAR_NOISE: f64 = 0.002;
 
 /// A step of the measured gap.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct StepChange {
     /// The first estimate after it.
     pub(crate) at: usize,
@@ -97,11 +97,12 @@ pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f6
     let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
         .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
     changes.fold((0.0, 0.0), |(squares, count), at| {
-        let (step, _) = sums.step_at(at.saturating_sub(REACH), at, (at + REACH).min(estimates.len()));
-        if step.step_m.abs() > largest_m || step.se_m > 0.5 * largest_m {
+        let step = sums.offset(0, at, estimates.len(), REACH);
+        let se_m = step.se_m();
+        if step.step_m.abs() > largest_m || se_m > 0.5 * largest_m {
             return (squares, count);
         }
-        (squares + step.step_m * step.step_m - step.se_m * step.se_m, count + 1.0)
+        (squares + step.step_m * step.step_m - se_m * se_m, count + 1.0)
     })
 }
 
@@ -116,6 +117,21 @@ struct PrefixSums {
     slope_information: f64,
     /// Variance of the wear per metre of wear, metres.
     wear_noise_m: f64,
+}
+
+/// A place where the lines on both sides, of one slope, are apart.
+#[derive(Clone, Copy)]
+struct Offset {
+    at: usize,
+    step_m: f64,
+    variance: f64,
+    slope: f64,
+}
+
+impl Offset {
+    fn se_m(&self) -> f64 {
+        self.variance.sqrt()
+    }
 }
 
 /// Variance, means and centred sums of squares of a range.
@@ -155,31 +171,22 @@ impl PrefixSums {
         WindowStats { variance, x, y, xx: centred(3, x * x), xy: centred(4, x * y), yy: centred(5, y * y) }
     }
 
-    /// Step between the stretches around `at`, with one slope for both, its variance, and that slope.
-    fn step_with_slope(&self, low: usize, at: usize, high: usize) -> (f64, f64, f64) {
-        let (left, right) = (self.window_stats(low, at), self.window_stats(at, high));
+    /// The step at a place of a range, by as many estimates on each side.
+    fn offset(&self, low: usize, at: usize, high: usize, reach: usize) -> Offset {
+        let (from, to) = (at.saturating_sub(reach).max(low), (at + reach).min(high));
+        let (left, right) = (self.window_stats(from, at), self.window_stats(at, to));
         let slope_variance = (left.xx + right.xx + self.slope_information).recip();
         let slope = (left.xy + right.xy) * slope_variance;
         let apart = right.x - left.x;
         let variance = left.variance + right.variance + apart * apart * slope_variance;
-        (right.y - left.y - slope * apart, variance, slope)
-    }
-
-    /// The same as a jump, and its slope.
-    fn step_at(&self, low: usize, at: usize, high: usize) -> (StepChange, f64) {
-        let (step_m, variance, slope) = self.step_with_slope(low, at, high);
-        let se_m = variance.sqrt();
-        (StepChange { at, step_m, se_m, jump_m: step_m, jump_se_m: se_m }, slope)
+        Offset { at, step_m: right.y - left.y - slope * apart, variance, slope }
     }
 
     /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
-    fn is_beyond_wear(&self, low: usize, high: usize, (step, slope): &(StepChange, f64)) -> bool {
-        let (left, right) = (
-            self.window_stats(step.at.saturating_sub(NEAR).max(low), step.at),
-            self.window_stats(step.at, (step.at + NEAR).min(high)),
-        );
-        let worn_m = (slope * (right.x - left.x)).abs();
-        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m.powi(2) + self.wear_noise_m * worn_m)
+    fn is_beyond_wear(&self, low: usize, high: usize, step: &Offset) -> bool {
+        let (left, right) = self.near_sides(low, high, step);
+        let worn_m = (step.slope * (right.x - left.x)).abs();
+        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m().powi(2) + self.wear_noise_m * worn_m)
     }
 
     /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
@@ -187,18 +194,21 @@ impl PrefixSums {
     ///
     /// A bend, as at the onset of wear, makes a far line miss on one side; it does not make neighbours
     /// differ.
-    fn is_near(&self, low: usize, high: usize, (step, slope): &(StepChange, f64)) -> bool {
-        let (from, to) = (
-            |reach: usize| step.at.saturating_sub(reach).max(low),
-            |reach: usize| (step.at + reach).min(high),
-        );
-        let (left, right) = (self.window_stats(from(NEAR), step.at), self.window_stats(step.at, to(NEAR)));
+    fn is_near(&self, low: usize, high: usize, step: &Offset) -> bool {
+        let (left, right) = self.near_sides(low, high, step);
         let se_m = (left.variance + right.variance).sqrt();
-        let slopes = [*slope, self.slope(from(SIDE), step.at, *slope), self.slope(step.at, to(SIDE), *slope)];
-        slopes.into_iter().all(|slope| {
+        let (from, to) = (step.at.saturating_sub(SIDE).max(low), (step.at + SIDE).min(high));
+        let of_side = |from, to| self.slope(from, to, step.slope);
+        [step.slope, of_side(from, step.at), of_side(step.at, to)].into_iter().all(|slope| {
             let step_m = right.y - left.y - slope * (right.x - left.x);
             step_m / step.step_m > NEAR_SHARE && step_m.abs() > NEAR_BELIEVED * se_m
         })
+    }
+
+    /// The near window before a step and that after it.
+    fn near_sides(&self, low: usize, high: usize, step: &Offset) -> (WindowStats, WindowStats) {
+        let (from, to) = (step.at.saturating_sub(NEAR).max(low), (step.at + NEAR).min(high));
+        (self.window_stats(from, step.at), self.window_stats(step.at, to))
     }
 
     /// Slope of one side, drawn to another so far as it is uncertain.
@@ -211,11 +221,10 @@ impl PrefixSums {
     ///
     /// Every third place is tested first, then all places near those with half the required ratio.
     fn largest(&self, low: usize, (from, to): (usize, usize), high: usize) -> Option<StepChange> {
-        let ratio = |step: &StepChange| (step.step_m / step.se_m).abs();
+        let ratio = |step: &Offset| (step.step_m / step.se_m()).abs();
         let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES).min(to);
         let is_half = |at: usize, reach: usize| {
-            let (step_m, variance, _) =
-                self.step_with_slope(at.saturating_sub(reach).max(low), at, (at + reach).min(high));
+            let Offset { step_m, variance, .. } = self.offset(low, at, high, reach);
             step_m * step_m > (0.6 * BELIEVED).powi(2) * variance
         };
         let promising = |&at: &usize| REACHES.into_iter().any(|reach| is_half(at, reach));
@@ -225,15 +234,10 @@ impl PrefixSums {
         all.dedup();
         all.into_iter()
             .filter(|at| places.contains(at))
-            .flat_map(|at| REACHES.map(|reach| (self.within_reach(low, at, high, reach), reach)))
+            .flat_map(|at| REACHES.map(|reach| (self.offset(low, at, high, reach), reach)))
             .filter(|(found, _)| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
-            .max_by(|((a, _), _), ((b, _), _)| ratio(a).total_cmp(&ratio(b)))
-            .map(|((step, _), reach)| self.located(low, step.at, high, reach))
-    }
-
-    /// The step at a place, by as many estimates on each side.
-    fn within_reach(&self, low: usize, at: usize, high: usize, reach: usize) -> (StepChange, f64) {
-        self.step_at(at.saturating_sub(reach).max(low), at, (at + reach).min(high))
+            .max_by(|(a, _), (b, _)| ratio(a).total_cmp(&ratio(b)))
+            .map(|(step, reach)| self.located(low, step.at, high, reach))
     }
 
     /// The step at the place near a found one where two lines leave the smallest squares, and its size there.
@@ -246,9 +250,9 @@ impl PrefixSums {
             ..=(found + LOCATE).min(to.saturating_sub(LEAST_SIDE));
         let squares = |at: usize| self.squares_about_line(from, at) + self.squares_about_line(at, to);
         let at = places.min_by(|a, b| squares(*a).total_cmp(&squares(*b))).unwrap_or(found);
-        let (step, slope) = self.within_reach(low, at, high, reach);
-        let (jump_m, jump_se_m) = self.step_between_lines(low, at, high, slope);
-        StepChange { jump_m, jump_se_m, ..step }
+        let step = self.offset(low, at, high, reach);
+        let (jump_m, jump_se_m) = self.step_between_lines(low, at, high, step.slope);
+        StepChange { at, step_m: step.step_m, se_m: step.se_m(), jump_m, jump_se_m }
     }
 
     /// Weighted sum of squared residuals of the range's own line.

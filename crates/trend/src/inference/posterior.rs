@@ -26,13 +26,14 @@ const LIFE_REACH: f64 = 3.5;
 struct LifeGrid {
     count: usize,
     reach: f64,
-    /// Log weight below the best at which a curve is dropped.
-    drop: f64,
 }
 
 /// Enough to weigh a curve, and enough to state quantiles.
-const ROUGH: LifeGrid = LifeGrid { count: 3, reach: 1.7, drop: 7.0 };
-const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5, drop: 7.0 };
+const ROUGH: LifeGrid = LifeGrid { count: 3, reach: 1.7 };
+const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5 };
+
+/// Log weight below the best at which a curve is dropped.
+const DROP: f64 = 7.0;
 
 /// A mixture over the bank.
 #[derive(Debug, Clone)]
@@ -77,7 +78,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
     let is_tried = |law| prior.includes_law(law);
-    let mut bank = candidates(segment.fresh, segment.known_age, span, starts, is_tried);
+    let bank = candidates(segment.fresh, segment.known_age, span, starts, is_tried);
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = linear_growth(&coarse);
     let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -85,28 +86,22 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
         return finish(&first, components(&first, &bank, THOROUGH));
     }
     let mut believed = components(&first, &bank, ROUGH);
-    normalise(&mut believed, ROUGH.drop);
+    normalise(&mut believed);
     if believed.is_empty() {
         return None;
     }
-    retain(&mut bank, &believed);
+    let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
+    kept.dedup();
+    let bank: Vec<Candidate> = kept.into_iter().map(|index| bank[index]).collect();
     let likely = likeliest(&believed);
     let fine = bins::bin(segment.estimates, bins::BINS);
     let second = SegmentFit::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
-    let believed = components(&second, &bank, THOROUGH);
-    finish(&second, believed)
-}
-
-/// Drops the curves of negligible weight.
-fn retain(candidates: &mut Vec<Candidate>, believed: &[(usize, Component)]) {
-    let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
-    kept.dedup();
-    *candidates = kept.into_iter().map(|index| candidates[index]).collect();
+    finish(&second, components(&second, &bank, THOROUGH))
 }
 
 /// The posterior; none where the gaps are so far from every curve that no likelihood is a number.
 fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option<Posterior> {
-    let log_sum = normalise(&mut believed, THOROUGH.drop);
+    let log_sum = normalise(&mut believed);
     (!believed.is_empty()).then(|| Posterior {
         components: believed.into_iter().map(|(_, component)| component).collect(),
         level_m2: fit.level_m2(),
@@ -138,13 +133,13 @@ pub(crate) fn mean_growth(components: &[Component], usage: f64) -> f64 {
 
 /// Turns log weights into weights that add up to one, drops negligible ones, and returns the log
 /// of their sum.
-fn normalise(believed: &mut Vec<(usize, Component)>, drop: f64) -> f64 {
+fn normalise(believed: &mut Vec<(usize, Component)>) -> f64 {
     let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
     if !best.is_finite() {
         believed.clear();
         return f64::NEG_INFINITY;
     }
-    believed.retain(|(_, n)| n.weight > best - drop);
+    believed.retain(|(_, n)| n.weight > best - DROP);
     let mut sum = 0.0;
     for (_, component) in believed.iter_mut() {
         component.weight = (component.weight - best).exp();
@@ -205,12 +200,12 @@ fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: LifeGrid) -> Vec<
     let mut best = f64::NEG_INFINITY;
     add(top, best, &mut |component| best = best.max(component.weight));
     // Where the prior excludes the best fit, its bound does not bound the others.
-    let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
+    let floor = top.bound.min(best + USUAL) - DROP - SLACK;
     let flat = bank.iter().position(|candidate| candidate.law == WearLaw::None);
     for scored_candidate in scored_candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
-        add(scored_candidate, best - tried.drop, &mut |component| {
+        add(scored_candidate, best - DROP, &mut |component| {
             best = best.max(component.weight);
-            if component.weight > best - tried.drop {
+            if component.weight > best - DROP {
                 components.push((scored_candidate.index, component));
             }
         });

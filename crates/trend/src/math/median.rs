@@ -3,8 +3,8 @@
 /// Standard deviation of a normal distribution over its median absolute deviation: 1/Φ⁻¹(3/4).
 pub(crate) const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
 
-/// The median of some values, which it reorders; none of nothing.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+/// The median of some values; none of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let (middle, is_even) = (values.len() / 2, values.len().is_multiple_of(2));
     if values.is_empty() {
         return None;

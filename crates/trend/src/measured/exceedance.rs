@@ -1,6 +1,6 @@
 //! Records above the limit: unconfirmed, confirmed, ended.
 
-use crate::measured::level::MeasuredLevel;
+use crate::measured::level::Level;
 use crate::measured::record::Record;
 use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED};
 use crate::statement::types::{ChangePoint, ChangePointKind};
@@ -31,7 +31,7 @@ struct Run {
 /// The exceedance at the last of some records, and the events of all of them.
 pub(crate) fn exceedance(
     all: &[Record],
-    level: Option<MeasuredLevel>,
+    level: Option<Level>,
     limit_m: f64,
 ) -> (Option<Exceedance>, Vec<ChangePoint>) {
     let is_above = |record: &Record| record.gap_m >= limit_m;
@@ -73,7 +73,7 @@ pub(crate) fn exceedance(
             run = None;
         }
     }
-    let is_held = |level: MeasuredLevel| {
+    let is_held = |level: Level| {
         level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len())
     };
     let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
@@ -99,7 +99,7 @@ pub(crate) fn exceedance(
 fn before(records: &[Record], at: usize) -> Option<f64> {
     let period = records[at].period;
     let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);
-    crate::math::median::median(&mut near.map(|r| r.gap_m).collect::<Vec<f64>>())
+    crate::math::median::median(near.map(|r| r.gap_m).collect())
 }
 
 fn event(first: &Record, run: &Run, kind: ChangePointKind) -> ChangePoint {

@@ -15,14 +15,15 @@ const WILD: f64 = 5.0;
 const FALL_ERRORS: f64 = 4.0;
 const FALL_SHARE: f64 = 0.05;
 
-/// Level of the gap at the last record.
+/// The measured level of the gap at the last record.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MeasuredLevel {
-    pub(crate) gap_m: f64,
-    /// Standard error from the records' errors and their scatter.
-    pub(crate) se_m: f64,
-    /// Records that it rests on.
-    pub(crate) records: usize,
+pub struct Level {
+    /// The gap, metres.
+    pub gap_m: f64,
+    /// Its standard error from the errors and the scatter of its records, metres.
+    pub se_m: f64,
+    /// Number of records that it rests on.
+    pub records: usize,
     /// The same with outliers among them, counted from the last.
     pub(crate) window: usize,
     pub(crate) period: u32,
@@ -30,7 +31,7 @@ pub(crate) struct MeasuredLevel {
     hours: f64,
 }
 
-impl MeasuredLevel {
+impl Level {
     /// The level at other hours, by its line.
     pub(crate) fn at(&self, hours: f64) -> f64 {
         self.gap_m + self.slope_m_per_hour * (hours - self.hours)
@@ -107,7 +108,7 @@ impl Line {
 /// The level at the last record: by the longest window up to twelve records of its period that a line explains.
 ///
 /// A lone record far below a level of several records does not lower it: two of them do.
-pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<MeasuredLevel> {
+pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<Level> {
     let level = level_at_end(sound)?;
     let (last, before) = sound.split_last()?;
     let Some(rest) = level_at_end(before).filter(|rest| level.records == 1 && rest.records > 1) else {
@@ -116,20 +117,20 @@ pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<MeasuredL
     let fall_m = rest.gap_m - last.gap_m;
     let is_lone_fall = rest.period == last.period
         && fall_m > (FALL_ERRORS * rest.se_m.hypot(last.error_m)).max(FALL_SHARE * limit_m);
-    Some(if is_lone_fall { MeasuredLevel { window: rest.window + 1, ..rest } } else { level })
+    Some(if is_lone_fall { Level { window: rest.window + 1, ..rest } } else { level })
 }
 
-fn level_at_end(sound: &[Record]) -> Option<MeasuredLevel> {
+fn level_at_end(sound: &[Record]) -> Option<Level> {
     let last = sound.last()?;
     let most = sound.iter().rev().take(WINDOW).take_while(|r| r.period == last.period).count();
     (1..=most).rev().find_map(|count| explained(&sound[sound.len() - count..]))
 }
 
 /// The level by all of some records, but for one of five or more; none where nothing explains them.
-fn explained(records: &[Record]) -> Option<MeasuredLevel> {
+fn explained(records: &[Record]) -> Option<Level> {
     let level = |line: Line, count: usize| {
         let last = records[records.len() - 1];
-        MeasuredLevel {
+        Level {
             gap_m: line.end_m,
             se_m: (line.end_m2 * line.inflation()).sqrt(),
             records: count,

@@ -11,7 +11,7 @@ pub(crate) mod thresholds;
 
 use crate::data::series::{DAY_US, Flight, MaintenanceEvent};
 use crate::measured::exceedance::{Exceedance, exceedance};
-use crate::measured::level::{MeasuredLevel, measured_level};
+use crate::measured::level::{Level, measured_level};
 use crate::measured::record::{Record, records};
 use crate::measured::rise::{Rise, rise};
 use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED};
@@ -32,7 +32,7 @@ pub(crate) struct Jump {
 /// What the records of an installation show.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Measured {
-    pub(crate) level: Option<MeasuredLevel>,
+    pub(crate) level: Option<Level>,
     /// The latest record, sound or not.
     pub(crate) latest: Option<Record>,
     pub(crate) exceedance: Option<Exceedance>,
@@ -120,7 +120,7 @@ fn jump_at(
     sound: &[Record],
     from: usize,
     (after_m, after_se_m): (f64, f64),
-    present: &MeasuredLevel,
+    present: &Level,
     settings: &Settings,
 ) -> Option<Jump> {
     /// Share of a jump that must be left.
@@ -144,7 +144,7 @@ fn jump_at(
 }
 
 /// Whether one of the last levels was at the watch limit; asked only where it makes a difference.
-fn was_at_watch(sound: &[Record], level: Option<MeasuredLevel>, settings: &Settings) -> bool {
+fn was_at_watch(sound: &[Record], level: Option<Level>, settings: &Settings) -> bool {
     let Settings { watch_m, limit_m, .. } = *settings;
     let Some(level) = level.filter(|level| level.gap_m >= HYSTERESIS * watch_m) else { return false };
     let first = sound.len().saturating_sub(RECALLED).max(1);

@@ -12,14 +12,16 @@ const IMPOSSIBLE_SHARE: f64 = 0.05;
 
 /// One measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Record {
+pub struct Record {
     /// Index of its flight.
     pub(crate) flight: usize,
-    pub(crate) departure_us: i64,
+    /// Departure of its flight, microseconds since 1970 UTC.
+    pub departure_us: i64,
     pub(crate) hours: f64,
-    pub(crate) gap_m: f64,
-    /// Standard error, with the scatter that was found.
-    pub(crate) error_m: f64,
+    /// The gap, metres.
+    pub gap_m: f64,
+    /// Its standard error with the scatter that was found, metres.
+    pub error_m: f64,
     /// Without a quality flag that makes it uncertain.
     pub(crate) is_sound: bool,
     /// A new one begins with each installation and after each renewal.

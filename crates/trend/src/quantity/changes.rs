@@ -190,6 +190,12 @@ impl<'a> Model<'a> {
         Some((factor.solve(&right), factor.inverse()))
     }
 
+    /// The same with a drift; none where usage is constant.
+    fn solve_with_drift(&self) -> Option<(Row, Square)> {
+        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
+        with.solve().filter(|_| self.usage_hours.1 > 0.0)
+    }
+
     /// Adds the regressor with the largest gain as long as one is significant, then removes those that are not.
     fn select(&mut self) {
         while self.steps.len() < MAX_STEPS && self.add_best() {}
@@ -215,11 +221,7 @@ impl<'a> Model<'a> {
 
     /// Squared t-value of a drift in addition to the present regressors.
     fn drift_gain(&self) -> f64 {
-        if self.usage_hours.1 <= 0.0 {
-            return 0.0;
-        }
-        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
-        with.solve().map_or(0.0, |(beta, covariance)| beta[1] * beta[1] / covariance[(1, 1)])
+        self.solve_with_drift().map_or(0.0, |(beta, covariance)| beta[1] * beta[1] / covariance[(1, 1)])
     }
 
     /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.
@@ -270,11 +272,10 @@ impl<'a> Model<'a> {
 
     /// Drift per hour without the steps, and its standard error, also where it is not significant.
     fn rate_per_hour(&self) -> Option<(f64, f64)> {
-        if self.values.len() < MIN_FLIGHTS || self.usage_hours.1 <= 0.0 {
+        if self.values.len() < MIN_FLIGHTS {
             return None;
         }
-        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
-        let (beta, covariance) = with.solve()?;
+        let (beta, covariance) = self.solve_with_drift()?;
         Some((beta[1] / self.usage_hours.1, covariance[(1, 1)].max(0.0).sqrt() / self.usage_hours.1))
     }
 }

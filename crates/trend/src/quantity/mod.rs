@@ -7,6 +7,8 @@ pub mod changes;
 pub mod common_curve;
 pub mod covariates;
 
+pub use crate::math::median::median;
+
 /// Fewest flights from which a change is sought.
 pub const MIN_FLIGHTS: usize = 8;
 
@@ -25,9 +27,4 @@ pub struct QuantityValue {
     pub temperature_c: Option<f64>,
     /// Natural logarithm of the flight's 95 % load, where it is known.
     pub ln_load: Option<f64>,
-}
-
-/// The median; none of nothing.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    crate::math::median::median(&mut values)
 }

@@ -1,9 +1,9 @@
 //! The assessment of one unit at a date.
 
+use crate::measured::level::Level;
+use crate::measured::record::Record;
 use crate::statement::state::{Reason, State};
-use crate::statement::types::{
-    ChangePoint, Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus,
-};
+use crate::statement::types::{ChangePoint, Crossing, ForecastMethod, Rate, Utilization, WearStatus};
 use crate::wear::bank::WearClass;
 
 /// What is known of one unit on one day.
@@ -20,7 +20,7 @@ pub struct Assessment {
     /// The measured level at the last record.
     pub level: Option<Level>,
     /// The latest record.
-    pub latest: Option<LatestRecord>,
+    pub latest: Option<Record>,
     /// Spread of what an installation adds to every gap measured in it, metres: not a part of the level's error.
     pub installation_sd_m: f64,
     /// Its growth now.

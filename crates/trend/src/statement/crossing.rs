@@ -69,9 +69,12 @@ impl RulDistribution {
             }
             None => (early, late),
         };
-        let crossing = Crossing { p05_hours, p50_hours: middle, p95_hours };
-        debug_assert!(is_ordered(&crossing), "{crossing:?}");
-        crossing
+        debug_assert!(
+            // A quantile beyond the horizon is larger than all others.
+            [p05_hours, middle, p95_hours].map(|hours| hours.unwrap_or(f64::INFINITY)).is_sorted(),
+            "quantiles of the hours left decrease: {p05_hours:?} {middle:?} {p95_hours:?}"
+        );
+        Crossing { p05_hours, p50_hours: middle, p95_hours }
     }
 
     /// Probability that the limit is met within some hours.
@@ -109,10 +112,4 @@ pub(crate) fn gap_quantiles(
     }
     let points = WeightedSamples::new(points.into_iter());
     [0.05, 0.5, 0.95].map(|share| points.quantile(share))
-}
-
-/// Whether the quantiles increase; one beyond the horizon is larger than all others.
-fn is_ordered(crossing: &Crossing) -> bool {
-    let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;
-    [p05_hours, p50_hours, p95_hours].map(|hours| hours.unwrap_or(f64::INFINITY)).is_sorted()
 }

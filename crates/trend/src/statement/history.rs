@@ -48,12 +48,8 @@ pub(crate) fn read_history(
     known_age: Option<f64>,
     prior: &FleetPrior,
 ) -> History {
-    let now = flights.last().map_or(0.0, |f| prior.usage(f));
-    let CleanedSeries { mut estimates, outliers, noise_factor } = mark_outliers(flights, prior.limit_m());
+    let CleanedSeries { estimates, outliers, noise_factor } = mark_outliers(flights, prior.limit_m());
     let found = detect_steps(&estimates, prior.limit_m());
-    for estimate in &mut estimates {
-        estimate.usage = prior.usage(&flights[estimate.flight]);
-    }
     let mut history = History {
         estimates,
         outliers,
@@ -62,13 +58,14 @@ pub(crate) fn read_history(
         offset_m2: 0.0,
         begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
-        now,
+        now: 0.0,
         known_age,
     };
     for step in &found {
         history.apply(step, flights, maintenance, prior);
     }
     history.changes.extend(events_without_step(flights, maintenance, &found, &history.estimates));
+    history.set_axis(flights, prior);
     history
 }
 
@@ -76,14 +73,19 @@ impl History {
     /// The same with the usage of another axis.
     pub(crate) fn on_axis(&self, flights: &[Flight], prior: &FleetPrior) -> Self {
         let mut history = self.clone();
-        for estimate in &mut history.estimates {
+        history.set_axis(flights, prior);
+        history
+    }
+
+    /// Turns every usage to that of the prior's axis.
+    fn set_axis(&mut self, flights: &[Flight], prior: &FleetPrior) {
+        for estimate in &mut self.estimates {
             estimate.usage = prior.usage(&flights[estimate.flight]);
         }
-        for begin in history.begins.iter_mut().skip(1) {
-            begin.usage = history.estimates[begin.estimate - 1].usage;
+        for begin in self.begins.iter_mut().skip(1) {
+            begin.usage = self.estimates[begin.estimate - 1].usage;
         }
-        history.now = flights.last().map_or(0.0, |f| prior.usage(f));
-        history
+        self.now = flights.last().map_or(0.0, |f| prior.usage(f));
     }
 
     /// Names a step and undoes it, or begins a segment with it.

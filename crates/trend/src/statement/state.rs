@@ -35,11 +35,6 @@ impl State {
     pub fn as_str(self) -> &'static str {
         self.into()
     }
-
-    /// The state with this word.
-    pub fn from_word(word: &str) -> Option<Self> {
-        word.parse().ok()
-    }
 }
 
 /// Why a state.

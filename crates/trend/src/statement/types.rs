@@ -5,28 +5,6 @@ use strum::{Display, IntoStaticStr};
 /// Number of estimates below which no wear law is fitted.
 pub(crate) const MIN_ESTIMATES: usize = 8;
 
-/// The measured level of the gap at the last record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
-    /// The gap, metres.
-    pub gap_m: f64,
-    /// Its standard error from the errors and the scatter of its records, metres.
-    pub se_m: f64,
-    /// Number of records that it rests on.
-    pub records: usize,
-}
-
-/// The latest record of a unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LatestRecord {
-    /// Departure of its flight, microseconds since 1970 UTC.
-    pub departure_us: i64,
-    /// The gap, metres.
-    pub gap_m: f64,
-    /// Its standard error with the scatter that was found, metres.
-    pub se_m: f64,
-}
-
 /// What a crossing was computed by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
@@ -39,13 +17,6 @@ pub enum ForecastMethod {
     SingleUnit,
     /// The line through the last records: no wear law explains them.
     Line,
-}
-
-impl ForecastMethod {
-    /// Its word in columns.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
 }
 
 /// Growth in metres per flight hour, with its 90 % interval.
@@ -88,7 +59,8 @@ pub struct Utilization {
 }
 
 /// Whether a unit wears.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum WearStatus {
     /// It has grown by 2 % of the limit or more with a probability above 95 %.
     Wearing,
@@ -135,11 +107,6 @@ pub enum ChangePointKind {
 }
 
 impl ChangePointKind {
-    /// Its word in columns.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
-
     /// A change of the gap that no record explains.
     pub fn is_unexplained(self) -> bool {
         matches!(self, Self::Step | Self::Reset | Self::Onset)

@@ -1,8 +1,8 @@
 //! Fleets whose truth a small simulator knows, with laws the bank does and does not contain.
 
 use trend::{
-    Assessment, ChangePoint, ChangePointKind, Executor, FleetPrior, MaintenanceEvent, Observation, Series,
-    Settings, UsageAxis, WearStatus, assess,
+    Assessment, ChangePoint, ChangePointKind, Executor, FleetPrior, MaintenanceEvent, Observation,
+    SerialExecutor, Series, Settings, UsageAxis, WearStatus, assess,
 };
 
 use crate::histories::{self, DAY_US, series};
@@ -82,7 +82,7 @@ fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
         let is_known = |u: &Unit, row: &Observation| row.departure_us <= day(u) * DAY_US;
         let cut = |u: &Unit| series(u.rows.iter().copied().filter(|row| is_known(u, row)));
         let known: Vec<Series> = fleet.iter().map(cut).collect();
-        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M, None);
+        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M, None, &SerialExecutor);
         for (unit, series) in fleet.iter().zip(&known) {
             let Some(crossing) = assessment(series, day(unit) * DAY_US, Some(&prior)).crossing else {
                 // A lone wild last record has none until the next one.
@@ -174,7 +174,7 @@ fn units_that_do_not_wear_are_seldom_called_wearing() {
 #[test]
 fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units() {
     let fleet = |flights| (0..6).map(move |seed| series(unit(seed, |t| t, flights).rows));
-    let learned = |fleet: &[Series]| FleetPrior::learn(fleet, 200 * DAY_US, LIMIT_M, None);
+    let learned = |fleet: &[Series]| FleetPrior::learn(fleet, 200 * DAY_US, LIMIT_M, None, &SerialExecutor);
     let whole = learned(&fleet(800).collect::<Vec<_>>());
     let reversed = learned(&fleet(800).rev().collect::<Vec<_>>());
     assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
@@ -201,8 +201,8 @@ impl Executor for Backwards {
 fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
     let fleet: Vec<Series> = (0..6).map(|seed| series(unit(seed, |t| t, 400).rows)).collect();
     let day = 200 * DAY_US;
-    let in_turn = FleetPrior::learn(&fleet, day, LIMIT_M, None);
-    let apart = FleetPrior::learn_with(&fleet, day, LIMIT_M, None, &Backwards);
+    let in_turn = FleetPrior::learn(&fleet, day, LIMIT_M, None, &SerialExecutor);
+    let apart = FleetPrior::learn(&fleet, day, LIMIT_M, None, &Backwards);
     assert_eq!(format!("{in_turn:?}"), format!("{apart:?}"));
 }
 
@@ -248,7 +248,13 @@ fn reshimmed(is_booked: bool) -> Vec<Series> {
 #[test]
 fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
     let new_um = |recorded_um| {
-        let prior = FleetPrior::learn(&reshimmed(recorded_um), i64::MAX, LIMIT_M, Some(UsageAxis::Hours));
+        let prior = FleetPrior::learn(
+            &reshimmed(recorded_um),
+            i64::MAX,
+            LIMIT_M,
+            Some(UsageAxis::Hours),
+            &SerialExecutor,
+        );
         prior.new_gap_m().0 * 1e6
     };
     let (recorded_um, unrecorded_um) = (new_um(true), new_um(false));
@@ -259,7 +265,7 @@ fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
 #[test]
 fn wear_follows_the_configured_axis_unless_it_was_not_counted() {
     let fleet = reshimmed(true);
-    let learned = |axis| FleetPrior::learn(&fleet, i64::MAX, LIMIT_M, axis);
+    let learned = |axis| FleetPrior::learn(&fleet, i64::MAX, LIMIT_M, axis, &SerialExecutor);
     assert_eq!(learned(Some(UsageAxis::Flights)).axis(), UsageAxis::Flights);
     // No flight holds its load reversals; all have one length, so hours and flights are equivalent.
     assert_eq!(learned(Some(UsageAxis::Reversals)), learned(None));

@@ -1,6 +1,6 @@
 //! Fuzz target of the assessment: any numbers and dates in the rows of a unit, any settings.
 
-use trend::{FleetPrior, Observation, Series, Settings, UsageDefaults, assess, forecast};
+use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, UsageDefaults, assess, forecast};
 
 use self::edits::number;
 use crate::histories::{self, DAY_US, series};
@@ -63,10 +63,9 @@ fn assess_any(bytes: &[u8]) {
     let (rows, settings, usage, as_of_us) = changed(bytes);
     let Ok(series) = Series::new(rows, &usage) else { return };
     let fleet = [40, 90].map(|n| histories::series(wearing(n)));
-    let prior = bytes
-        .len()
-        .is_multiple_of(2)
-        .then(|| FleetPrior::learn(fleet.iter().chain([&series]), as_of_us, settings.limit_m, None));
+    let prior = bytes.len().is_multiple_of(2).then(|| {
+        FleetPrior::learn(fleet.iter().chain([&series]), as_of_us, settings.limit_m, None, &SerialExecutor)
+    });
     let Ok(found) = assess(&series, as_of_us, &settings, prior.as_ref()) else { return };
     if let Some(level) = found.level {
         assert!(level.gap_m.is_finite() && level.se_m >= 0.0, "level {level:?}");

@@ -1,6 +1,8 @@
 //! Drawn histories with known truth: a calm unit, and what then happens to it.
 
-use trend::{FleetPrior, MaintenanceEvent, Observation, Series, Settings, State, UsageDefaults};
+use trend::{
+    FleetPrior, MaintenanceEvent, Observation, SerialExecutor, Series, Settings, State, UsageDefaults,
+};
 
 use crate::random::Random;
 
@@ -150,7 +152,7 @@ impl Drawn {
 /// The prior of a fleet of histories.
 pub(crate) fn prior<'a>(fleet: impl IntoIterator<Item = &'a Drawn>) -> FleetPrior {
     let series: Vec<Series> = fleet.into_iter().map(Drawn::series).collect();
-    FleetPrior::learn(&series, i64::MAX, LIMIT_M, None)
+    FleetPrior::learn(&series, i64::MAX, LIMIT_M, None, &SerialExecutor)
 }
 
 pub(crate) fn settings() -> Settings {

@@ -1,6 +1,6 @@
 //! Lengths enter by the limit alone: a fleet of parts ten times as large gets the same results.
 
-use trend::{Assessment, FleetPrior, Observation, Series, Settings, assess};
+use trend::{Assessment, FleetPrior, Observation, SerialExecutor, Series, Settings, assess};
 
 use crate::histories::{self, DAY_US};
 use crate::random::Random;
@@ -47,7 +47,7 @@ fn assessments(factor: f64) -> Vec<Assessment> {
     let series = |seed| histories::series(rows(seed).into_iter().map(scaled));
     let fleet: Vec<Series> = (0..UNITS).map(series).collect();
     let settings = Settings::for_limit(factor * LIMIT_M);
-    let prior = FleetPrior::learn(&fleet, DAYS * DAY_US, settings.limit_m, None);
+    let prior = FleetPrior::learn(&fleet, DAYS * DAY_US, settings.limit_m, None, &SerialExecutor);
     let assessment = |(unit, series): (usize, &Series)| {
         // Every sixth unit without the fleet, as a part number without history.
         let prior = (unit % 6 != 5).then_some(&prior);

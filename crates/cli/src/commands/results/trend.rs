@@ -179,7 +179,7 @@ pub(crate) fn by_state<'r>(rows: impl IntoIterator<Item = &'r TrendRow>) -> Stri
     let mut states = BTreeMap::<_, usize>::new();
     let mut with_caveats = 0;
     for row in rows {
-        let state = row.state.and_then(State::from_word);
+        let state = row.state.and_then(|word| word.parse::<State>().ok());
         *states.entry(state).or_default() += 1;
         with_caveats += usize::from(state == Some(State::Normal) && !row.caveats.0.is_empty());
     }
