@@ -6,14 +6,14 @@ use crate::math::distributions::{self, NORMAL_95};
 use crate::measured::exceedance::Exceedance;
 use crate::measured::level::Level;
 use crate::measured::rise::Rise;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
 use crate::statement::types::{Crossing, ForecastMethod, Rate, Utilization, WearStatus};
-use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
+use crate::unit_fit::{Fit, UnitFit};
 
 /// Number of last days that give the utilisation.
 const UTILIZATION_DAYS: i64 = 90;
@@ -47,117 +47,107 @@ pub fn assess(
     let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
     });
-    let forecast = Forecasts::of(&unit, flights, settings, elapsed_hours);
-    let earliest = forecast.crossing.and_then(|crossing| crossing.p05_hours);
+    let mut found = with_forecast(&unit, flights, settings, elapsed_hours);
+    let earliest = found.crossing.and_then(|crossing| crossing.p05_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
-    let growth_probability = rises.or(forecast.growth_probability).unwrap_or_default();
+    let growth_probability = rises.or(found.growth_probability).unwrap_or_default();
     let earliest =
         earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
-    let (state, reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
+    (found.state, found.reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
     let last_us = unit.measured.last_sound_us();
+    let by_forecast = found.over_limit_probability.unwrap_or_default();
     Ok(Assessment {
         as_of_us,
         flights: flights.len(),
         estimates: unit.history.estimates.len(),
-        unit_hours: series.unit_hours_at_start().zip(flights.last()).map(|(start, last)| start + last.hours),
+        unit_hours: series
+            .usage
+            .unit_hours_at_start
+            .zip(flights.last())
+            .map(|(start, last)| start + last.hours),
         level: unit.measured.level,
         latest: unit.measured.latest,
         installation_sd_m: prior.bias_sd_m,
-        rate: forecast.rate,
-        wear: forecast.wear,
-        growth_probability: forecast.growth_probability,
-        law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, forecast.wear == WearStatus::Wearing)),
-        crossing: forecast.crossing,
-        method: forecast.method,
+        law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, found.wear == WearStatus::Wearing)),
         elapsed_hours,
-        check_probability: forecast.check_probability,
         over_limit_probability: over_limit(unit.measured.level, prior.bias_sd_m, settings.limit_m)
-            .map(|measured| measured.max(forecast.over_limit_probability.unwrap_or_default())),
+            .map(|measured| measured.max(by_forecast)),
         utilization,
         outliers_us: unit.outliers_us(flights),
         noise_factor: unit.history.noise_factor,
         stale_days: last_us
             .map(|last_us| as_of_us.saturating_sub(last_us) as f64 / DAY_US as f64)
             .filter(|days| *days > settings.stale_after_days),
-        state,
-        reason,
         changes: unit.changes,
+        ..found
     })
 }
 
-/// Numbers of an assessment that need a forecast.
-#[derive(Default)]
-struct Forecasts {
-    crossing: Option<Crossing>,
-    method: Option<ForecastMethod>,
-    rate: Option<Rate>,
-    wear: WearStatus,
-    growth_probability: Option<f64>,
-    check_probability: Option<f64>,
-    over_limit_probability: Option<f64>,
+/// The part of an assessment that a forecast gives: by wear laws, else by the line through the last records.
+fn with_forecast(
+    unit: &UnitFit<'_>,
+    flights: &[Flight],
+    settings: &Settings,
+    elapsed_hours: f64,
+) -> Assessment {
+    let mut found = match (&unit.fit, unit.rise_now(flights)) {
+        (Some(fit), rise) => {
+            let mut found = by_laws(fit, unit, flights, settings, elapsed_hours);
+            if let (Some(crossing), Some(rise)) = (&mut found.crossing, rise) {
+                // No earliest time lies after that of the line through the last records.
+                let by_line = rise.p05_hours;
+                crossing.p05_hours = Some(crossing.p05_hours.map_or(by_line, |hours| hours.min(by_line)));
+            }
+            found
+        }
+        (None, Some(rise)) => Assessment {
+            crossing: Some(within(rise, settings.horizon_hours)),
+            method: Some(ForecastMethod::Line),
+            rate: Some(Rate {
+                p05_m_per_hour: rise.m_per_hour - NORMAL_95 * rise.m_per_hour_se,
+                m_per_hour: rise.m_per_hour,
+                p95_m_per_hour: rise.m_per_hour + NORMAL_95 * rise.m_per_hour_se,
+            }),
+            wear: WearStatus::Wearing,
+            growth_probability: Some(1.0),
+            check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
+            over_limit_probability: Some(chance_by(elapsed_hours, &rise)).filter(|_| elapsed_hours > 0.0),
+            ..Assessment::default()
+        },
+        (None, None) => Assessment::default(),
+    };
+    if matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held)) {
+        let over = Some(0.0);
+        found.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
+        found.method = Some(ForecastMethod::Measured);
+        found.check_probability = Some(1.0);
+    }
+    found
 }
 
-impl Forecasts {
-    fn of(unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings, elapsed_hours: f64) -> Self {
-        let mut forecasts = match (&unit.fit, unit.rise_now(flights)) {
-            (Some(fit), rise) => {
-                let mut forecasts = Self::by_laws(fit, unit, flights, settings, elapsed_hours);
-                if let (Some(crossing), Some(rise)) = (&mut forecasts.crossing, rise) {
-                    // No earliest time lies after that of the line through the last records.
-                    let by_line = rise.p05_hours;
-                    crossing.p05_hours = Some(crossing.p05_hours.map_or(by_line, |hours| hours.min(by_line)));
-                }
-                forecasts
-            }
-            (None, Some(rise)) => Self {
-                crossing: Some(within(rise, settings.horizon_hours)),
-                method: Some(ForecastMethod::Line),
-                rate: Some(Rate {
-                    p05_m_per_hour: rise.m_per_hour - NORMAL_95 * rise.m_per_hour_se,
-                    m_per_hour: rise.m_per_hour,
-                    p95_m_per_hour: rise.m_per_hour + NORMAL_95 * rise.m_per_hour_se,
-                }),
-                wear: WearStatus::Wearing,
-                growth_probability: Some(1.0),
-                check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
-                over_limit_probability: Some(chance_by(elapsed_hours, &rise)).filter(|_| elapsed_hours > 0.0),
-            },
-            (None, None) => Self::default(),
-        };
-        let is_over =
-            matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held));
-        if is_over {
-            let over = Some(0.0);
-            forecasts.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
-            forecasts.method = Some(ForecastMethod::Measured);
-            forecasts.check_probability = Some(1.0);
-        }
-        forecasts
-    }
-
-    fn by_laws(
-        fit: &Fit<'_>,
-        unit: &UnitFit<'_>,
-        flights: &[Flight],
-        settings: &Settings,
-        elapsed_hours: f64,
-    ) -> Self {
-        let ratio = hours_per_usage(flights, &fit.prior);
-        // A rise that was taken off for the law is still there.
-        let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
-        let settings = &Settings { limit_m, ..*settings };
-        let remaining =
-            RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);
-        let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
-        Self {
-            crossing: Some(remaining.crossing()),
-            method: Some(fit.method),
-            rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
-            wear: wear_status(growth_probability),
-            growth_probability: Some(growth_probability),
-            check_probability: Some(remaining.within(settings.check_interval_hours)),
-            over_limit_probability: Some(remaining.within(elapsed_hours)),
-        }
+/// The same by the mixture of wear laws.
+fn by_laws(
+    fit: &Fit<'_>,
+    unit: &UnitFit<'_>,
+    flights: &[Flight],
+    settings: &Settings,
+    elapsed_hours: f64,
+) -> Assessment {
+    let ratio = hours_per_usage(flights, &fit.prior);
+    // A rise that was taken off for the law is still there.
+    let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
+    let settings = &Settings { limit_m, ..*settings };
+    let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);
+    let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
+    Assessment {
+        crossing: Some(remaining.crossing()),
+        method: Some(fit.method),
+        rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
+        wear: wear_status(growth_probability),
+        growth_probability: Some(growth_probability),
+        check_probability: Some(remaining.within(settings.check_interval_hours)),
+        over_limit_probability: Some(remaining.within(elapsed_hours)),
+        ..Assessment::default()
     }
 }
 

@@ -8,10 +8,10 @@ use crate::inference::posterior::{Posterior, mean_growth};
 use crate::inference::segment_fit::process_variance;
 use crate::math::distributions::NORMAL_95;
 use crate::measured::record::Record;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
 use crate::settings::Settings;
 use crate::statement::crossing::gap_quantiles;
-use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
+use crate::unit_fit::{Fit, UnitFit};
 
 /// A gap and its 90 % interval, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]

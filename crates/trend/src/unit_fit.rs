@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
-use crate::inference::consistency::Evidence;
+use crate::inference::consistency::agrees;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::measured::rise::Rise;
 use crate::measured::{Jump, Measured};
@@ -38,7 +38,7 @@ impl<'a> UnitFit<'a> {
         let flights = series.flights_until(as_of_us);
         let maintenance = series.maintenance_until(as_of_us);
         let measured = Measured::new(flights, maintenance, settings);
-        let history = history::read_history(flights, maintenance, series.unit_hours_at_start(), prior);
+        let history = history::read_history(flights, maintenance, series.usage.unit_hours_at_start, prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
         changes
@@ -95,9 +95,7 @@ fn consistent_fit<'a>(
     }
     let fitted = |segment: &Segment<'_>, prior: &FleetPrior| {
         let posterior = posterior(segment, prior)?;
-        let evidence = Evidence::of(measured, history, flights, prior)?;
-        let ratio = hours_per_usage(flights, prior);
-        evidence.agrees(&posterior, segment.now, prior, history.offset_m2, ratio).then_some(posterior)
+        agrees(&posterior, segment.now, measured, history, flights, prior).then_some(posterior)
     };
     let by_fleet = || {
         let posterior = fitted(last, prior)?;
@@ -152,18 +150,4 @@ fn onset(
     let first = flights.partition_point(|flight| prior.usage(flight) < segment.begin + start);
     let departure_us = flights.get(first)?.departure_us;
     Some(ChangePoint { departure_us, kind: ChangePointKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
-}
-
-/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
-/// flights while that is young.
-pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
-    /// Flights of the present installation below which it is young, and the last ones that show the use.
-    const YOUNG: usize = 20;
-    const LAST: usize = 300;
-    let Some(last) = flights.last() else { return 1.0 };
-    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
-    let back = if here < YOUNG { LAST } else { here.min(LAST) };
-    let first = &flights[flights.len().saturating_sub(back)];
-    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
-    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }

@@ -97,7 +97,7 @@ pub(crate) fn row(
         hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
         flights_per_day: use_now.map(|u| u.flights_per_day),
         hours_per_flight: use_now.map(|u| u.hours_per_flight),
-        usage_source: use_now.and(series).map(|series| series.usage_source().to_string()),
+        usage_source: use_now.and(series).map(|series| series.usage.source.to_string()),
         stale_days: trend.stale_days.filter(|_| removal.is_none()),
         removed_utc: removal.and_then(|installation| installation.removed_utc),
         state: removal.is_none().then(|| state.as_str()),
@@ -144,7 +144,7 @@ pub(crate) fn inspected(
 
 /// Rows of a unit that cannot be right, in words.
 fn row_faults(series: Option<&Series>, history: &History, as_of: Timestamp) -> impl Iterator<Item = String> {
-    let faults = series.map(Series::faults).unwrap_or_default();
+    let faults = series.map(|series| series.faults).unwrap_or_default();
     let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
     // A report of a past date leaves later records out on purpose.
     let now = as_of.max(Timestamp::now());

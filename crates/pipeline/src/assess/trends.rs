@@ -523,7 +523,7 @@ impl<'a> FleetContext<'a> {
         let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
         let limit_m = self.limits.stated_m(name.0.as_deref());
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
-        let usage_axis = prior.map(|prior| prior.axis().to_string());
+        let usage_axis = prior.map(|prior| prior.axis.to_string());
         let index = self.installations.as_ref();
         let installed = index.and_then(|index| index.installed(name, as_of));
         let removal = index.and_then(|index| index.removal(name, as_of));

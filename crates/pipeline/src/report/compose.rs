@@ -254,14 +254,13 @@ fn timed_interval(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<T
 fn prior(
     (part_number, learned_until_utc, prior): (Option<String>, Timestamp, trend::FleetPrior),
 ) -> FleetPriorView {
-    let (new_m, new_sd_m) = prior.new_gap_m();
     let (life_p05_hours, life_p95_hours) = prior.life_range_hours();
     FleetPriorView {
         part_number,
         learned_until_utc,
-        axis: prior.axis().to_string(),
-        new_m,
-        new_sd_m,
+        axis: prior.axis.to_string(),
+        new_m: prior.new_m,
+        new_sd_m: prior.new_sd_m,
         life_p05_hours,
         life_p50_hours: prior.median_life_hours(),
         life_p95_hours,

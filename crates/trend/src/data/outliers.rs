@@ -31,43 +31,31 @@ pub(crate) struct WeightedGap {
     pub(crate) weight: f64,
 }
 
-/// The estimates that take part, those that do not, and the noise found.
-#[derive(Debug, Clone)]
-pub(crate) struct CleanedSeries {
-    pub(crate) estimates: Vec<WeightedGap>,
-    /// Flights whose gap is an outlier.
-    pub(crate) outliers: Vec<usize>,
-    /// Variance found over variance stated.
-    pub(crate) noise_factor: f64,
-}
-
-/// Marks gaps that do not agree with their neighbours and rescales the stated standard errors.
-pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> CleanedSeries {
+/// The estimates that agree with their neighbours, the flights whose gap does not, and variance found over stated.
+///
+/// The weights follow from the standard errors with the scatter that was found.
+pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> (Vec<WeightedGap>, Vec<usize>, f64) {
     let measured = flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?)));
     let (measured, gaps): (Vec<usize>, Vec<Gap>) = measured.unzip();
     let noise = noise(&gaps, limit_m);
     let gaps: Vec<f64> = gaps.iter().map(|gap| gap.gap_m).collect();
-    let mut cleaned = CleanedSeries {
-        estimates: Vec::with_capacity(gaps.len()),
-        outliers: Vec::new(),
-        noise_factor: noise.factor,
-    };
-    let mut errors = Vec::with_capacity(gaps.len());
+    let (mut estimates, mut errors) = (Vec::with_capacity(gaps.len()), Vec::with_capacity(gaps.len()));
+    let mut outliers = Vec::new();
     for (k, is_sound) in noise.are_sound(&gaps, AGREEMENT_SDS).into_iter().enumerate() {
         let flight = measured[k];
         if is_sound {
             let (Flight { installation, departure_us, hours: usage, .. }, gap_m) = (flights[flight], gaps[k]);
             let weight = noise.errors[k].powi(-2);
-            cleaned.estimates.push(WeightedGap { flight, installation, departure_us, usage, gap_m, weight });
+            estimates.push(WeightedGap { flight, installation, departure_us, usage, gap_m, weight });
             errors.push(noise.errors[k]);
         } else {
-            cleaned.outliers.push(flight);
+            outliers.push(flight);
         }
     }
-    let sound: Vec<f64> = cleaned.estimates.iter().map(|estimate| estimate.gap_m).collect();
+    let sound: Vec<f64> = estimates.iter().map(|estimate: &WeightedGap| estimate.gap_m).collect();
     let inflation = certain_inflation(&sound, &errors);
-    cleaned.estimates.iter_mut().for_each(|estimate| estimate.weight /= inflation);
-    cleaned
+    estimates.iter_mut().for_each(|estimate| estimate.weight /= inflation);
+    (estimates, outliers, noise.factor)
 }
 
 /// Standard errors of some gaps in order, with the scatter that was found, m.

@@ -14,10 +14,3 @@ pub(crate) struct Segment<'a> {
     /// Age when it began, if the books know it.
     pub(crate) known_age: Option<f64>,
 }
-
-impl Segment<'_> {
-    /// Whether the age at its begin needs no guessing.
-    pub(crate) fn is_of_known_age(&self) -> bool {
-        self.fresh || self.known_age.is_some()
-    }
-}

@@ -112,9 +112,11 @@ pub struct MaintenanceEvent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
-    usage: UsageDefaults,
+    /// Where the unit's usage is known from.
+    pub usage: UsageDefaults,
     maintenance: Vec<MaintenanceEvent>,
-    faults: RowFaults,
+    /// Rows that cannot be right.
+    pub faults: RowFaults,
 }
 
 /// Rows that cannot be right, by what was done about them.
@@ -158,13 +160,6 @@ impl Series {
         self
     }
 
-    /// The same with the number of hour-meter readings that were left out.
-    #[must_use]
-    pub fn without_readings(mut self, count: usize) -> Self {
-        self.faults.meter_readings = count;
-        self
-    }
-
     /// The recorded maintenance at or before a date.
     pub fn maintenance_until(&self, as_of_us: i64) -> &[MaintenanceEvent] {
         &self.maintenance[..self.maintenance.partition_point(|entry| entry.utc_us <= as_of_us)]
@@ -183,21 +178,6 @@ impl Series {
     /// The gaps known on a day, in order of departure.
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
-    }
-
-    /// Rows that cannot be right.
-    pub fn faults(&self) -> RowFaults {
-        self.faults
-    }
-
-    /// Where the unit's hours are known from.
-    pub fn usage_source(&self) -> UsageSource {
-        self.usage.source
-    }
-
-    /// The unit's own hours when its first flight here began, if known.
-    pub(crate) fn unit_hours_at_start(&self) -> Option<f64> {
-        self.usage.unit_hours_at_start
     }
 }
 

@@ -8,8 +8,7 @@ use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
 use crate::measured::level::measured_level;
 use crate::measured::record::Record;
-use crate::measured::rise::Rise;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
 use crate::statement::history::History;
 use crate::wear::component::Component;
 
@@ -25,68 +24,48 @@ const RATE_RATIO: std::ops::RangeInclusive<f64> = 0.7..=1.8;
 /// Standard errors of the line's slope that are allowed in addition.
 const RATE_REACH: f64 = 2.0;
 
-/// Weighted mean of the last records that a line explains.
-pub(crate) struct Evidence {
-    usage: f64,
-    gap_m: f64,
-    error_m2: f64,
-    rise: Option<Rise>,
-}
-
-impl Evidence {
-    /// The last records, their undone offset and season removed.
-    pub(crate) fn of(
-        measured: &Measured,
-        history: &History,
-        flights: &[Flight],
-        prior: &FleetPrior,
-    ) -> Option<Self> {
-        let season = |us: i64| prior.season.mean_m * prior.season.wave(us as f64);
-        let entry = |r: &Record| {
-            let gap_m = r.gap_m - history.undone_m - season(r.departure_us);
-            (prior.usage(&flights[r.flight]), gap_m, r.error_m.powi(-2))
-        };
-        let records: Vec<(f64, f64, f64)> =
-            last_records(measured, prior.limit_m())?.iter().map(entry).collect();
-        let weight: f64 = records.iter().map(|r| r.2).sum();
-        let mean =
-            |of: &dyn Fn(&(f64, f64, f64)) -> f64| records.iter().map(|r| r.2 * of(r)).sum::<f64>() / weight;
-        let gap_m = mean(&|r| r.1);
-        // Stated errors that are too large would accept any level: the scatter is a second criterion.
-        let scatter_m2 = mean(&|r| (r.1 - gap_m).powi(2));
-        let error_m2 =
-            if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
-        Some(Self { usage: mean(&|r| r.0), gap_m, error_m2, rise: measured.rise })
-    }
-
-    /// Whether a posterior has this level at this usage, and the rate of a significant line now; also false where a
-    /// figure is not a number.
-    pub(crate) fn agrees(
-        &self,
-        posterior: &Posterior,
-        now: f64,
-        prior: &FleetPrior,
-        offset_m2: f64,
-        hours_per_usage: f64,
-    ) -> bool {
-        let since = now - self.usage;
-        let then = |component: &Component| {
-            let value = |age: f64| component.law.value(age);
-            let grown = value(component.age_now) - value(component.age_now - since);
-            component.weight * (component.level_m - component.amplitude_m * grown)
-        };
-        let level_m: f64 = posterior.components.iter().map(then).sum();
-        let systematic_m2 = prior.bias_sd_m.powi(2) + prior.season.sd_m.powi(2) + offset_m2;
-        let has_level = (level_m - self.gap_m).abs() <= REACH * (self.error_m2 + systematic_m2).sqrt();
-        let has_rate = self.rise.is_none_or(|rise| {
-            let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
-            let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / hours_per_usage;
-            let within = RATE_REACH * rise.m_per_hour_se;
-            m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
-                && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within
-        });
-        has_level && has_rate
-    }
+/// Whether a posterior has the level of the last records at their mean usage, and the rate of a significant line now;
+/// also false where a figure is not a number.
+///
+/// The undone offset and the season are taken off the records first.
+pub(crate) fn agrees(
+    posterior: &Posterior,
+    now: f64,
+    measured: &Measured,
+    history: &History,
+    flights: &[Flight],
+    prior: &FleetPrior,
+) -> bool {
+    let Some(records) = last_records(measured, prior.limit_m()) else { return false };
+    let season = |us: i64| prior.season.mean_m * prior.season.wave(us as f64);
+    let adjusted_m = |r: &Record| r.gap_m - history.undone_m - season(r.departure_us);
+    let weight: f64 = records.iter().map(|r| r.error_m.powi(-2)).sum();
+    let mean = |of: &dyn Fn(&Record) -> f64| {
+        records.iter().map(|r| r.error_m.powi(-2) * of(r)).sum::<f64>() / weight
+    };
+    let gap_m = mean(&adjusted_m);
+    // Stated errors that are too large would accept any level: the scatter is a second criterion.
+    let scatter_m2 = mean(&|r| (adjusted_m(r) - gap_m).powi(2));
+    let error_m2 =
+        if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
+    let since = now - mean(&|r| prior.usage(&flights[r.flight]));
+    let then = |component: &Component| {
+        let value = |age: f64| component.law.value(age);
+        let grown = value(component.age_now) - value(component.age_now - since);
+        component.weight * (component.level_m - component.amplitude_m * grown)
+    };
+    let level_m: f64 = posterior.components.iter().map(then).sum();
+    let systematic_m2 = prior.bias_sd_m.powi(2) + prior.season.sd_m.powi(2) + history.offset_m2;
+    let has_level = (level_m - gap_m).abs() <= REACH * (error_m2 + systematic_m2).sqrt();
+    let has_rate = measured.rise.is_none_or(|rise| {
+        let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
+        let hours_per_usage = hours_per_usage(flights, prior);
+        let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / hours_per_usage;
+        let within = RATE_REACH * rise.m_per_hour_se;
+        m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
+            && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within
+    });
+    has_level && has_rate
 }
 
 /// The records of the measured level; without a lone last record, which the next one confirms or refutes.

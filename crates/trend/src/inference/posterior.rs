@@ -21,16 +21,10 @@ const USUAL: f64 = 20.0;
 /// Standard deviations within which a life may lie.
 const LIFE_REACH: f64 = 3.5;
 
-/// How many lives are tried for each curve, over how many standard deviations of its amplitude.
-#[derive(Debug, Clone, Copy)]
-struct LifeGrid {
-    count: usize,
-    reach: f64,
-}
-
-/// Enough to weigh a curve, and enough to state quantiles.
-const ROUGH: LifeGrid = LifeGrid { count: 3, reach: 1.7 };
-const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5 };
+/// Lives tried for each curve, and over how many standard deviations of its amplitude: enough to weigh a curve, and
+/// enough to state quantiles.
+const ROUGH: (usize, f64) = (3, 1.7);
+const THOROUGH: (usize, f64) = (7, 3.5);
 
 /// Log weight below the best at which a curve is dropped.
 const DROP: f64 = 7.0;
@@ -183,34 +177,21 @@ fn scored_candidates(fit: &SegmentFit<'_>, bank: &[Candidate]) -> Vec<ScoredCand
 }
 
 /// Components, with log weights, of every curve that can matter.
-fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: LifeGrid) -> Vec<(usize, Component)> {
+fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: (usize, f64)) -> Vec<(usize, Component)> {
     let scored_candidates = scored_candidates(fit, bank);
-    let add = |scored_candidate: &ScoredCandidate, least: f64, push: &mut dyn FnMut(Component)| {
-        let candidate = &bank[scored_candidate.index];
-        if candidate.law == WearLaw::None {
-            flat(fit, push);
-        } else {
-            try_lives(fit, candidate, scored_candidate, (tried, least), push);
-        }
+    let of = |scored: &ScoredCandidate| match &bank[scored.index] {
+        Candidate { law: WearLaw::None, .. } => flat(fit).to_vec(),
+        candidate => try_lives(fit, candidate, scored, tried),
     };
-    let mut components = Vec::with_capacity(1000);
     let Some(top) = scored_candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else {
-        return components;
+        return Vec::new();
     };
-    let mut best = f64::NEG_INFINITY;
-    add(top, best, &mut |component| best = best.max(component.weight));
+    let best = of(top).iter().map(|component| component.weight).fold(f64::NEG_INFINITY, f64::max);
     // Where the prior excludes the best fit, its bound does not bound the others.
     let floor = top.bound.min(best + USUAL) - DROP - SLACK;
-    let flat = bank.iter().position(|candidate| candidate.law == WearLaw::None);
-    for scored_candidate in scored_candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
-        add(scored_candidate, best - DROP, &mut |component| {
-            best = best.max(component.weight);
-            if component.weight > best - DROP {
-                components.push((scored_candidate.index, component));
-            }
-        });
-    }
-    components
+    let matters = |c: &&ScoredCandidate| c.bound > floor || bank[c.index].law == WearLaw::None;
+    let with_index = |c| of(c).into_iter().map(|component| (c.index, component));
+    scored_candidates.iter().filter(matters).flat_map(with_index).collect()
 }
 
 /// The amplitude that fits the gaps and a new unit's gap best, were amplitudes free.
@@ -235,30 +216,29 @@ fn scored_candidate(
     ScoredCandidate { index, pass, best_m, information, bound }
 }
 
-/// Components of one curve over the lives its amplitude may have, of more than the least log weight.
+/// Components of one curve over the lives its amplitude may have, with log weights.
 fn try_lives(
     fit: &SegmentFit<'_>,
     candidate: &Candidate,
     scored_candidate: &ScoredCandidate,
-    (tried, least): (LifeGrid, f64),
-    push: &mut dyn FnMut(Component),
-) {
+    (count, reach): (usize, f64),
+) -> Vec<Component> {
     let ScoredCandidate { pass, best_m, information, .. } = scored_candidate;
     let (prior, spread) = (fit.prior, fit.new_m2);
-    let reach_m = tried.reach / information.sqrt();
+    let reach_m = reach / information.sqrt();
     let Some((low, high)) = life_range(prior, candidate.law, best_m - reach_m, best_m + reach_m) else {
-        return;
+        return Vec::new();
     };
-    let step = (high - low) / (tried.count - 1) as f64;
+    let step = (high - low) / (count - 1) as f64;
     let age_now = candidate.age + fit.segment.now - fit.segment.begin;
     let height_now = candidate.law.value(age_now);
     let age_assumption = match candidate.law {
-        _ if fit.segment.is_of_known_age() => AgeAssumption::NotNeeded,
+        _ if fit.segment.fresh || fit.segment.known_age.is_some() => AgeAssumption::NotNeeded,
         WearLaw::Onset { .. } => AgeAssumption::NotNeeded,
         _ if candidate.age > 0.0 => AgeAssumption::Worn,
         _ => AgeAssumption::Fresh,
     };
-    for i in 0..tried.count {
+    let component = |i: usize| {
         let ln_life = low + step * i as f64;
         let amplitude_m = prior.span_m / candidate.law.growth_in(ln_life.exp());
         let new_m = fit.gaps.start - amplitude_m * pass.start;
@@ -282,11 +262,9 @@ fn try_lives(
             weight: 0.0,
         };
         let grid = step.ln() + candidate.ln_cell + ln_density_in_grid(candidate, &component);
-        let weight = log_likelihood + grid + fit.logs.of(&component);
-        if weight > least {
-            push(Component { weight, ..component });
-        }
-    }
+        Component { weight: log_likelihood + grid + fit.logs.of(&component), ..component }
+    };
+    (0..count).map(component).collect()
 }
 
 /// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
@@ -308,7 +286,7 @@ fn ln_density_in_grid(candidate: &Candidate, component: &Component) -> f64 {
 }
 
 /// The unit that does not wear, and the one whose onset is yet to come.
-fn flat(fit: &SegmentFit<'_>, push: &mut dyn FnMut(Component)) {
+fn flat(fit: &SegmentFit<'_>) -> [Component; 2] {
     let SegmentFit { prior, logs, segment, gaps, .. } = fit;
     let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / fit.new_m2 + fit.ln_new_m2);
     let component = Component {
@@ -323,9 +301,8 @@ fn flat(fit: &SegmentFit<'_>, push: &mut dyn FnMut(Component)) {
         onset_pending: false,
         weight: 0.0,
     };
-    for component in [component, Component { onset_pending: true, ..component }] {
-        push(Component { weight: log_likelihood + logs.of(&component), ..component });
-    }
+    [component, Component { onset_pending: true, ..component }]
+        .map(|component| Component { weight: log_likelihood + logs.of(&component), ..component })
 }
 
 /// Range of ln life worth trying: where the amplitude may be, within what a life may be.

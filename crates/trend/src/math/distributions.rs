@@ -1,4 +1,4 @@
-//! Normal distribution function.
+//! Normal distribution: its function, its density, and a quadrature rule.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -18,6 +18,15 @@ pub(crate) fn ln_peak_density(sd: f64) -> f64 {
 /// ln √(2π).
 const LN_ROOT_TAU: f64 = 0.918_938_533_204_672_7;
 
+/// Five-point Gauss–Hermite rule for a standard normal variable.
+pub(crate) const GAUSS_HERMITE_5: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -27,6 +36,17 @@ mod tests {
     fn the_normal_tail_holds_to_the_last_digits() {
         for (z, p) in [(-0.3, 0.382_088_577_811_047_4), (-5.0, 2.866_515_718_791_939e-7)] {
             assert!((cdf(z) / p - 1.0).abs() < 1e-14, "{z}: {}", cdf(z));
+        }
+    }
+
+    /// A rule of n points is exact for powers below 2n (Abramowitz and Stegun 1964, 25.4.46); the moments of a standard
+    /// normal variable are 1, 0, 1, 0, 3, 0, 15, 0, 105.
+    #[test]
+    fn rules_have_the_moments_of_a_normal_variable() {
+        const MOMENTS: [f64; 10] = [1.0, 0.0, 1.0, 0.0, 3.0, 0.0, 15.0, 0.0, 105.0, 0.0];
+        for (power, moment) in MOMENTS.iter().enumerate() {
+            let found: f64 = GAUSS_HERMITE_5.iter().map(|(z, weight)| weight * z.powi(power as i32)).sum();
+            assert!((found - moment).abs() < 1e-12 * moment.max(1.0), "{power}: {found}, not {moment}");
         }
     }
 }

@@ -1,6 +1,5 @@
-//! Distributions, quadrature rules and weighted quantiles.
+//! Distributions, medians and weighted quantiles.
 
 pub(crate) mod distributions;
 pub(crate) mod median;
-pub(crate) mod quadrature;
 pub(crate) mod weighted;

@@ -3,7 +3,6 @@
 use crate::data::series::Flight;
 use crate::data::steps::WEAR_NOISE;
 use crate::math::distributions::{NORMAL_95, ln_peak_density};
-use crate::math::quadrature::WAIT_QUANTILES;
 use crate::prior::season_params::SeasonParams;
 use crate::wear::bank::{FAMILIES, WearLaw, default_shares};
 use crate::wear::component::{AgeAssumption, Component};
@@ -20,6 +19,9 @@ const BIAS_SPREAD: f64 = 0.015;
 
 /// A life shorter than this has laws of its own, hours.
 const FAST_LIFE_HOURS: f64 = 600.0;
+
+/// Quantiles of the exponential wait for an onset, one for each tenth.
+pub(crate) const WAIT_QUANTILES: usize = 10;
 
 /// Widths of intervals: with a prior learned from a fleet, with one of no fleet, and of wear at a rate that the last
 /// records show.
@@ -65,14 +67,16 @@ impl UsageAxis {
 /// How units of one part number wear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FleetPrior {
-    /// What wear follows, and the hours that one unit of it is worth in the fleet's mean.
-    pub(crate) axis: UsageAxis,
+    /// What wear follows.
+    pub axis: UsageAxis,
+    /// Hours that one unit of the axis is worth in the fleet's mean.
     pub(crate) hours_per_unit: f64,
     /// Growth that is a life: from new to the act limit, metres.
     pub(crate) span_m: f64,
-    /// Gap of a new unit, mean and spread, metres.
-    pub(crate) new_m: f64,
-    pub(crate) new_sd_m: f64,
+    /// Mean gap of a new unit, metres.
+    pub new_m: f64,
+    /// Standard deviation of the gap of new units, metres.
+    pub new_sd_m: f64,
     /// ln of the life in hours, mean and spread.
     pub(crate) ln_life: f64,
     pub(crate) ln_life_sd: f64,
@@ -152,11 +156,6 @@ impl FleetPrior {
         self.span_m / (1.0 - NEW_SHARE)
     }
 
-    /// What wear follows.
-    pub fn axis(&self) -> UsageAxis {
-        self.axis
-    }
-
     /// Median life from new to the act limit, flight hours at the fleet's mean usage: the median of the log-normal prior
     /// of lives.
     pub fn median_life_hours(&self) -> f64 {
@@ -167,11 +166,6 @@ impl FleetPrior {
     pub fn life_range_hours(&self) -> (f64, f64) {
         let reach = NORMAL_95 * self.ln_life_sd;
         ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
-    }
-
-    /// Mean and standard deviation of a new unit's gap, m.
-    pub fn new_gap_m(&self) -> (f64, f64) {
-        (self.new_m, self.new_sd_m)
     }
 
     /// The usage of a unit up to a flight, hours' worth.
@@ -201,6 +195,20 @@ impl FleetPrior {
     pub(crate) fn includes_law(&self, law: WearLaw) -> bool {
         matches!(law, WearLaw::None | WearLaw::Onset { .. }) || self.shares[law.family()] >= RULED_OUT
     }
+}
+
+/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
+/// flights while that is young.
+pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
+    /// Flights of the present installation below which it is young, and the last ones that show the use.
+    const YOUNG: usize = 20;
+    const LAST: usize = 300;
+    let Some(last) = flights.last() else { return 1.0 };
+    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
+    let back = if here < YOUNG { LAST } else { here.min(LAST) };
+    let first = &flights[flights.len().saturating_sub(back)];
+    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
+    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }
 
 /// Log densities of a prior.

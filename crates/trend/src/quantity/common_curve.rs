@@ -54,17 +54,8 @@ impl CommonCurve {
         let week = departure_us.div_euclid(WEEK_US);
         let before = self.weeks.range(..=week).next_back();
         let after = self.weeks.range(week..).next();
-        match (before, after) {
-            (Some((b, value)), Some((a, other))) => {
-                if week - b <= a - week {
-                    *value
-                } else {
-                    *other
-                }
-            }
-            (Some((_, value)), None) | (None, Some((_, value))) => *value,
-            (None, None) => 0.0,
-        }
+        let near = before.into_iter().chain(after).min_by_key(|(other, _)| other.abs_diff(week));
+        near.map_or(0.0, |(_, deviation)| *deviation)
     }
 
     /// Deviations by the µs since 1970 UTC at which their week begins.

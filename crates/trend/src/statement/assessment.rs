@@ -7,7 +7,7 @@ use crate::statement::types::{ChangePoint, Crossing, ForecastMethod, Rate, Utili
 use crate::wear::bank::WearClass;
 
 /// What is known of one unit on one day.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Assessment {
     /// Date of the assessment, microseconds since 1970 UTC; later data are ignored.
     pub as_of_us: i64,

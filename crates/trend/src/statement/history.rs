@@ -1,6 +1,6 @@
 //! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
 
-use crate::data::outliers::{CleanedSeries, WeightedGap, mark_outliers};
+use crate::data::outliers::{WeightedGap, mark_outliers};
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent};
 use crate::data::steps::{StepChange, detect_steps};
@@ -48,7 +48,7 @@ pub(crate) fn read_history(
     known_age: Option<f64>,
     prior: &FleetPrior,
 ) -> History {
-    let CleanedSeries { estimates, outliers, noise_factor } = mark_outliers(flights, prior.limit_m());
+    let (estimates, outliers, noise_factor) = mark_outliers(flights, prior.limit_m());
     let found = detect_steps(&estimates, prior.limit_m());
     let mut history = History {
         estimates,
@@ -97,8 +97,7 @@ impl History {
         prior: &FleetPrior,
     ) {
         let flight = self.estimates[step.at].flight;
-        let mut entries = maintenance.iter().filter(|entry| is_near(entry, flights, flight)).peekable();
-        let kind = if entries.peek().is_some() || near_installation_change(flights, flight) {
+        let kind = if is_recorded(flights, maintenance, flight) {
             ChangePointKind::Recorded
         } else if self.reset_probability(step, prior) > 0.5 {
             ChangePointKind::Reset
@@ -110,7 +109,8 @@ impl History {
             ChangePointKind::Recorded => 1.0,
             _ => distributions::cdf(step.step_m.abs() / step.se_m),
         };
-        let renewed = entries.any(|entry| entry.renews) && step.step_m < 0.0;
+        let is_renewal = |entry: &MaintenanceEvent| entry.renews && is_near(entry, flights, flight);
+        let renewed = step.step_m < 0.0 && maintenance.iter().any(is_renewal);
         let begins_anew = kind == ChangePointKind::Reset || renewed;
         let (step_m, se_m) =
             if begins_anew { (step.jump_m, step.jump_se_m) } else { (step.step_m, step.se_m) };
@@ -179,7 +179,7 @@ impl History {
 /// Whether installations or maintenance explain a change at a flight.
 pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], flight: usize) -> bool {
     maintenance.iter().any(|entry| is_near(entry, flights, flight))
-        || near_installation_change(flights, flight)
+        || flights[near(flights, flight)].windows(2).any(|pair| pair[0].installation != pair[1].installation)
 }
 
 /// Flights near a step: as far as a few measured flights before and after it. Flights without a record lie between them.
@@ -208,18 +208,7 @@ fn events_without_step<'a>(
     };
     maintenance.iter().filter(move |entry| !has_step(entry)).filter_map(|entry| {
         let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
-        let departure_us = first.departure_us;
-        Some(ChangePoint {
-            departure_us,
-            kind: ChangePointKind::Recorded,
-            step_m: 0.0,
-            se_m: 0.0,
-            certainty: 1.0,
-        })
+        let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
+        Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
     })
-}
-
-/// Whether the books know of a change of installation near this flight.
-fn near_installation_change(flights: &[Flight], flight: usize) -> bool {
-    flights[near(flights, flight)].windows(2).any(|pair| pair[0].installation != pair[1].installation)
 }

@@ -36,14 +36,12 @@ fn probability(sum: f64) -> f64 {
 /// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
 /// where that is most of it.
 pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
-    let starts = posterior.components.iter().filter_map(|n| Some((onset_usage(n)?, n.weight)));
-    let starts = WeightedSamples::new(starts);
+    let start = |n: &Component| match n.law {
+        WearLaw::Onset { start } => Some((start, n.weight)),
+        _ => None,
+    };
+    let starts = WeightedSamples::new(posterior.components.iter().filter_map(start));
     (starts.total > 0.5).then(|| (starts.quantile(0.5), probability(starts.total)))
-}
-
-/// When a component's wear began, in usage since the segment's begin, if it is an onset.
-pub(crate) fn onset_usage(component: &Component) -> Option<f64> {
-    if let WearLaw::Onset { start } = component.law { Some(start) } else { None }
 }
 
 /// Most probable class of wear laws, and its probability; for a wearing unit, of the classes other than none.

@@ -12,7 +12,7 @@ use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// Alert state of a unit, from least to most urgent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, EnumString)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, EnumString)]
 #[strum(serialize_all = "snake_case")]
 pub enum State {
     /// No action.
@@ -20,6 +20,7 @@ pub enum State {
     /// Inspect or monitor the unit.
     Watch,
     /// Nothing is known: no sound record of late, or no limit.
+    #[default]
     Unassessed,
     /// Plan the replacement.
     Plan,
@@ -38,13 +39,14 @@ impl State {
 }
 
 /// Why a state.
-#[derive(Debug, Clone, Copy, PartialEq, IntoStaticStr)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub enum Reason {
     /// No flight of this installation has a gap without a doubt.
     NoRecord { flagged: usize },
     /// No limit is configured.
+    #[default]
     NoLimit,
     /// No sound record for some days; what the last one showed stays known.
     Stale { days: f64, gap_m: f64 },

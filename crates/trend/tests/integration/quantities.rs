@@ -98,14 +98,8 @@ fn a_clear_step_is_dated_at_its_flight_from_the_third_flight_on() {
 #[test]
 fn single_wild_flights_are_outliers_and_no_step() {
     for seed in 0..100 {
-        let values =
-            changed(
-                flights(&mut Random::new(seed), 120, 0.01, 0.0),
-                |k| {
-                    if k % 31 == 17 { 3.0 } else { 0.0 }
-                },
-            );
-        let found = fit(&values);
+        let wild = |k| if k % 31 == 17 { 3.0 } else { 0.0 };
+        let found = fit(&changed(flights(&mut Random::new(seed), 120, 0.01, 0.0), wild));
         assert_eq!((found.steps.len(), found.is_drifting), (0, false), "seed {seed}: {found:?}");
         assert!(found.outliers >= 4);
     }

@@ -53,7 +53,8 @@ impl<'a> UsageSources<'a> {
         let dropped = drop_contradicting(&mut observations);
         let source = self.source(history);
         let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
-        let series = Series::new(observations, &usage)?.without_readings(dropped);
+        let mut series = Series::new(observations, &usage)?;
+        series.faults.meter_readings = dropped;
         Ok(series.with_maintenance(maintenance_events(&self.maintenance, name)))
     }
 }
