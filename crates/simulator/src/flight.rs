@@ -71,7 +71,7 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
     let ([motor, screw, load], gap_m) = fly(plant, profile, sensors, seed);
     let rate_hz = profile.sample_rate_hz;
     Ok(Flight {
-        time_s: sensors.stamps(profile.samples(), rate_hz, seed),
+        time_s: sensors.clock.stamps(profile.samples(), rate_hz, seed),
         motor_m: sensors.motor.read_log(motor, profile, seed, "motor"),
         screw_m: sensors.screw.read_log(screw, profile, seed, "screw"),
         load_n: sensors.load.read_log(load, profile, seed, "load"),

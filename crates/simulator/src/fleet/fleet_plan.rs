@@ -39,7 +39,7 @@ impl Plan {
         let rate_hz = first.profile.sample_rate_hz;
         Ok(SimulatedFlight {
             step_s: 1.0 / rate_hz,
-            time_s: first.sensors.stamps(first.profile.samples(), rate_hz, flight.seed),
+            time_s: first.sensors.clock.stamps(first.profile.samples(), rate_hz, flight.seed),
             actuators,
         })
     }

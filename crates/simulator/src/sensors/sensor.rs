@@ -125,26 +125,13 @@ pub struct Channel {
     pub coloured_form: NoiseColour,
 }
 
-/// Over which range a channel is nonlinear.
-#[derive(Debug, Clone, Copy)]
-enum Range {
-    /// A position over its stroke, either way.
-    Position { stroke_m: f64 },
-    /// A load, either way.
-    Load { load_n: f64 },
-}
-
-impl Range {
-    /// The error of a channel whose nonlinearity is one.
-    fn nonlinearity_at(self, value: f64) -> f64 {
-        match self {
-            Self::Position { stroke_m } => {
-                let u = (value / stroke_m).clamp(-1.0, 1.0);
-                (u - u.powi(3)) / CUBIC_PEAK
-            }
-            Self::Load { load_n } => value * value.abs() / (load_n * load_n),
-        }
+/// The error of a channel whose nonlinearity is one: of a load over `load_n`, of a position over the stroke.
+fn nonlinearity_at(value: f64, profile: &Profile, name: &str) -> f64 {
+    if name == "load" {
+        return value * value.abs() / (profile.load_n * profile.load_n);
     }
+    let u = (value / profile.stroke_m).clamp(-1.0, 1.0);
+    (u - u.powi(3)) / CUBIC_PEAK
 }
 
 /// Mean length of a burst of missing samples.
@@ -196,12 +183,7 @@ impl Channel {
         let coloured =
             self.coloured(values.len(), rate_hz, &mut seeded_rng(seed, &["sensor", name, "coloured"]));
         let rng = &mut seeded_rng(seed, &["sensor", name]);
-        let range = if name == "load" {
-            Range::Load { load_n: profile.load_n }
-        } else {
-            Range::Position { stroke_m: profile.stroke_m }
-        };
-        let read = self.read(values, &coloured, rate_hz, range, rng);
+        let read = self.read(values, &coloured, profile, name, rng);
         if rate_hz < profile.sample_rate_hz {
             let hold = |k| read[held_index(k, profile.sample_rate_hz, rate_hz)];
             return (0..profile.samples()).map(hold).collect();
@@ -239,13 +221,14 @@ impl Channel {
         &self,
         mut values: Vec<f64>,
         coloured: &[f64],
-        rate_hz: f64,
-        range: Range,
+        profile: &Profile,
+        name: &str,
         rng: &mut ChaCha8Rng,
     ) -> Vec<f64> {
+        let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
         let last = (values.len().max(2) - 1) as f64;
         for (k, value) in values.iter_mut().enumerate() {
-            let bent = self.nonlinearity * range.nonlinearity_at(*value)
+            let bent = self.nonlinearity * nonlinearity_at(*value, profile, name)
                 + self.periodic.at(*value)
                 + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);
@@ -317,10 +300,12 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The stamps of evenly spaced samples; with jitter they may run backwards.
-    pub(crate) fn stamps(&self, samples: usize, rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    /// The stamps of evenly spaced samples; with jitter they may run backwards. The same seed gives every actuator of a
+    /// flight the same stamps.
+    pub(crate) fn stamps(&self, samples: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
+        let mut rng = seeded_rng(seed, &["clock"]);
         let stamp = |k: usize| {
-            let white: f64 = StandardNormal.sample(rng);
+            let white: f64 = StandardNormal.sample(&mut rng);
             let time_s = k as f64 / rate_hz + self.jitter_s * white;
             if self.tick_s > 0.0 { (time_s / self.tick_s).round() * self.tick_s } else { time_s }
         };
@@ -371,11 +356,6 @@ impl Sensors {
         not_negative("sensors.clock.jitter_s", self.clock.jitter_s)?;
         not_negative("sensors.clock.tick_s", self.clock.tick_s)
     }
-
-    /// The stamps of a log; the same seed gives every actuator of a flight the same clock.
-    pub(crate) fn stamps(&self, samples: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
-        self.clock.stamps(samples, rate_hz, &mut seeded_rng(seed, &["clock"]))
-    }
 }
 
 #[cfg(test)]
@@ -384,8 +364,8 @@ mod tests {
     use super::*;
 
     fn read(channel: Channel, value: f64, samples: usize) -> Vec<f64> {
-        let range = Range::Position { stroke_m: 1.0 };
-        channel.read(vec![value; samples], &[], 100.0, range, &mut seeded_rng(3, &["sensor"]))
+        let profile = Profile { stroke_m: 1.0, sample_rate_hz: 100.0, ..Profile::default() };
+        channel.read(vec![value; samples], &[], &profile, "screw", &mut seeded_rng(3, &["sensor"]))
     }
 
     /// First-order noise: autocorrelation `e^(−2πft)`; flicker: equal power in each decade.
@@ -477,7 +457,7 @@ mod tests {
     #[test]
     fn stamps_fall_on_ticks() {
         let clock = Clock { jitter_s: 1e-3, tick_s: 0.02 };
-        let stamps = clock.stamps(500, 100.0, &mut seeded_rng(1, &["clock"]));
+        let stamps = clock.stamps(500, 100.0, 1);
         assert!(stamps.iter().all(|t| (t / 0.02 - (t / 0.02).round()).abs() < 1e-9));
     }
 }
