@@ -1,7 +1,6 @@
 //! Plotted forecast of an assessment: smoothed past levels, and quantiles of the future gap.
 
-use crate::data::bins::{self, BINS, Bin};
-use crate::data::segment::Segment;
+use crate::data::bins::{self, BINS, Bin, Segment};
 use crate::data::series::{Flight, Series};
 use crate::error::Error;
 use crate::inference::posterior::{Posterior, mean_growth};
@@ -71,7 +70,10 @@ pub fn forecast(
         let [p05_m, m, p95_m] = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
         let risen_m = unit.history.undone_m.max(0.0);
         let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
-        let mut band = if hours > 0.0 { band.widened(prior.interval_width) } else { band };
+        // As much wider as a crossing's interval.
+        let widened = |bound_m: f64| band.m + prior.interval_width * (bound_m - band.m);
+        let wide = Interval { p05_m: widened(band.p05_m), m: band.m, p95_m: widened(band.p95_m) };
+        let mut band = if hours > 0.0 { wide } else { band };
         // The upper edge meets the limit no later than the line through the last records.
         if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
             let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
@@ -98,14 +100,6 @@ fn line_ahead(
         (hours, Interval { p05_m: at(slope(-1.0), -1.0), m: at(slope(0.0), 0.0), p95_m: at(slope(1.0), 1.0) })
     };
     hours.into_iter().map(after).collect()
-}
-
-impl Interval {
-    /// The band as much wider as a crossing's interval.
-    fn widened(self, width: f64) -> Self {
-        let at = |bound_m: f64| self.m + width * (bound_m - self.m);
-        Self { p05_m: at(self.p05_m), m: self.m, p95_m: at(self.p95_m) }
-    }
 }
 
 /// The level at each bin of a segment: the mean curve plus a smoothed random walk.

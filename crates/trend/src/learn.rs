@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::data::segment::Segment;
+use crate::data::bins::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::data::steps::installation_steps;
 use crate::executor::Executor;

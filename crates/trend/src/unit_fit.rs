@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::data::segment::Segment;
+use crate::data::bins::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::inference::consistency::agrees;
 use crate::inference::posterior::{Posterior, posterior};

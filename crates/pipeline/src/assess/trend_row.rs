@@ -35,7 +35,8 @@ pub(crate) fn row(
     // The installations table says where a unit is; of an external table, its last flight does.
     let place = installed.or(removal).map(TailPosition::of);
     let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
-    let gaps_m = series.map(|series| series.gaps_until(trend.as_of_us)).unwrap_or_default();
+    let flights = series.map_or(&[][..], |series| series.flights_until(trend.as_of_us));
+    let gaps_m: Vec<f64> = flights.iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect();
     // A removed unit wears no more: it has no state, no date and no place among the expected removals.
     let is_judged = limit_m.is_some() && removal.is_none();
     let crossing = trend.crossing.filter(|_| is_judged);

@@ -1,6 +1,19 @@
-//! A segment's estimates in a few bins of equal count: the data of the candidate bank.
+//! A segment of a unit's history, and its estimates in a few bins of equal count: the data of the candidate bank.
 
 use crate::data::outliers::WeightedGap;
+
+/// Segment of a unit's history between resets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Segment<'a> {
+    pub(crate) estimates: &'a [WeightedGap],
+    /// Usage at its beginning and at the date of the assessment.
+    pub(crate) begin: f64,
+    pub(crate) now: f64,
+    /// New or just reset when it began.
+    pub(crate) fresh: bool,
+    /// Age when it began, if the books know it.
+    pub(crate) known_age: Option<f64>,
+}
 
 /// Bins of a long segment.
 pub(crate) const BINS: usize = 48;

@@ -3,6 +3,5 @@
 pub(crate) mod bins;
 pub(crate) mod noise;
 pub(crate) mod outliers;
-pub(crate) mod segment;
 pub(crate) mod series;
 pub(crate) mod steps;

@@ -174,11 +174,6 @@ impl Series {
     pub fn flights_until(&self, as_of_us: i64) -> &[Flight] {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
-
-    /// The gaps known on a day, in order of departure.
-    pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
-        self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
-    }
 }
 
 /// Largest amount of a gap or of its error, m: far beyond any actuator.

@@ -1,7 +1,6 @@
 //! Posterior of every candidate of the bank, given a segment's bins: weights, amplitudes, levels.
 
-use crate::data::bins;
-use crate::data::segment::Segment;
+use crate::data::bins::{self, Segment};
 use crate::inference::level_filter::Regression;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
 use crate::math::distributions::ln_peak_density;

@@ -6,8 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::data::bins::{self, Bin};
-use crate::data::segment::Segment;
+use crate::data::bins::{self, Bin, Segment};
 use crate::inference::level_filter::Pass;
 use crate::inference::posterior::Posterior;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};

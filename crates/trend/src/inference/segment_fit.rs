@@ -1,7 +1,6 @@
 //! Fit of a segment: its bins, their common filter, and the regression of a candidate.
 
-use crate::data::bins::Bin;
-use crate::data::segment::Segment;
+use crate::data::bins::{Bin, Segment};
 use crate::inference::level_filter::{Filter, Pass, Regression};
 use crate::prior::fleet_prior::{FleetPrior, LogPrior};
 

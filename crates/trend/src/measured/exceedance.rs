@@ -1,8 +1,7 @@
 //! Records above the limit: unconfirmed, confirmed, ended.
 
 use crate::measured::level::Level;
-use crate::measured::record::Record;
-use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED};
+use crate::measured::record::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED, Record};
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// The gap is at or above its limit.

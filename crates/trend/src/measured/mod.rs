@@ -7,14 +7,12 @@ pub(crate) mod exceedance;
 pub(crate) mod level;
 pub(crate) mod record;
 pub(crate) mod rise;
-pub(crate) mod thresholds;
 
 use crate::data::series::{DAY_US, Flight, MaintenanceEvent};
 use crate::measured::exceedance::{Exceedance, exceedance};
 use crate::measured::level::{Level, measured_level};
-use crate::measured::record::{Record, records};
+use crate::measured::record::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED, Record, records};
 use crate::measured::rise::{Rise, rise};
-use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED};
 use crate::settings::Settings;
 use crate::statement::types::ChangePoint;
 

@@ -1,7 +1,7 @@
 //! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
 
+use crate::data::bins::Segment;
 use crate::data::outliers::{WeightedGap, mark_outliers};
-use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent};
 use crate::data::steps::{StepChange, detect_steps};
 use crate::math::distributions;

@@ -6,7 +6,7 @@ use strum::{EnumString, IntoStaticStr};
 
 use crate::data::series::DAY_US;
 use crate::measured::exceedance::Exceedance;
-use crate::measured::thresholds::HYSTERESIS;
+use crate::measured::record::HYSTERESIS;
 use crate::measured::{Jump, Measured};
 use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind};

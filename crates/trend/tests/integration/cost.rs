@@ -31,22 +31,14 @@ fn shortest(mut work: impl FnMut(usize)) -> [f64; 2] {
     times
 }
 
-/// Times to assess twenty units of each length.
-fn times(lengths: [i64; 2], rho: f64, step_um: f64) -> [f64; 2] {
-    let units =
-        lengths.map(|flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>());
-    shortest(|of| {
-        for series in &units[of] {
-            assess(series, i64::MAX / 2, &settings(), None).unwrap();
-        }
-    })
-}
-
 /// Exponents of 1.0 to 1.1 on a machine of its own; a quadratic search has two.
 #[test]
 fn time_grows_in_proportion_to_flights() {
     for (name, rho, step_um) in [("calm", 0.0, 0.0), ("autocorrelated", 0.8, 0.0), ("steps", 0.0, 15.0)] {
-        let [short, long] = times([1_500, 6_000], rho, step_um);
+        let units = |flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>();
+        let units = [1_500, 6_000].map(units);
+        let assess = |series| assess(series, i64::MAX / 2, &settings(), None).unwrap();
+        let [short, long] = shortest(|of| units[of].iter().for_each(|series| drop(assess(series))));
         let exponent = (long / short).log(4.0);
         println!("{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}", short * 50.0, long * 50.0);
         assert!(exponent <= 1.5, "{name}: {exponent}");

@@ -1,6 +1,6 @@
 //! States of drawn histories: none less urgent than due, and hardly a false alarm.
 
-use trend::{FleetPrior, State, assess};
+use trend::{State, assess};
 
 use crate::histories::{Drawn, LIMIT_UM, prior, settings};
 
@@ -214,46 +214,33 @@ fn drawn(kind: Kind, number: u64) -> Vec<(Drawn, State)> {
     (0..UNITS).map(one).collect()
 }
 
-/// States at the last flight, each other unit without a fleet.
-fn states(units: &[(Drawn, State)], fleet: &FleetPrior) -> Vec<(State, State, String)> {
-    let settings = settings();
-    let state = |(k, (drawn, due)): (usize, &(Drawn, State))| {
-        let prior = k.is_multiple_of(2).then_some(fleet);
-        let found = assess(&drawn.series(), drawn.now_us(), &settings, prior).unwrap();
-        let shown = found.level.map_or(f64::NAN, |level| level.gap_m * 1e6);
-        (*due, found.state, format!("unit {k}, {shown:.1} µm: {}", found.reason))
-    };
-    units.iter().enumerate().map(state).collect()
-}
-
-fn calm_fleet() -> FleetPrior {
-    let fleet: Vec<Drawn> = drawn(CALM[6], 99).into_iter().take(40).map(|(drawn, _)| drawn).collect();
-    prior(&fleet)
+/// Units of some kinds whose state is off the due one, each other unit without a fleet.
+fn off(first: u64, kinds: &[Kind], is_off: fn(State, State) -> bool) -> Vec<String> {
+    let calm: Vec<Drawn> = drawn(CALM[6], 99).into_iter().take(40).map(|(drawn, _)| drawn).collect();
+    let (fleet, settings, mut all) = (prior(&calm), settings(), Vec::new());
+    for (number, kind) in (first..).zip(kinds) {
+        for (k, (drawn, due)) in drawn(*kind, number).into_iter().enumerate() {
+            let prior = k.is_multiple_of(2).then_some(&fleet);
+            let found = assess(&drawn.series(), drawn.now_us(), &settings, prior).unwrap();
+            let shown_um = found.level.map_or(f64::NAN, |level| level.gap_m * 1e6);
+            if is_off(found.state, due) {
+                let (state, reason) = (found.state, found.reason);
+                all.push(format!("{}, unit {k}: {state:?} for {due:?}, {shown_um:.1} µm: {reason}", kind.0));
+            }
+        }
+    }
+    all
 }
 
 #[test]
 fn no_unit_that_must_be_acted_on_is_given_less() {
-    let fleet = calm_fleet();
-    let mut missed = Vec::new();
-    for (number, kind) in (1..).zip(URGENT) {
-        let found = states(&drawn(kind, number), &fleet);
-        let low: Vec<_> = found.into_iter().filter(|(due, state, _)| state < due).collect();
-        println!("{}: {} of {UNITS} less than due", kind.0, low.len());
-        missed.extend(low.into_iter().map(|low| (kind.0, low)));
-    }
+    let missed = off(1, &URGENT, |found, due| found < due);
     assert!(missed.is_empty(), "{} missed: {missed:#?}", missed.len());
 }
 
 #[test]
 fn calm_units_raise_no_alarm() {
-    let fleet = calm_fleet();
-    let mut alarms = Vec::new();
-    for (number, kind) in (51..).zip(CALM) {
-        let found = states(&drawn(kind, number), &fleet);
-        let high: Vec<_> = found.into_iter().filter(|(due, state, _)| state > due).collect();
-        println!("{}: {} of {UNITS} false alarms", kind.0, high.len());
-        alarms.extend(high.into_iter().map(|high| (kind.0, high)));
-    }
+    let alarms = off(51, &CALM, |found, due| found > due);
     assert!(alarms.len() * 1000 <= 3 * CALM.len() * UNITS as usize, "{} alarms: {alarms:#?}", alarms.len());
 }
 

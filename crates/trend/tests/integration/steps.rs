@@ -5,16 +5,13 @@ use trend::{Observation, Series, Settings, assess};
 use crate::histories::{self, DAY_US};
 use crate::random::Random;
 
-const NOISE_UM: f64 = 1.0;
-
 /// A sparsely logged unit: one log in eleven days, in which it wears by `growth_um`, with a fall before a flight.
 fn series(seed: u64, flights: i64, growth_um: f64, (at, fall_um): (i64, f64)) -> Series {
     let mut random = Random::new(seed);
     let row = |flight: i64| {
         let gap_um = 30.0 + growth_um * flight as f64 - if flight < at { 0.0 } else { fall_um };
-        let measured_um = gap_um + NOISE_UM * random.normal();
         // Flights without a log are in the meter alone.
-        let row = histories::row(flight, 11 * DAY_US, 44.0, measured_um, NOISE_UM);
+        let row = histories::row(flight, 11 * DAY_US, 44.0, gap_um + random.normal(), 1.0);
         Observation { flight_hours: Some(2.0), ..row }
     };
     histories::series((0..flights).map(row))
