@@ -166,7 +166,7 @@ pub struct SimulatedFlight {
 }
 
 /// Installations, flights and truth of a whole fleet.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plan {
     /// The designs, with their limits and nominal mechanics.
     pub parts: Vec<Part>,

@@ -30,10 +30,7 @@ pub(crate) struct Planner<'a> {
     units: Vec<FleetUnit>,
     wear: Vec<ChaCha8Rng>,
     tail_hours: Vec<f64>,
-    installations: Vec<Installation>,
-    maintenance: Vec<Maintenance>,
-    inspections: Vec<Inspection>,
-    flights: Vec<PlannedFlight>,
+    plan: Plan,
 }
 
 impl<'a> Planner<'a> {
@@ -48,10 +45,7 @@ impl<'a> Planner<'a> {
             units,
             wear,
             tail_hours: (0..spec.tails.len()).map(|k| spec.tail_hours * (1.0 + 0.1 * k as f64)).collect(),
-            installations: Vec::new(),
-            maintenance: Vec::new(),
-            inspections: Vec::new(),
-            flights: Vec::new(),
+            plan: Plan { parts: spec.parts.clone(), ..Plan::default() },
         };
         (0..planner.unit_at.len()).for_each(|seat| planner.install(seat, planner.start_us));
         Ok(planner)
@@ -67,7 +61,10 @@ impl<'a> Planner<'a> {
                 self.plan_flight(number, tail);
             }
         }
-        Ok(self.finish())
+        let spec = self.spec;
+        let place = |stay: &Installation| seat(spec, &stay.tail_number, &stay.position);
+        self.plan.installations.sort_by_key(|stay| (place(stay), stay.installed_us));
+        Ok(self.plan)
     }
 
     /// A flight's slot opens at this instant; swaps happen here, while every aircraft is on the ground.
@@ -103,7 +100,7 @@ impl<'a> Planner<'a> {
             let (tail, position) = self.place(seat);
             let here =
                 |stay: &&mut Installation| stay.tail_number == *tail && stay.position == position.position;
-            if let Some(stay) = self.installations.iter_mut().rev().find(here) {
+            if let Some(stay) = self.plan.installations.iter_mut().rev().find(here) {
                 stay.removed_us = Some(at_us);
             }
             self.install(seat, at_us);
@@ -121,7 +118,7 @@ impl<'a> Planner<'a> {
     fn inspect(&mut self, number: usize) {
         for check in self.spec.play_checks.iter().filter(|check| check.before_flight == number) {
             let unit = &self.units[self.unit_at[seat(self.spec, &check.tail, &check.position)]];
-            self.inspections.push(Inspection {
+            self.plan.inspections.push(Inspection {
                 part_number: self.spec.parts[unit.part].part_number.clone(),
                 serial_number: unit.serial_number.clone(),
                 at_us: self.slot_us(number),
@@ -142,7 +139,7 @@ impl<'a> Planner<'a> {
             if shim.is_recorded {
                 let part_number = self.spec.parts[unit.part].part_number.clone();
                 let serial_number = unit.serial_number.clone();
-                self.maintenance.push(Maintenance { part_number, serial_number, at_us });
+                self.plan.maintenance.push(Maintenance { part_number, serial_number, at_us });
             }
         }
     }
@@ -165,7 +162,7 @@ impl<'a> Planner<'a> {
 
     fn install(&mut self, seat: usize, installed_us: i64) {
         let ((tail, position), unit) = (self.place(seat), &self.units[self.unit_at[seat]]);
-        self.installations.push(Installation {
+        self.plan.installations.push(Installation {
             tail_number: tail.clone(),
             position: position.position.clone(),
             part_number: self.spec.parts[unit.part].part_number.clone(),
@@ -190,7 +187,7 @@ impl<'a> Planner<'a> {
         let seats = tail * spec.positions.len()..(tail + 1) * spec.positions.len();
         let (actuators, assignments) =
             seats.map(|seat| self.plan_actuator(seat, number, &flight_id, flight_hours)).unzip();
-        self.flights.push(PlannedFlight {
+        self.plan.flights.push(PlannedFlight {
             tail_number: name.clone(),
             seed: derive_seed(spec.seed, &["log", &flight_id]),
             flight_id,
@@ -283,19 +280,6 @@ impl<'a> Planner<'a> {
         spec.changes.iter().for_each(|change| change.apply(&flight, &mut plant, &mut sensors));
         profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
         Assignment { plant, profile, sensors, part: unit.part }
-    }
-
-    fn finish(self) -> Plan {
-        let mut installations = self.installations;
-        installations
-            .sort_by_key(|stay| (seat(self.spec, &stay.tail_number, &stay.position), stay.installed_us));
-        Plan {
-            parts: self.spec.parts.clone(),
-            installations,
-            maintenance: self.maintenance,
-            inspections: self.inspections,
-            flights: self.flights,
-        }
     }
 }
 

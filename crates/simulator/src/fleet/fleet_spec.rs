@@ -243,10 +243,7 @@ impl Spec {
     }
 
     /// Checks that every number is in its range and every name is declared once.
-    ///
-    /// # Errors
-    /// The first diagnostic, any variant but [`Error::NoSuchFlight`] and [`Error::Misfit`].
-    pub fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         self.start_us()?;
         self.check_names()?;
         self.check_flights()?;

@@ -45,7 +45,7 @@ pub enum WearLaw {
 
 impl WearLaw {
     /// Mean growth from new to an age, metres.
-    pub fn growth_m(&self, unit_hours: f64) -> f64 {
+    pub(crate) fn growth_m(&self, unit_hours: f64) -> f64 {
         match *self {
             Self::Steady => 0.0,
             Self::Linear { rate_m_per_hour } => rate_m_per_hour * unit_hours,

@@ -30,7 +30,7 @@ impl ChannelSampler {
             step_s,
             sensor: SensorState::new(channel, initial),
             shown: initial,
-            average: channel.box_average.then(|| BoxAverage::new(rate_hz, channel.delay_s)),
+            average: channel.box_average.then(BoxAverage::default),
         }
     }
 
@@ -56,10 +56,21 @@ impl ChannelSampler {
             None => self.sample(from_s, before, after),
             Some(average) => {
                 while self.samples.len() < self.wanted {
-                    let Some(mean) = average.next_mean(from_s, before, after, self.step_s) else { break };
-                    self.samples.extend(mean);
+                    let boundary_s = (average.boundaries as f64 - 1.0) / self.rate_hz - self.delay_s;
+                    let part = (boundary_s - from_s) / self.step_s;
+                    if part > 1.0 {
+                        break;
+                    }
+                    // The first boundary ends no period: it opens the first one.
+                    if average.boundaries > 0 {
+                        let rest = integral(before, after, average.since, part, self.step_s);
+                        self.samples.push((average.integral + rest) * self.rate_hz);
+                    }
+                    let boundaries = average.boundaries + 1;
+                    *average = BoxAverage { boundaries, integral: 0.0, since: part };
                 }
-                average.integrate(before, after, self.step_s);
+                average.integral += integral(before, after, average.since, 1.0, self.step_s);
+                average.since = 0.0;
             }
         }
     }
@@ -79,9 +90,7 @@ impl ChannelSampler {
 /// Hysteresis and lag of a sensor, both with a memory of their own.
 #[derive(Debug)]
 struct SensorState {
-    hysteresis: f64,
-    hysteresis_length: f64,
-    lag_s: f64,
+    channel: Channel,
     /// The hysteretic error, within ± `hysteresis`.
     error: f64,
     /// The output of the lag.
@@ -90,17 +99,11 @@ struct SensorState {
 
 impl SensorState {
     fn new(channel: &Channel, initial: f64) -> Self {
-        Self {
-            hysteresis: channel.hysteresis,
-            hysteresis_length: channel.hysteresis_length,
-            lag_s: channel.lag_s,
-            error: 0.0,
-            lagged: initial,
-        }
+        Self { channel: *channel, error: 0.0, lagged: initial }
     }
 
     fn is_ideal(&self) -> bool {
-        self.hysteresis == 0.0 && self.lag_s == 0.0
+        self.channel.hysteresis == 0.0 && self.channel.lag_s == 0.0
     }
 
     /// What the sensor shows after a step in which its input moves evenly between two values.
@@ -108,62 +111,34 @@ impl SensorState {
     /// The hysteretic error obeys `de = (H sgn dx − e) |dx|/ℓ`, and the lag `τ y' = x − y`; both are
     /// integrated exactly.
     fn follow(&mut self, before: f64, after: f64, step_s: f64) -> f64 {
+        let Channel { hysteresis, hysteresis_length, lag_s, .. } = self.channel;
         let mut input = (before, after);
-        if self.hysteresis > 0.0 {
+        if hysteresis > 0.0 {
             let (moved, error) = (after - before, self.error);
-            let towards = self.hysteresis.copysign(moved);
-            self.error = towards + (error - towards) * (-moved.abs() / self.hysteresis_length).exp();
+            let towards = hysteresis.copysign(moved);
+            self.error = towards + (error - towards) * (-moved.abs() / hysteresis_length).exp();
             input = (before - error, after - self.error);
         }
-        if self.lag_s == 0.0 {
+        if lag_s == 0.0 {
             return input.1;
         }
         // The input is a ramp: the output trails it by τ times the slope, and forgets its start.
-        let trail = (input.1 - input.0) / step_s * self.lag_s;
-        let forgotten = (-step_s / self.lag_s).exp();
+        let trail = (input.1 - input.0) / step_s * lag_s;
+        let forgotten = (-step_s / lag_s).exp();
         self.lagged = input.1 - trail + (self.lagged - input.0 + trail) * forgotten;
         self.lagged
     }
 }
 
 /// The mean over one sample period, which ends at the sample instant.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct BoxAverage {
-    rate_hz: f64,
-    delay_s: f64,
     /// Boundaries passed so far; the first opens the first period.
     boundaries: usize,
     /// The integral since the last boundary.
     integral: f64,
     /// Where within the present step the last boundary lay, 0 to 1.
     since: f64,
-}
-
-impl BoxAverage {
-    fn new(rate_hz: f64, delay_s: f64) -> Self {
-        Self { rate_hz, delay_s, boundaries: 0, integral: 0.0, since: 0.0 }
-    }
-
-    /// The mean of a period that ends in this step: none if no boundary is left in it, and an empty
-    /// inner value at the boundary that only opens the first period.
-    #[expect(clippy::option_option, reason = "the first boundary ends no period, yet is passed")]
-    fn next_mean(&mut self, from_s: f64, before: f64, after: f64, step_s: f64) -> Option<Option<f64>> {
-        let boundary_s = (self.boundaries as f64 - 1.0) / self.rate_hz - self.delay_s;
-        let part = (boundary_s - from_s) / step_s;
-        if part > 1.0 {
-            return None;
-        }
-        let whole = self.integral + integral(before, after, self.since, part, step_s);
-        let opens = self.boundaries == 0;
-        (self.boundaries, self.integral, self.since) = (self.boundaries + 1, 0.0, part);
-        Some((!opens).then_some(whole * self.rate_hz))
-    }
-
-    /// The rest of the step after its last boundary.
-    fn integrate(&mut self, before: f64, after: f64, step_s: f64) {
-        self.integral += integral(before, after, self.since, 1.0, step_s);
-        self.since = 0.0;
-    }
 }
 
 /// The integral of a straight line over a part of a step.
