@@ -4,13 +4,15 @@ use crate::mapping::Role;
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::{Dimension, Unit};
 
-/// A name's words: cut at what is no letter or digit, and where a capital follows a small letter.
-fn words(name: &str) -> Vec<(usize, &str)> {
+/// A name's words: cut at what is no letter or digit, and where a capital follows a small letter, but for a unit (`kN`).
+pub(super) fn words(name: &str) -> Vec<(usize, &str)> {
     let mut found = Vec::new();
     let mut start = None;
     let mut before = ' ';
     for (at, c) in name.char_indices().chain(std::iter::once((name.len(), ' '))) {
-        let is_cut = !c.is_alphanumeric() || (c.is_uppercase() && before.is_lowercase());
+        let is_hump = c.is_uppercase() && before.is_lowercase();
+        let is_cut =
+            !c.is_alphanumeric() || (is_hump && !start.is_some_and(|from| is_unit_at(&name[from..])));
         if let (true, Some(from)) = (is_cut, start) {
             found.push((from, &name[from..at]));
             start = None;
@@ -21,6 +23,12 @@ fn words(name: &str) -> Vec<(usize, &str)> {
         before = c;
     }
     found
+}
+
+/// Whether a text begins with a unit that no letter or digit follows.
+fn is_unit_at(text: &str) -> bool {
+    let end = text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len());
+    is_unit(&text[..end])
 }
 
 /// Where a word stands in a list of words.
@@ -179,6 +187,7 @@ mod tests {
             ("ELEV_R_FORCE_LBF", "load; {position}_FORCE_LBF; ELEV_R; lbf"),
             ("RAM_LOAD", "load; RAM_LOAD; -; -"),
             ("rudder_torque_nm", "load; {position}_torque_nm; rudder; N.m"),
+            ("LH Aileron Load [kN]", "load; {position} Load [kN]; LH Aileron; kN"),
             ("resolver angle rudder", "motor; resolver angle {position}; rudder; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");

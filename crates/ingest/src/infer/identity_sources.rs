@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::infer::column_names::place_in;
+use crate::infer::column_names::{place_in, words};
 use crate::log::identity::hive_folders;
 use crate::mapping::IdentityField;
 
@@ -15,11 +15,11 @@ const SOUNDS: [(IdentityField, &str); 6] = [
     ),
     (
         IdentityField::FlightId,
-        "flight_id flight_leg_id flight flight_number flight_no flt_no flt_id leg leg_id sortie",
+        "flight_id flight_leg_id flight flight_number flight_no flt_no flt_id flt flight_leg leg leg_id sortie",
     ),
     (
         IdentityField::DepartureUtc,
-        "departure_utc departure departure_time takeoff_utc takeoff off_block_utc off_block off start_utc date_utc \
+        "departure_utc departure departure_time dep_time takeoff_utc takeoff takeoff_time off_block_utc off_block off start_utc date_utc \
          flight_date date",
     ),
     (IdentityField::Position, "position actuator actuator_position surface"),
@@ -35,7 +35,8 @@ const SOUNDS: [(IdentityField, &str); 6] = [
 
 /// The fact that a name sounds like, and how far behind the best known name of that fact.
 fn rank_of(name: &str) -> Option<(IdentityField, usize)> {
-    let plain = name.trim().to_lowercase().replace(['-', ' ', '.'], "_");
+    let name = name.replace('/', "");
+    let plain = words(&name).iter().map(|(_, word)| word.to_lowercase()).collect::<Vec<_>>().join("_");
     SOUNDS.iter().find_map(|(fact, known)| Some((*fact, place_in(known, &plain)?)))
 }
 

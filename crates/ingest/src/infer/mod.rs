@@ -59,10 +59,10 @@ pub struct InferredMapping {
     pub others: Vec<String>,
 }
 
-/// Names of columns that name the channel of a row, and of those that hold its value.
+/// Names of columns that name the channel of a row, and words in the names of those that hold its value.
 const NAME_COLUMNS: &str =
     "parameter parameter_name param name channel channel_name signal signal_name mnemonic label variable tag";
-const VALUE_COLUMNS: &str = "value val reading data measurement sample v";
+const VALUE_WORDS: &str = "value val reading data measurement sample v";
 /// Words in the names of columns that name the position of a row, beyond those of a fact.
 const POSITION_WORDS: &str = "unit location ema servo actuator side surface lru";
 
@@ -82,8 +82,12 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let layout = layout(&table, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
-    let clock =
-        clock(leaves, |name| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some()));
+    let is_instant = |name: &str| {
+        let texts = table.texts(name).unwrap_or_default();
+        texts.first().is_some_and(|text| text.parse::<jiff::civil::DateTime>().is_ok())
+    };
+    let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
+    let clock = clock(leaves, is_fact, is_instant);
     let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
         let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
@@ -159,10 +163,10 @@ fn identity_columns(
 /// The layout that columns of names, values and positions show.
 fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
     let leaves = table.files[0].leaves();
-    let is_called = |leaf: &LeafColumn, known: &str| place_in(known, &leaf.name.to_lowercase()).is_some();
     let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
-    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, NAME_COLUMNS));
-    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, VALUE_COLUMNS));
+    let name =
+        leaves.iter().filter(text).find(|leaf| place_in(NAME_COLUMNS, &leaf.name.to_lowercase()).is_some());
+    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && has_word_of(&leaf.name, VALUE_WORDS));
     let mut layout = Layout::default();
     if let (Some(name), Some(value)) = (name, value) {
         (layout.name_column, layout.value_column) = (Some(name.name.clone()), Some(value.name.clone()));
@@ -181,10 +185,12 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
     Ok(layout)
 }
 
-/// The time column: timestamps before numbers, names of a time before others; never a column of one value.
+/// The time column: timestamps before numbers and these before texts of instants, names of a time before others; never a
+/// column of one value.
 fn clock(
     leaves: &[LeafColumn],
     is_constant: impl Fn(&str) -> bool,
+    holds_instants: impl Fn(&str) -> bool,
 ) -> Option<(String, Option<&'static str>)> {
     let is_instant = |leaf: &LeafColumn| {
         matches!(leaf.kind, DataType::Timestamp(..) | DataType::Time32(_) | DataType::Time64(_))
@@ -194,11 +200,12 @@ fn clock(
         (true, false, _) => Some(1),
         (false, true, Some(_)) if leaf.kind.is_numeric() => Some(2),
         (false, true, None) if leaf.kind.is_numeric() => Some(3),
+        (false, true, _) if leaf.kind == DataType::Utf8 && holds_instants(&leaf.name) => Some(4),
         _ => None,
     };
     let ranked = leaves.iter().filter_map(|leaf| Some((rank(leaf)?, leaf)));
     let (_, best) = ranked.filter(|(_, leaf)| !is_constant(&leaf.name)).min_by_key(|(rank, _)| *rank)?;
-    Some((best.name.clone(), if is_instant(best) { None } else { time_unit(&best.name) }))
+    Some((best.name.clone(), time_unit(&best.name).filter(|_| best.kind.is_numeric())))
 }
 
 /// The unit that gives the usual step of a column of times a rate between 2 and 5000 Hz; none where two units do.
