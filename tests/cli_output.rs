@@ -412,7 +412,7 @@ fn tables_fit_80_columns_and_keep_what_matters() {
     };
     let shown = [
         "▲ plan 10 Dec N414FP aileron_left 1040-0013",
-        "139.4 of 150.0 µm, +746.2 µm/1000 FH; 5 % by 10 Dec, 50 % by 25 Dec, 95 % by 12 Jan",
+        "139.4 of 150.0 µm, +745.8 µm/1000 FH; 5 % by 10 Dec, 50 % by 25 Dec, 95 % by 12 Jan",
     ];
     let tables: [&[&str]; 4] = [
         &["trend"],
