@@ -16,7 +16,7 @@ pub(crate) fn middle_and_half(values: &[f64]) -> (f64, f64) {
 /// Normal standard deviations in a median absolute deviation.
 pub(crate) const MAD: f64 = 1.482_602_218_505_602;
 
-/// The upper median of values, which are put in another order; zero of none.
+/// The median of values, of an even number the upper of the middle two; zero of none. The values are put in another order.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;

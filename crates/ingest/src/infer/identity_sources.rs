@@ -184,6 +184,14 @@ mod tests {
         assert_eq!(found[&IdentityField::TailNumber], "tail_number");
         assert_eq!(found[&IdentityField::FlightHours], "flight_duration_h");
         assert_eq!(found[&IdentityField::TailHoursEnd], "tail_hours");
+        for (name, fact) in [
+            ("tailNumber", IdentityField::TailNumber),
+            ("A/C Reg", IdentityField::TailNumber),
+            ("flight-leg", IdentityField::FlightId),
+            ("DEP_TIME", IdentityField::DepartureUtc),
+        ] {
+            assert_eq!(fact_of(name), Some(fact), "{name}");
+        }
         let hive =
             folders(Path::new("l/tail=N412FP/off=2026-11-19T04%3A13%3A00Z/actuator=left/part-0.parquet"));
         assert_eq!(hive[&IdentityField::DepartureUtc], "off");

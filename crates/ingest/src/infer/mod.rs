@@ -411,17 +411,38 @@ mod tests {
             ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + f64::from(k / 3 * 10)).collect())),
             ("channel", every(names)),
             ("unit", every(["deg", "mm", "N"])),
-            ("value", Column::Real((0..300).map(f64::from).collect())),
+            ("eng_value", Column::Real((0..300).map(f64::from).collect())),
         ];
         write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
         let found = propose(&file).unwrap();
         assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
-        assert_eq!(found.layout.position_column, None);
+        let Layout { value_column, position_column, .. } = found.layout;
+        assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
         assert_eq!(found.channels[&Role::Load].0, "{position}/load");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
         let epochs = [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true)]
             .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
         assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight]);
+    }
+
+    /// One row per position and instant, whose clock is a text.
+    #[test]
+    fn a_column_of_places_and_a_clock_of_texts_are_understood() {
+        use crate::parquet::writer::{Column, write_parquet};
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("x.parquet");
+        let text = |of: fn(usize) -> String| Column::Text((0..300).map(of).collect());
+        let columns = [
+            ("Date Time (UTC)", text(|k| format!("2026-11-19 04:13:{:02}.{:02}", k / 200, k / 2 % 100))),
+            ("time_source", text(|_| "GPS".to_owned())),
+            ("lru_location", text(|k| ["left", "right"][k % 2].to_owned())),
+            ("motor_deg", Column::Real((0..300).map(f64::from).collect())),
+        ];
+        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
+        let found = propose(&file).unwrap();
+        assert_eq!(found.clock, Some(("Date Time (UTC)".to_owned(), None)));
+        assert_eq!(found.layout.position_column.as_deref(), Some("lru_location"));
+        assert!(found.positions.iter().eq(["left", "right"]));
     }
 
     /// A long table with its identity in columns, one of which is a constant instant.

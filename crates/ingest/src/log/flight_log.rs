@@ -128,7 +128,7 @@ impl Log {
     /// Whether every page of the columns of these actuators carries a checksum.
     ///
     /// # Errors
-    /// When a page header cannot be.
+    /// When a page header cannot be read.
     pub fn has_page_checksums(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<bool, Error> {
         for (sheet, leaves) in self.leaves(used) {
             for file in &sheet.files {
