@@ -1,7 +1,7 @@
 //! The accuracy study: flights of known gap, the methods compared, and how far each is from the truth.
 //!
 //! [`scenarios::classes`] lists classes of flights, each with one assumption of the estimator broken;
-//! [`scenarios::Class::fly`] draws and flies a flight from a class and an index.
+//! `scenarios::Class::fly` draws and flies a flight from a class and an index.
 //!
 //! `simulator` shares no equation with `estimator`, so neither can flatter the other.
 

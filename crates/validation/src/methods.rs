@@ -22,7 +22,7 @@ pub struct MethodResults {
     pub contact: Option<(f64, f64, f64)>,
     /// The reason of a refusal, or the flags of an estimate.
     pub codes: Vec<String>,
-    /// By method: see [`METHODS`].
+    /// By method: see `METHODS`.
     pub by_method_m: [f64; METHODS.len()],
 }
 
