@@ -230,8 +230,8 @@ impl Log {
     /// `own` is the position of a log that holds one actuator and does not name it in its columns.
     ///
     /// # Errors
-    /// [`ErrorKind::NoPosition`] when no column fits; [`ErrorKind::ColumnMissing`] or
-    /// [`ErrorKind::IdentityMissing`] in a log of one actuator.
+    /// `ErrorKind::NoPosition` when no column fits; `ErrorKind::ColumnMissing` or
+    /// `ErrorKind::IdentityMissing` in a log of one actuator.
     pub fn actuators(
         &self,
         channels: &Channels,

@@ -71,7 +71,7 @@ pub enum Encoding {
 /// Writes columns of one length as a Parquet file with key-value metadata, numbers split.
 ///
 /// # Errors
-/// As [`write_encoded`].
+/// As `write_encoded`.
 pub fn write_parquet(
     file: &Path,
     columns: &[(String, Column)],
