@@ -205,6 +205,22 @@ mod tests {
         assert!((found.rms - wanted).abs() < 3.0 * found.uncertainty, "{found:?}");
     }
 
+    #[test]
+    fn noise_is_found_beneath_a_motion_ten_thousand_times_larger() {
+        let motion = |k: usize| 0.02 * (0.004 * k as f64).sin();
+        let values: Vec<f64> = noise(30_000, 2e-6).iter().enumerate().map(|(k, n)| n + motion(k)).collect();
+        near(&values, None, 2e-6);
+    }
+
+    #[test]
+    fn rounding_is_not_noise() {
+        let motion = |k: usize| 0.02 * (0.003 * k as f64).sin();
+        let rounded: Vec<f64> = (0..20_000).map(|k| (motion(k) / 1e-6).round() * 1e-6).collect();
+        assert!(white_noise(&rounded, Some(1e-6)).unwrap().rms < 0.2e-6);
+        let both: Vec<f64> = noise(20_000, 3e-6).iter().map(|n| (n / 2e-6).round() * 2e-6).collect();
+        near(&both, Some(2e-6), 3e-6);
+    }
+
     /// Every value four times, and every value once in four rows.
     #[test]
     fn a_slow_channel_is_taken_at_its_own_rate() {

@@ -188,6 +188,32 @@ mod tests {
                 prop_assert!((v - t - offset).abs() < 1e-7);
             }
         }
+
+        /// Whatever is missing, and however fast it moves, a sample has the turn of the truth, or none where each step is
+        /// longer than half a turn.
+        #[test]
+        fn turns_lost_in_holes_are_those_of_the_other_position(
+            holes in proptest::collection::vec((20_usize..950, 1_usize..200), 1..6), speed in 0.1_f64..20.0,
+        ) {
+            let truth: Vec<f64> = (0..1000).map(|k| 0.05 * (speed * f64::from(k) * 0.004).sin()).collect();
+            let load: Vec<f64> = (0..1000).map(|k| 8e3 * (f64::from(k) * 0.07).sin()).collect();
+            // A sample and a half late, apart by a gap, and wound up by the load.
+            let late = |k: u32| 0.05 * (speed * (f64::from(k) - 1.5) * 0.004).sin();
+            let other: Vec<f64> =
+                (0..).zip(&load).map(|(k, f)| late(k) + 2e-4 * f.signum() + f / 1e7).collect();
+            let mut found: Vec<f64> = truth.iter().map(|x| x.rem_euclid(0.005)).collect();
+            for (start, length) in holes {
+                found[start..(start + length).min(1000)].fill(f64::NAN);
+            }
+            unwrap_turns(&mut found, 0.005);
+            let evidence =
+                TurnEvidence { turn_m: 0.005, other_m: &other, load_n: &load, segments: &[0..1000] };
+            prop_assert!(restore_turns(&mut found, evidence) == 0 || speed > 8.0);
+            let offset = found[0] - truth[0];
+            for (v, t) in found.iter().zip(&truth).filter(|(v, _)| !v.is_nan()) {
+                prop_assert!((v - t - offset).abs() < 1e-9, "{} for {}", v, t + offset);
+            }
+        }
     }
 
     /// The other position jumps by 2 mm in the hole, as a sensor that was exchanged or reset: 0.4 turns of 5 mm.

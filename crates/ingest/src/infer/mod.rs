@@ -83,8 +83,11 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
     let is_instant = |name: &str| {
-        let texts = table.texts(name).unwrap_or_default();
-        texts.first().is_some_and(|text| text.parse::<jiff::civil::DateTime>().is_ok())
+        // A column of stamps has as many texts as rows: the statistics of its first rows show one without reading them.
+        let stated =
+            file.text_bounds(name, 0).map(|bounds| String::from_utf8_lossy(bounds.least).into_owned());
+        let text = stated.or_else(|| table.texts(name).ok()?.first().cloned());
+        text.is_some_and(|text| text.parse::<jiff::civil::DateTime>().is_ok())
     };
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
     let clock = clock(leaves, is_fact, is_instant);

@@ -87,6 +87,32 @@ mod tests {
 
     use super::*;
 
+    fn same(found: &[f64], wanted: &[f64]) {
+        let equal = |(f, w): (&f64, &f64)| (f.is_nan() && w.is_nan()) || (f - w).abs() < 1e-12;
+        assert!(found.len() == wanted.len() && found.iter().zip(wanted).all(equal), "{found:?}");
+    }
+
+    #[test]
+    fn a_line_joins_neighbours_and_never_spans_a_hole() {
+        let nan = f64::NAN;
+        let channel = TimeSeries {
+            at_s: &[0.0, 1.0, 2.0, 3.0, 4.0],
+            values: &[0.0, 10.0, nan, 30.0, 40.0],
+            step_s: 1.0,
+        };
+        let found =
+            interpolate_at(channel, &[-0.5, 0.0, 0.25, 1.0, 1.5, 3.0, 3.5, 4.0, 4.5], Interpolation::Line);
+        same(&found, &[nan, 0.0, 2.5, 10.0, nan, 30.0, 35.0, 40.0, nan]);
+    }
+
+    #[test]
+    fn a_slow_sample_is_given_once_at_the_first_instant_after_it() {
+        let nan = f64::NAN;
+        let channel = TimeSeries { at_s: &[0.0, 1.0, 5.0], values: &[1.0, 2.0, 3.0], step_s: 1.0 };
+        let found = interpolate_at(channel, &[0.0, 0.4, 0.8, 1.2, 1.6, 5.0, 5.4], Interpolation::First);
+        same(&found, &[1.0, nan, nan, 2.0, nan, 3.0, nan]);
+    }
+
     #[test]
     fn a_slow_channel_is_found_whether_repeated_or_left_empty() {
         let nan = f64::NAN;

@@ -179,8 +179,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     }
     fit.unexplained_m = unexplained_m(workspace, scaling, &fit);
     // The load of a bench is no other actuator's: travel that no flank accounts for may be the gap's.
-    let is_on_bench = scaling.motor_sense < 0.0;
-    if fit.unexplained_m > 0.0 && !is_on_bench {
+    if fit.unexplained_m > 0.0 && !scaling.is_locked() {
         return Err(Rejection::MotionUnexplained);
     }
     fit.gap_m.1 = fit.gap_m.1.hypot(fit.unexplained_m);

@@ -117,7 +117,7 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         STRIBECK => lack((0.0, STRIBECK_EXCESS), state.stribeck),
         // The delays that remain once the channels are realigned.
         // A screw that is locked has no delay.
-        SPEED if scaling.motor_sense < 0.0 => zero(LOCKED_SKEW_S * SPEED_M_PER_S),
+        SPEED if scaling.is_locked() => zero(LOCKED_SKEW_S * SPEED_M_PER_S),
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
         LOAD_RATE => {
             GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: SKEW_S / LATE_S * here_m }

@@ -87,6 +87,11 @@ impl Scaling {
         })
     }
 
+    /// Whether the output is locked, as on a bench.
+    pub(crate) fn is_locked(&self) -> bool {
+        self.motor_sense < 0.0
+    }
+
     /// The wind-up of the part at the 95 % load, m.
     pub(crate) fn windup_m(&self) -> f64 {
         self.load_n / self.stiffness_n_per_m
