@@ -190,7 +190,7 @@ pub struct ClockMapping {
     pub rate_hz: Option<f64>,
     /// Resolution of the clock, s: rows that share a timestamp are spread evenly.
     pub tick_s: Option<f64>,
-    /// How far timestamps may fall back and still be sorted, s. Default 1; without limit where a third of them falls.
+    /// How far timestamps may fall back and still be sorted, s. Default 1; without limit where a third of them falls and none is repeated.
     pub max_back_s: Option<f64>,
     /// The longest pause of one flight, s; a log with a longer one is refused. Default 3600.
     pub max_gap_s: Option<f64>,

@@ -29,8 +29,7 @@ const MAX_FIRST_STAMP_S: f64 = 1e11;
 
 /// How far stamps may fall back by default, s.
 const MAX_BACK_S: f64 = 1.0;
-/// A log of which a larger share of the stamps falls was written backwards or in no order: sorting it loses nothing. No
-/// clock restarts so often.
+/// No clock restarts so often that a larger share of the stamps falls.
 const UNORDERED_SHARE: f64 = 1.0 / 3.0;
 
 /// The longest pause within one flight by default, s: recorders pause for minutes, and a turnaround lasts longer.
@@ -176,8 +175,7 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
             return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
         }
     }
-    let fallen = stamps.seconds.windows(2).filter(|w| w[1] < w[0]).count() as f64;
-    let is_in_no_order = fallen > UNORDERED_SHARE * stamps.seconds.len() as f64;
+    let is_in_no_order = is_in_no_order(&stamps.seconds);
     let usual_s = if is_in_no_order { f64::INFINITY } else { MAX_BACK_S };
     let max_back_s = clock.max_back_s.unwrap_or(usual_s);
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
@@ -207,6 +205,18 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
     let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
     Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs })
+}
+
+/// Whether rows were written backwards or in no order, so that sorting them loses nothing. Two recordings whose rows
+/// alternate have stamps in common, and are not sorted into each other.
+fn is_in_no_order(seconds: &[f64]) -> bool {
+    let fallen = seconds.windows(2).filter(|w| w[1] < w[0]).count() as f64;
+    let mut sorted = Vec::new();
+    if fallen > UNORDERED_SHARE * seconds.len() as f64 {
+        sorted.extend(seconds.iter().copied().filter(|s| !s.is_nan()));
+        sorted.sort_unstable_by(f64::total_cmp);
+    }
+    sorted.len() > 1 && strictly_rising(&sorted)
 }
 
 /// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
@@ -429,6 +439,13 @@ mod tests {
             assert_eq!(line.kept, Some(rows));
             assert_eq!((line.segments.len(), line.repairs.repeated), (1, 0));
         }
+    }
+
+    /// Rows of two recorders in turn, one of whose clocks is 5 s ahead.
+    #[test]
+    fn two_recordings_whose_rows_alternate_are_not_sorted_into_each_other() {
+        let t: Vec<f64> = (0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect();
+        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeGoesBack { .. })));
     }
 
     #[test]
