@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use job::Config;
 use records::{
     Flight, FlightId, GapEstimate, GapRecord, Installation, PartNumber, Position, Provenance, SerialNumber,
-    TailNumber,
+    Status, TailNumber,
 };
 use store::{Holder, LogRecord, LogResult, Store};
 
@@ -50,6 +50,17 @@ pub(crate) fn installation(
         unit_hours_at_install: None,
         tail_hours_at_install: None,
         today: None,
+    }
+}
+
+/// An estimate of a gap, µm, to 1 µm.
+pub(crate) fn estimated(gap_um: f64) -> GapEstimate {
+    GapEstimate {
+        status: Status::Estimated,
+        gap_m: Some(gap_um * 1e-6),
+        gap_se_m: Some(1e-6),
+        load_reversals: 100,
+        ..GapEstimate::default()
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use jiff::{SignedDuration, Timestamp};
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::report::compose::compose;
-use records::{GapEstimate, GapRecord, Installations, Status, TrendRow};
+use records::{GapRecord, Installations, TrendRow};
 use report::{Report, UnitView};
 use store::{LogResult, Store};
 
@@ -32,16 +32,9 @@ fn day(count: i32) -> Timestamp {
 fn record(unit: i32, at: i32) -> GapRecord {
     let hours = HOURS_A_DAY * f64::from(at + 1);
     let gap_um = 20.0 + (20.0 + 2.0 * f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-    let estimate = GapEstimate {
-        status: Status::Estimated,
-        gap_m: Some(gap_um * 1e-6),
-        gap_se_m: Some(1e-6),
-        load_reversals: 100,
-        ..GapEstimate::default()
-    };
     let [tail, serial, flight] = [format!("T{unit:02}"), format!("S{unit:02}"), format!("{unit}-{at}")];
     let names = [&tail, "aileron_left", "EMA-27-1040", &serial, &flight];
-    let mut record = fleet::record(names, day(at), 1.5, estimate);
+    let mut record = fleet::record(names, day(at), 1.5, fleet::estimated(gap_um));
     record.flight.tail_hours_end = Some(500.0 + hours);
     record
 }

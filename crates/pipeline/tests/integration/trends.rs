@@ -6,7 +6,7 @@ use pipeline::assess::backtest;
 use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::fleet::histories::Histories;
-use records::{GapEstimate, GapRecord, Installation, Installations, Status, TailNumber, TrendRow};
+use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
 use std::fmt::Write as _;
 
 use crate::fleet::{self, config, scatter_um};
@@ -30,17 +30,10 @@ fn flown(days: i32) -> Vec<GapRecord> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
         let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-        let estimate = GapEstimate {
-            status: Status::Estimated,
-            gap_m: Some(gap_um * 1e-6),
-            gap_se_m: Some(1e-6),
-            load_reversals: 100,
-            ..GapEstimate::default()
-        };
         let [tail, position] = [format!("T{unit:02}"), format!("place_{unit}")];
         let [serial, flight] = [format!("S{unit:02}"), format!("{unit}-{at}")];
         let names = [&tail, &position, "EMA-27-1040", &serial, &flight];
-        let mut record = fleet::record(names, day(at), HOURS_A_DAY, estimate);
+        let mut record = fleet::record(names, day(at), HOURS_A_DAY, fleet::estimated(gap_um));
         record.flight.tail_hours_end = Some(500.0 + hours);
         record
     };

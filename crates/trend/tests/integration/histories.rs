@@ -76,7 +76,7 @@ impl Drawn {
         }
     }
 
-    /// So many logs by chance, of a gap that grows from one value to another.
+    /// Logs of such a gap, their number drawn between two.
     pub(crate) fn some_logs(&mut self, least: usize, most: usize, gap_um: impl Fn(f64) -> f64) {
         let count = self.count(least, most);
         self.logs(count, gap_um);
