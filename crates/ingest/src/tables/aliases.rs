@@ -25,5 +25,5 @@ pub fn aliases(file: &Path) -> Result<Vec<Alias>, Error> {
             serial_number: table.required(row, serial, name::<SerialNumber>)?,
         })
     };
-    (0..table.len()).map(row).collect()
+    table.rows().map(row).collect()
 }

@@ -38,7 +38,7 @@ const ROWS: usize = 65_536;
 #[derive(Debug, Clone)]
 pub struct TableBatch {
     file: PathBuf,
-    header: Arc<[String]>,
+    header: Vec<String>,
     batch: RecordBatch,
     /// Rows of the table before these.
     before: usize,
@@ -76,14 +76,9 @@ impl TableBatch {
         Self { file: name.to_owned(), header, batch, before }
     }
 
-    /// Rows in it.
-    pub fn len(&self) -> usize {
-        self.batch.num_rows()
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// Numbers of its rows.
+    pub fn rows(&self) -> Range<usize> {
+        0..self.batch.num_rows()
     }
 
     pub(super) fn header(&self) -> &[String] {
@@ -163,11 +158,11 @@ impl TableBatch {
             let value = texts.get(row).map(&read).transpose();
             value.map_err(|detail| self.error(row, Some(column), detail))
         };
-        (0..self.len()).map(cell).collect()
+        self.rows().map(cell).collect()
     }
 
     fn cast(&self, column: Option<usize>, wanted: &DataType) -> Result<ArrayRef, Error> {
-        let Some(column) = column else { return Ok(new_null_array(wanted, self.len())) };
+        let Some(column) = column else { return Ok(new_null_array(wanted, self.rows().len())) };
         let array = self.batch.column(column);
         cast(array, wanted).map_err(|_| {
             let (column, found) = (self.header[column].clone(), array.data_type().to_string());
@@ -180,7 +175,10 @@ impl TableBatch {
 ///
 /// # Errors
 /// As [`TableSplits::open`].
-pub fn batches(file: &Path, wanted: Option<&[&str]>) -> Result<TableBatches, Error> {
+pub fn batches(
+    file: &Path,
+    wanted: Option<&[&str]>,
+) -> Result<impl Iterator<Item = Result<TableBatch, Error>> + use<>, Error> {
     let table = TableSplits::open(file, wanted, &[])?;
     table.batches(0..table.len())
 }
@@ -217,14 +215,26 @@ impl TableSplits {
     ///
     /// # Errors
     /// As [`TableSplits::open`].
-    pub fn batches(&self, parts: Range<usize>) -> Result<TableBatches, Error> {
+    pub fn batches(
+        &self,
+        parts: Range<usize>,
+    ) -> Result<impl Iterator<Item = Result<TableBatch, Error>> + use<>, Error> {
         let opened = match &self.parquet {
             Some((file, footer, mask)) => groups(file, footer, mask.clone(), parts),
-            None => Rows::csv(&self.file).map(|(rows, schema)| (rows, schema, 0)),
+            None => csv(&self.file),
         };
-        let (rows, schema, before) = opened.map_err(|fault| Error::new(&self.file, fault))?;
-        let header = schema.fields().iter().map(|f| f.name().clone()).collect();
-        Ok(TableBatches { file: self.file.clone(), header, schema, rows, before, is_begun: false })
+        let Rows { schema, mut batches, mut before } =
+            opened.map_err(|fault| Error::new(&self.file, fault))?;
+        let (file, mut if_none) = (self.file.clone(), Some(RecordBatch::new_empty(schema)));
+        Ok(std::iter::from_fn(move || {
+            let empty = if_none.take();
+            let batch = batches.next().or_else(|| empty.map(Ok))?;
+            Some(batch.map_err(|fault| Error::new(&file, fault)).map(|batch| {
+                let rows = batch.num_rows();
+                before += rows;
+                TableBatch::new(&file, batch, before - rows)
+            }))
+        }))
     }
 }
 
@@ -254,96 +264,66 @@ fn parquet(
     Ok((opened, footer, mask))
 }
 
-/// The rows of some row groups, their columns, and how many rows of the file are before them.
+/// Rows of an open table, in batches.
+struct Rows {
+    schema: Arc<Schema>,
+    batches: Box<dyn Iterator<Item = Result<RecordBatch, ErrorKind>> + Send>,
+    /// Rows of the table before these.
+    before: usize,
+}
+
+/// The rows of some row groups.
 fn groups(
     file: &File,
     footer: &ArrowReaderMetadata,
     mask: ProjectionMask,
     groups: Range<usize>,
-) -> Result<(Rows, Arc<Schema>, usize), ErrorKind> {
+) -> Result<Rows, ErrorKind> {
     let input = read_at::handle(file)?;
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
     let rows = BoundedGroups::new(input, footer.metadata(), groups.collect(), ROWS);
-    let reader = caught(|| {
+    let mut reader = caught(|| {
         let hint = Some(footer.schema().fields());
         let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;
         ParquetRecordBatchReader::try_new_with_row_groups(&levels, &rows, ROWS, None)
     })?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);
-    Ok((Rows::Parquet(reader), schema, before))
+    let batches = Box::new(std::iter::from_fn(move || caught(|| reader.next().transpose()).transpose()));
+    Ok(Rows { schema, batches, before })
 }
 
-/// What [`TableSplits`] reads.
-pub struct TableBatches {
-    file: PathBuf,
-    header: Arc<[String]>,
-    schema: Arc<Schema>,
-    rows: Rows,
-    before: usize,
-    is_begun: bool,
-}
-
-impl Iterator for TableBatches {
-    type Item = Result<TableBatch, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let next = match self.rows.next(&self.schema) {
-            Some(next) => next,
-            None if !self.is_begun => Ok(RecordBatch::new_empty(Arc::clone(&self.schema))),
-            None => return None,
-        };
-        self.is_begun = true;
-        let batch = next.map_err(|fault| Error::new(&self.file, fault)).map(|batch| {
-            let before = self.before;
-            self.before += batch.num_rows();
-            TableBatch { file: self.file.clone(), header: Arc::clone(&self.header), batch, before }
-        });
-        Some(batch)
+/// The rows of a CSV file, all of whose cells are text.
+fn csv(file: &Path) -> Result<Rows, ErrorKind> {
+    let mut text = Vec::new();
+    let mut opened = whole(file)?;
+    transient::with_retry(|| {
+        text.clear();
+        opened.rewind()?;
+        opened.read_to_end(&mut text)
+    })?;
+    if let Some(format) = foreign(&text) {
+        let detail = format!("this is {format}: save it as CSV in UTF-8");
+        return Err(ErrorKind::Table { row: None, column: None, detail });
     }
-}
-
-enum Rows {
-    Parquet(ParquetRecordBatchReader),
-    Csv(csv::StringRecordsIntoIter<Cursor<Vec<u8>>>),
-}
-
-impl Rows {
-    fn csv(file: &Path) -> Result<(Self, Arc<Schema>), ErrorKind> {
-        let mut text = Vec::new();
-        let mut opened = whole(file)?;
-        transient::with_retry(|| {
-            text.clear();
-            opened.rewind()?;
-            opened.read_to_end(&mut text)
-        })?;
-        if let Some(format) = foreign(&text) {
-            let detail = format!("this is {format}: save it as CSV in UTF-8");
-            return Err(ErrorKind::Table { row: None, column: None, detail });
-        }
-        // Spreadsheets open their UTF-8 with a byte order mark.
-        let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
-        let mut text = Cursor::new(text);
-        text.set_position(mark);
-        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
-        let header = reader.headers().map_err(|e| bad_row(&e))?;
-        bounds::check("columns", header.len() as u64, TABLE_COLUMNS as u64)?;
-        let mut names = BTreeSet::new();
-        if let Some(twice) = header.iter().find(|name| !name.is_empty() && !names.insert(*name)) {
-            let detail = format!("the header has column `{twice}` twice: rename or remove one");
-            return Err(ErrorKind::Table { row: None, column: None, detail });
-        }
-        let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
-        Ok((Self::Csv(reader.into_records()), Arc::new(Schema::new(fields))))
+    // Spreadsheets open their UTF-8 with a byte order mark.
+    let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
+    let mut text = Cursor::new(text);
+    text.set_position(mark);
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
+    let header = reader.headers().map_err(|e| bad_row(&e))?;
+    bounds::check("columns", header.len() as u64, TABLE_COLUMNS as u64)?;
+    let mut names = BTreeSet::new();
+    if let Some(twice) = header.iter().find(|name| !name.is_empty() && !names.insert(*name)) {
+        let detail = format!("the header has column `{twice}` twice: rename or remove one");
+        return Err(ErrorKind::Table { row: None, column: None, detail });
     }
-
-    fn next(&mut self, schema: &Arc<Schema>) -> Option<Result<RecordBatch, ErrorKind>> {
-        match self {
-            Self::Parquet(reader) => caught(|| reader.next().transpose()).transpose(),
-            Self::Csv(records) => texts(records, schema).transpose(),
-        }
-    }
+    let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
+    let (schema, mut records) = (Arc::new(Schema::new(fields)), reader.into_records());
+    let of_schema = Arc::clone(&schema);
+    let batches = Box::new(std::iter::from_fn(move || texts(&mut records, &of_schema).transpose()));
+    Ok(Rows { schema, batches, before: 0 })
 }
 
 /// The next rows of a CSV file; nothing at its end.
@@ -469,7 +449,7 @@ mod tests {
             let parted = TableSplits::open(&file, None, &["serial"]).unwrap();
             assert_eq!(parted.len(), 3);
             let rows = |parts: Range<usize>| parted.batches(parts).unwrap().map(Result::unwrap);
-            assert_eq!(rows(1..3).map(|batch| batch.len()).sum::<usize>(), 4, "{kind}");
+            assert_eq!(rows(1..3).map(|batch| batch.rows().len()).sum::<usize>(), 4, "{kind}");
             let last = rows(2..3).next().unwrap();
             let codes = last.dictionary_column(0).unwrap();
             assert_eq!(codes.values().as_string::<i32>().value(codes.key(0).unwrap()), " S1 ");
@@ -492,7 +472,7 @@ mod tests {
             batch(vec![("gap_m", Arc::new(Int64Array::from(vec![1])))]).schema(),
         ));
         let all: Vec<TableBatch> = batches(&file, None).unwrap().collect::<Result<_, _>>().unwrap();
-        assert_eq!((all.len(), all[0].len(), all[0].find(&["gap_m"])), (1, 0, Some(0)));
+        assert_eq!((all.len(), all[0].rows(), all[0].find(&["gap_m"])), (1, 0..0, Some(0)));
     }
 
     proptest! {

@@ -77,7 +77,7 @@ impl Flights {
         let needed = table.columns(["tail_number", "flight_id", "departure_utc"])?;
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
         let (mut flights, mut errors) = (Self::default(), Vec::new());
-        for row in 0..table.len() {
+        for row in table.rows() {
             errors.extend(flights.enter(&table, row, needed, optional, identity).err());
         }
         if let (true, Some(hours)) = (errors.is_empty(), optional[0]) {
@@ -88,7 +88,7 @@ impl Flights {
         }
         let mut hash = blake3::Hasher::new();
         let columns: Vec<usize> = needed.into_iter().chain(optional.into_iter().flatten()).collect();
-        for row in 0..table.len() {
+        for row in table.rows() {
             for column in &columns {
                 hash.update(table.text(row, *column).unwrap_or_default().as_bytes());
                 hash.update(&[0]);

@@ -17,8 +17,8 @@ use crate::tables::table::{ColumnAliases, Table};
 pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
     let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
     let columns = InstallationColumns::find(&table)?;
-    let (mut rows, mut errors) = (Vec::with_capacity(table.len()), Vec::new());
-    for row in 0..table.len() {
+    let (mut rows, mut errors) = (Vec::with_capacity(table.rows().len()), Vec::new());
+    for row in table.rows() {
         match columns.installation(&table, row) {
             Ok(stay) => rows.push(stay),
             Err(error) => errors.push(error),

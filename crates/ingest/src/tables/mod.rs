@@ -11,6 +11,6 @@ mod table;
 
 pub use aliases::aliases;
 pub use cell::{name, number, utc};
-pub use column_batches::{StringColumn, TableBatch, TableBatches, TableSplits, batches, trim_ascii_fast};
+pub use column_batches::{StringColumn, TableBatch, TableSplits, batches, trim_ascii_fast};
 pub use installations::installations;
 pub use table::{ColumnAliases, Table};

@@ -1,6 +1,7 @@
 //! Tables read whole, every cell as text.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use arrow::array::RecordBatch;
@@ -48,7 +49,7 @@ impl Table {
             texts.map_err(|fault| Error::new(name, fault))
         };
         let columns = (0..header.len()).map(column).collect::<Result<_, _>>()?;
-        let rows = parts.iter().map(TableBatch::len).sum();
+        let rows = parts.iter().map(|part| part.rows().len()).sum();
         Ok(Self { file: name.to_owned(), header, columns, rows, names: ColumnAliases::new() })
     }
 
@@ -59,14 +60,9 @@ impl Table {
         self
     }
 
-    /// Rows without the header.
-    pub fn len(&self) -> usize {
-        self.rows
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// Numbers of its rows.
+    pub fn rows(&self) -> Range<usize> {
+        0..self.rows
     }
 
     /// Where a column stands, if it is there under one of its names.

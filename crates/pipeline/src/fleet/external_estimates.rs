@@ -63,7 +63,8 @@ pub fn queries_of(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
     let serial = table.column(&["serial_number", "serial"])?;
     let as_of = table.column(&["as_of_utc"])?;
     let part = table.find(&["part_number"]);
-    (0..table.len())
+    table
+        .rows()
         .map(|row| {
             Ok(AsOfQuery {
                 part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),

@@ -95,7 +95,7 @@ impl<R> RowsByUnit<R> {
         let keys = KeyColumns::of(chunk)?;
         let serial = chunk.find(&["serial_number", "serial"]);
         let mut seen = KeyCache::default();
-        for row in 0..chunk.len() {
+        for row in chunk.rows() {
             let seat = match seen.get(&keys, row) {
                 Some(seat) => seat,
                 None => {

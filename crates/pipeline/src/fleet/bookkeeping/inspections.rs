@@ -136,5 +136,5 @@ pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error>
             force_n: table.optional(row, force, number)?,
         })
     };
-    (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)
+    table.rows().map(check).collect::<Result<Vec<_>, Error>>().map(Some)
 }

@@ -25,7 +25,7 @@ pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
     let (part, serial) = (column("part_number")?, column("serial_number")?);
     let (done, kind) = (column("utc")?, column("kind")?);
     let mut maintenance = MaintenanceLog::new();
-    for row in 0..table.len() {
+    for row in table.rows() {
         let unit = (
             table.required(row, part, name::<PartNumber>)?.to_string(),
             table.required(row, serial, name::<SerialNumber>)?.to_string(),
@@ -61,7 +61,7 @@ pub fn unknown_units(config: &Config, installations: &Installations) -> Vec<Unkn
         let Ok(table) = Table::read(&config.path(file)) else { continue };
         let Ok(serial) = table.column(&["serial_number", "serial"]) else { continue };
         let part = table.find(&["part_number"]);
-        for row in 0..table.len() {
+        for row in table.rows() {
             let Some(serial) = table.text(row, serial) else { continue };
             let part = part.and_then(|column| table.text(row, column));
             let is_known = part.map_or(serials.contains(serial), |part| known.contains(&(part, serial)));
