@@ -27,9 +27,6 @@ pub fn is_passing(code: &str) -> bool {
     is_transient(code) || code == UNREADABLE
 }
 
-/// Remedy of a name that the log does not have.
-const NAMES_ARE_MAPPED: &str = "names are mapped under `[channel]`, `[clock]` and `[identity]`";
-
 /// One file's trouble.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {kind}", file.display())]
@@ -60,7 +57,7 @@ impl Error {
 pub(crate) enum ErrorKind {
     #[error("{}", unreadable(source).0)]
     Unreadable {
-        #[source]
+        #[from]
         source: io::Error,
     },
     #[error(transparent)]
@@ -80,11 +77,11 @@ pub(crate) enum ErrorKind {
         message = "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
     )]
     ForeignFormat { format: &'static str },
-    #[error("{_0}")]
+    #[error(transparent)]
     #[strum(
         message = "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
     )]
-    BeyondLimit(Excess),
+    BeyondLimit(#[from] Excess),
     #[error("{}", match column { Some(column) => format!("column `{column}` is encrypted"), None => "the file is encrypted".into() })]
     #[strum(
         message = "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"
@@ -187,18 +184,6 @@ pub(crate) enum ErrorKind {
     Table { row: Option<u64>, column: Option<String>, detail: String },
 }
 
-impl From<io::Error> for ErrorKind {
-    fn from(source: io::Error) -> Self {
-        Self::Unreadable { source }
-    }
-}
-
-impl From<Excess> for ErrorKind {
-    fn from(excess: Excess) -> Self {
-        Self::BeyondLimit(excess)
-    }
-}
-
 impl ErrorKind {
     /// The stable code; `docs/errors.md` has a paragraph for each.
     fn code(&self) -> &'static str {
@@ -212,9 +197,9 @@ impl ErrorKind {
     fn diagnostic(&self) -> Diagnostic {
         let mut c = Diagnostic::new(self.code(), self);
         self.place(&mut c);
-        c.found = self.found();
-        c.expected = self.expected();
-        c.hint = Some(self.remedy());
+        (c.found, c.expected) = (self.found(), self.expected());
+        c.hint =
+            Some(self.named_remedy().or_else(|| self.get_message().map(str::to_owned)).unwrap_or_default());
         c
     }
 
@@ -292,10 +277,6 @@ impl ErrorKind {
         }
     }
 
-    fn remedy(&self) -> String {
-        self.named_remedy().or_else(|| self.get_message().map(str::to_owned)).unwrap_or_default()
-    }
-
     /// A remedy that depends on what was found, or that several errors share.
     fn named_remedy(&self) -> Option<String> {
         Some(match self {
@@ -320,10 +301,9 @@ impl ErrorKind {
             Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
                 format!("the placeholder of the position is {PLACEHOLDER}")
             }
-            Self::NoPosition { pattern, columns } => {
-                let Some(near) = closest_to_pattern(pattern, columns) else {
-                    return Some(NAMES_ARE_MAPPED.into());
-                };
+            Self::NoPosition { pattern, columns }
+                if let Some(near) = closest_to_pattern(pattern, columns) =>
+            {
                 let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
                 let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
                 format!(
@@ -336,7 +316,9 @@ impl ErrorKind {
             Self::TableColumn { has_semicolons: true, .. } => {
                 "the fields are separated by `;`: save the table with commas, and numbers with a point".into()
             }
-            Self::ColumnMissing { .. } => NAMES_ARE_MAPPED.into(),
+            Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
+                "names are mapped under `[channel]`, `[clock]` and `[identity]`".into()
+            }
             Self::Table { detail, .. } if detail.contains("is not a UTC date") => {
                 "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z".into()
             }
@@ -356,12 +338,9 @@ fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c St
         let start = before.chars().zip(column.chars()).take_while(common).count();
         start + after.chars().rev().zip(column.chars().rev()).take_while(common).count()
     };
-    let score = |column: &str| (shared(column), strsim::jaro_winkler(pattern, column));
-    let by_score = |a: &&String, b: &&String| {
-        let (a, b) = (score(a), score(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-    };
-    columns.iter().max_by(by_score)
+    let scored = columns.iter().map(|name| (shared(name), strsim::jaro_winkler(pattern, name), name));
+    let best = scored.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    best.map(|(_, _, name)| name)
 }
 
 /// Message of the operating system, reworded for the usual cases, and the remedy.
