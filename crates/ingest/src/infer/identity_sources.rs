@@ -47,14 +47,10 @@ pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
 
 /// The name of each fact among some names, the best known one first.
 pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str> {
-    let mut found: BTreeMap<IdentityField, (usize, &str)> = BTreeMap::new();
-    for name in names {
-        let Some((fact, rank)) = rank_of(name) else { continue };
-        if found.get(&fact).is_none_or(|(best, _)| rank < *best) {
-            found.insert(fact, (rank, name));
-        }
-    }
-    found.into_iter().map(|(fact, (_, name))| (fact, name)).collect()
+    let mut ranked: Vec<_> = names.iter().rev().filter_map(|name| Some((rank_of(name)?, *name))).collect();
+    // The last name of a fact is the one that remains: the best known, and of equal ones the first.
+    ranked.sort_by_key(|((_, rank), _)| std::cmp::Reverse(*rank));
+    ranked.into_iter().map(|((fact, _), name)| (fact, name)).collect()
 }
 
 /// Folders called `name=value` whose names sound like facts.
@@ -131,9 +127,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
 
 /// The tail number in a path of one of the forms that [`path_identity`] knows.
 pub fn path_tail(path: &Path) -> Option<String> {
-    let (expression, _) = path_identity(path, false)?;
-    let regex = regex::Regex::new(&expression).ok()?;
-    Some(regex.captures(path.to_str()?)?.name("tail_number")?.as_str().to_owned())
+    captured(&path_identity(path, false)?.0, path.to_str()?, "tail_number")
 }
 
 /// The end of a file name that is a position.
@@ -141,8 +135,13 @@ pub const PLACE_END: &str = r"(?:[^/]*?[_ -])??(?<position>[A-Za-z]+(?:[_ -][A-Z
 
 /// The position at the end of a file name, if it has no digits.
 pub fn path_position(path: &Path) -> Option<String> {
-    let regex = regex::Regex::new(&format!("^{PLACE_END}$")).ok()?;
-    Some(regex.captures(path.file_name()?.to_str()?)?.name("position")?.as_str().to_owned())
+    captured(&format!("^{PLACE_END}$"), path.file_name()?.to_str()?, "position")
+}
+
+/// What a named group of an expression matches in a text.
+fn captured(expression: &str, text: &str, group: &str) -> Option<String> {
+    let regex = regex::Regex::new(expression).ok()?;
+    Some(regex.captures(text)?.name(group)?.as_str().to_owned())
 }
 
 #[cfg(test)]

@@ -132,17 +132,8 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         (None, Some(column)) => table.texts(column)?.as_ref().clone(),
         (tail, _) => tail.into_iter().collect(),
     };
-    Ok(InferredMapping {
-        clock,
-        epoch,
-        layout,
-        metadata,
-        columns,
-        by_row,
-        folders: folders(path),
-        tails,
-        ..found
-    })
+    let folders = folders(path);
+    Ok(InferredMapping { clock, epoch, layout, metadata, columns, by_row, folders, tails, ..found })
 }
 
 /// The columns that hold facts, and whether they name more than one flight.
@@ -170,10 +161,9 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
     let name =
         leaves.iter().filter(text).find(|leaf| place_in(NAME_COLUMNS, &leaf.name.to_lowercase()).is_some());
     let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && has_word_of(&leaf.name, VALUE_WORDS));
-    let mut layout = Layout::default();
-    if let (Some(name), Some(value)) = (name, value) {
-        (layout.name_column, layout.value_column) = (Some(name.name.clone()), Some(value.name.clone()));
-    }
+    let (name_column, value_column) =
+        name.zip(value).map(|(name, value)| (name.name.clone(), value.name.clone())).unzip();
+    let mut layout = Layout { name_column, value_column, position_column: None };
     let is_taken =
         |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
     for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
@@ -224,6 +214,9 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
     }
 }
 
+/// Units of times, and how many seconds each is.
+const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+
 /// A column of numbers; none where it cannot be read.
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
@@ -236,13 +229,7 @@ fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
 /// 1970 where times lie between 1990 and 2100 when they count from there; midnight where they lie within a day and
 /// the name of the column has it.
 fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
-    let scale = match unit {
-        "s" => 1.0,
-        "ms" => 1e-3,
-        "us" => 1e-6,
-        "ns" => 1e-9,
-        _ => return Epoch::None,
-    };
+    let Some((_, scale)) = UNITS.iter().find(|(known, _)| *known == unit) else { return Epoch::None };
     match times.iter().find(|time| !time.is_nan()).map(|first| first * scale) {
         Some(first_s) if (631_152_000.0..4_102_444_800.0).contains(&first_s) => Epoch::Unix,
         Some(first_s) if is_of_day && (0.0..DAY_S).contains(&first_s) => Epoch::Midnight,
@@ -252,9 +239,7 @@ fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
 
 /// The struct that all numbers are fields of, with its dot.
 fn common_root<'l>(numeric: &[&'l LeafColumn]) -> &'l str {
-    let root = |leaf: &&'l LeafColumn| {
-        leaf.name.split_once('.').filter(|_| leaf.is_field).map(|(root, _)| &leaf.name[..=root.len()])
-    };
+    let root = |leaf: &&'l LeafColumn| leaf.name.split_inclusive('.').next().filter(|_| leaf.is_field);
     let first = numeric.first().and_then(root);
     first.filter(|first| numeric.iter().all(|leaf| root(leaf) == Some(first))).unwrap_or_default()
 }
@@ -335,13 +320,9 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
         let is_redundant = |other: &Pattern<'_>| sensor.is_some() && other.2.is_some() && other.0 == *places;
         let others = ranked.iter().skip(1).filter(|(_, other)| is_redundant(other));
         let others: Vec<_> = others.map(|(name, (_, unit, _))| ((*name).to_owned(), *unit)).collect();
-        if !others.is_empty() {
-            found.alternatives.insert(role, others);
-        }
+        found.alternatives.extend((!others.is_empty()).then_some((role, others)));
         if Role::NEEDED.contains(&role) {
-            shared = Some(
-                shared.map_or_else(|| places.clone(), |all| all.intersection(places).copied().collect()),
-            );
+            shared.get_or_insert_with(|| places.clone()).retain(|place| places.contains(place));
         }
     }
     found.positions = shared.unwrap_or_default().into_iter().map(str::to_owned).collect();
@@ -368,6 +349,7 @@ fn wraps_at(file: &LogFile, found: &InferredMapping) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parquet::writer::{Column, write_parquet};
 
     #[test]
     fn a_log_with_names_and_units_is_understood_whole() {
@@ -385,6 +367,14 @@ mod tests {
 
     fn of(names: &[&str]) -> InferredMapping {
         channels(names, "").0
+    }
+
+    /// The mapping that a log with these columns seems to offer.
+    fn proposed(columns: &[(&str, Column)]) -> InferredMapping {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let columns: Vec<_> = columns.iter().map(|(name, own)| ((*name).to_owned(), own.clone())).collect();
+        write_parquet(file.path(), &columns, &[]).unwrap();
+        propose(file.path()).unwrap()
     }
 
     #[test]
@@ -405,9 +395,6 @@ mod tests {
     /// 1,795,061,580 s after 1970 is 2026-11-19T04:13:00Z.
     #[test]
     fn a_clock_that_counts_from_1970_and_a_column_of_units_are_recognised() {
-        use crate::parquet::writer::{Column, write_parquet};
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("x.parquet");
         let names = ["rudder/motor_position", "rudder/screw_position", "rudder/load"];
         let every = |texts: [&str; 3]| Column::Text((0..300).map(|k| texts[k % 3].to_owned()).collect());
         let columns = [
@@ -416,8 +403,7 @@ mod tests {
             ("unit", every(["deg", "mm", "N"])),
             ("eng_value", Column::Real((0..300).map(f64::from).collect())),
         ];
-        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
-        let found = propose(&file).unwrap();
+        let found = proposed(&columns);
         assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
         let Layout { value_column, position_column, .. } = found.layout;
         assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
@@ -431,9 +417,6 @@ mod tests {
     /// One row per position and instant, whose clock is a text.
     #[test]
     fn a_column_of_places_and_a_clock_of_texts_are_understood() {
-        use crate::parquet::writer::{Column, write_parquet};
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("x.parquet");
         let text = |of: fn(usize) -> String| Column::Text((0..300).map(of).collect());
         let columns = [
             ("Date Time (UTC)", text(|k| format!("2026-11-19 04:13:{:02}.{:02}", k / 200, k / 2 % 100))),
@@ -441,8 +424,7 @@ mod tests {
             ("lru_location", text(|k| ["left", "right"][k % 2].to_owned())),
             ("motor_deg", Column::Real((0..300).map(f64::from).collect())),
         ];
-        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
-        let found = propose(&file).unwrap();
+        let found = proposed(&columns);
         assert_eq!(found.clock, Some(("Date Time (UTC)".to_owned(), None)));
         assert_eq!(found.layout.position_column.as_deref(), Some("lru_location"));
         assert!(found.positions.iter().eq(["left", "right"]));
@@ -451,9 +433,6 @@ mod tests {
     /// A long table with its identity in columns, one of which is a constant instant.
     #[test]
     fn a_long_log_with_its_identity_in_columns_is_understood() {
-        use crate::parquet::writer::{Column, write_parquet};
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("x.parquet");
         let rows = 300;
         let names = ["rudder_motor_deg", "rudder_screw_mm", "rudder_load_n"];
         let departure: jiff::Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
@@ -465,13 +444,7 @@ mod tests {
             ("parameter", Column::Text((0..rows).map(|k| names[k % 3].to_owned()).collect())),
             ("value", Column::Real((0..rows).map(|k| k as f64).collect())),
         ];
-        let write = |columns: &[(&str, Column)]| {
-            let columns: Vec<_> =
-                columns.iter().map(|(name, own)| ((*name).to_owned(), own.clone())).collect();
-            write_parquet(&file, &columns, &[]).unwrap();
-        };
-        write(&columns);
-        let found = propose(&file).unwrap();
+        let found = proposed(&columns);
         assert_eq!(found.clock, Some(("stamp_ms".to_owned(), Some("ms"))));
         assert_eq!(found.layout.name_column.as_deref(), Some("parameter"));
         assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
@@ -480,8 +453,7 @@ mod tests {
         assert_eq!((facts, found.by_row), (vec!["tail_number", "flight_id", "departure_utc"], false));
         assert!(found.tails.iter().eq(["N412FP"]));
         columns[1].1 = Column::Text((0..rows).map(|k| format!("N41{}FP", k / 200)).collect());
-        write(&columns);
-        let found = propose(&file).unwrap();
+        let found = proposed(&columns);
         assert!(found.by_row && found.tails.iter().eq(["N410FP", "N411FP"]), "{found:?}");
     }
 }
