@@ -1,7 +1,7 @@
 //! Column builder: converts values to SI and updates their statistics while they are in the cache.
 
 use crate::channel::buffer_pool;
-use crate::channel::si_conversion::SiConversion;
+use crate::channel::si_conversion::{SiConversion, apply_to_all};
 use crate::channel::stats::{ChannelStats, StatsAccumulator};
 
 /// Numbers that are brought in between two looks: few enough to stay in the first cache.
@@ -48,7 +48,7 @@ impl Extend<f64> for ColumnBuilder {
         let before = self.values.len();
         self.values.extend(numbers);
         if let Some(to_si) = self.to_si {
-            to_si.apply_to_all(&mut self.values[before..]);
+            apply_to_all(to_si, &mut self.values[before..]);
         }
         if let Some(scanner) = &mut self.scanner {
             scanner.advance(&self.values);

@@ -296,7 +296,8 @@ pub(crate) fn drop_frozen_samples(
     longest_run: usize,
     step_s: f64,
 ) -> Vec<String> {
-    let least = min_frozen_run(step_s);
+    // A position may repeat its value for half a second.
+    let least = ((0.5 / step_s).ceil() as usize).max(3);
     if longest_run < least {
         return Vec::new();
     }
@@ -309,11 +310,6 @@ pub(crate) fn drop_frozen_samples(
         }
     }
     found
-}
-
-/// Samples in the half second for which a position may repeat its value.
-fn min_frozen_run(step_s: f64) -> usize {
-    ((0.5 / step_s).ceil() as usize).max(3)
 }
 
 /// Segments in which a position is constant for at least half a second while the other position moves a millimetre and

@@ -64,16 +64,11 @@ impl SiConversion {
     pub(crate) fn length(self, raw: f64) -> f64 {
         (raw * self.scale * self.factor).abs()
     }
-
-    /// As [`SiConversion::apply`], in place.
-    pub(crate) fn apply_to_all(self, values: &mut [f64]) {
-        apply_to_all(self, values);
-    }
 }
 
-/// Vectors change no number: sums and products are not fused.
+/// Converts raw readings in place. Vectors change no number: sums and products are not fused.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn apply_to_all(line: SiConversion, values: &mut [f64]) {
+pub(crate) fn apply_to_all(line: SiConversion, values: &mut [f64]) {
     for value in values {
         *value = line.apply(*value);
     }
@@ -107,13 +102,14 @@ pub(crate) fn to_si(
 /// What brings the unit's dimension to the screw axis, or what would be wanted instead.
 fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
     let rotary = matches!(geometry, Geometry::Rotary { .. });
+    let metres_per_radian = geometry.metres_per_radian();
     match unit.dimension() {
         Dimension::Length if rotary => Err("an angle (deg, rad, rev): the part only turns"),
         Dimension::Force if rotary => Err("a torque (N.m, lbf.in, lbf.ft): the part only turns"),
         Dimension::Length | Dimension::Force | Dimension::Temperature => Ok(1.0),
-        Dimension::Angle => geometry.metres_per_radian().ok_or("a length, or the part's `lead_m_per_rev`"),
+        Dimension::Angle => metres_per_radian.ok_or("a length, or the part's `lead_m_per_rev`"),
         Dimension::Torque => {
-            geometry.metres_per_radian().map(f64::recip).ok_or("a force, or the part's `lead_m_per_rev`")
+            metres_per_radian.map(f64::recip).ok_or("a force, or the part's `lead_m_per_rev`")
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Where the bytes of a file come from: this machine, or an object store.
 //!
-//! An object is mirrored in a temporary file, into which the requested ranges are copied: every
-//! reads files reads it the same way, once its bytes are [wanted](ByteSource::want).
+//! An object is mirrored in a temporary file, into which the requested ranges are copied: both are
+//! read the same way, once their bytes are [wanted](ByteSource::want).
 
 use std::fs::File;
 use std::io;

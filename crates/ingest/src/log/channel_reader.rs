@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use crate::channel::buffer_pool;
-use crate::channel::si_conversion::{Geometry, to_si};
+use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
 use crate::channel::stats::ChannelStats;
 use crate::channel::turns::unwrap_turns;
 use crate::error::{Error, ErrorKind};
@@ -235,7 +235,7 @@ impl<'s> ChannelSampling<'s> {
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);
         }
-        si.apply_to_all(&mut values);
+        apply_to_all(si, &mut values);
         Ok(Channel { turn_m: map.wraps_at.map(|turn| si.length(turn)), ..values.into() })
     }
 

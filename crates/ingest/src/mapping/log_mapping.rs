@@ -1,6 +1,5 @@
 //! What a log must offer, and where in it: the mapping that `pipeline.toml` writes down.
 
-use crate::mapping::{RawValue, SampleFilter};
 use std::collections::BTreeMap;
 
 use jiff::civil::Date;
@@ -10,6 +9,7 @@ use serde_with::skip_serializing_none;
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::mapping::units::{TimeUnit, Unit};
+use crate::mapping::{RawValue, SampleFilter};
 
 /// Everything needed to read one log.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -129,22 +129,10 @@ impl TailAlias {
 }
 
 /// A fact about a flight that a log may state.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    JsonSchema,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum IdentityField {
     /// The aircraft.
     TailNumber,

@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray, UInt64Array, make_array};
-use arrow::buffer::NullBuffer;
+use arrow::array::{Array, ArrayRef, AsArray, OffsetSizeTrait, UInt64Array, make_array};
+use arrow::buffer::{NullBuffer, OffsetBuffer};
 use arrow::compute::take;
 use arrow::datatypes::{DataType, Field, Fields};
 
@@ -104,23 +104,24 @@ fn field_of(array: &ArrayRef) -> ArrayRef {
     }
 }
 
+/// The values of all lists of an array, and how many each list holds.
 fn list_values(array: &ArrayRef) -> (ArrayRef, Vec<usize>) {
-    let counted = |ends: Vec<usize>, values: &ArrayRef| {
-        let (first, last) = (ends.first().copied().unwrap_or(0), ends.last().copied().unwrap_or(0));
-        (values.slice(first, last - first), ends.windows(2).map(|w| w[1] - w[0]).collect())
-    };
     if let Some(list) = array.as_list_opt::<i32>() {
-        counted(list.value_offsets().iter().map(|&o| o as usize).collect(), list.values())
+        between(list.offsets(), list.values())
     } else if let Some(list) = array.as_list_opt::<i64>() {
-        counted(list.value_offsets().iter().map(|&o| o as usize).collect(), list.values())
+        between(list.offsets(), list.values())
     } else if let Some(map) = array.as_map_opt() {
-        let entries: ArrayRef = Arc::new(map.entries().clone());
-        counted(map.value_offsets().iter().map(|&o| o as usize).collect(), &entries)
+        between(map.offsets(), map.entries())
     } else {
         let list = array.as_fixed_size_list();
         let each = list.value_length() as usize;
         (Arc::clone(list.values()), vec![each; list.len()])
     }
+}
+
+fn between<O: OffsetSizeTrait>(offsets: &OffsetBuffer<O>, values: &dyn Array) -> (ArrayRef, Vec<usize>) {
+    let lengths: Vec<usize> = offsets.lengths().collect();
+    (values.slice(offsets[0].as_usize(), lengths.iter().sum()), lengths)
 }
 
 /// Values for each outer row, when each of its inner rows holds so many.

@@ -254,9 +254,7 @@ impl LogFile {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         let groups = self.groups();
         let wanted: Vec<bool> = groups.clone().map(scan.wants_group).collect();
-        let chunks = groups.clone().filter(|group| wanted[*group]);
-        let chunks = chunks.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
-        self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))?;
+        self.want(&leaves, |group| wanted[group])?;
         let mut rows = 0_usize;
         for group in groups {
             if !wanted[group] {
@@ -298,7 +296,7 @@ impl LogFile {
         into: &mut ColumnBuilder,
     ) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
-        self.want(&[leaf])?;
+        self.want(&[leaf], |_| true)?;
         let mut rows = 0;
         for group in self.groups() {
             let (declared, wanted) = (self.rows_of(group), wanted.offset(rows));
@@ -368,7 +366,12 @@ impl LogFile {
         }
     }
 
-    fn column(&self, group: usize, leaf: &LeafColumn, scan: Scan<'_>) -> Result<BatchIter, Error> {
+    fn column(
+        &self,
+        group: usize,
+        leaf: &LeafColumn,
+        scan: Scan<'_>,
+    ) -> Result<ParquetRecordBatchReader, Error> {
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
         let schema = footer.parquet_schema();
@@ -376,7 +379,9 @@ impl LogFile {
         let hint = is_coded.then(|| footer.schema().fields());
         let groups = BoundedGroups::new(self.handle()?, footer.metadata(), vec![group], scan.batch_rows);
         parquet_to_arrow_field_levels(schema, mask, hint)
-            .and_then(|levels| BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None))
+            .and_then(|levels| {
+                ParquetRecordBatchReader::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
+            })
             .map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
@@ -400,7 +405,7 @@ impl LogFile {
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
-        self.want(&[leaf])?;
+        self.want(&[leaf], |_| true)?;
         let mut rows = 0_usize;
         for group in self.groups() {
             self.pages(group, leaf)?;
@@ -429,7 +434,7 @@ impl LogFile {
     /// Whether every page of these leaves carries a checksum.
     pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        self.want(&leaves)?;
+        self.want(&leaves, |_| true)?;
         for group in self.groups() {
             for leaf in &leaves {
                 if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
@@ -444,9 +449,9 @@ impl LogFile {
         self.footer.metadata().row_group(group).column(leaf.index)
     }
 
-    /// Fetches every chunk of these leaves.
-    fn want(&self, leaves: &[&LeafColumn]) -> Result<(), Error> {
-        let groups = self.groups();
+    /// Fetches the chunks of these leaves in some row groups.
+    fn want(&self, leaves: &[&LeafColumn], wants_group: impl Fn(usize) -> bool) -> Result<(), Error> {
+        let groups = self.groups().filter(|group| wants_group(*group));
         let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
         self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
     }
@@ -478,7 +483,7 @@ impl LogFile {
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
-        self.want(&wanted)?;
+        self.want(&wanted, |_| true)?;
         for group in self.groups() {
             for leaf in &wanted {
                 let (start, bytes) = self.chunk(group, leaf).byte_range();
@@ -514,8 +519,6 @@ impl TextBounds<'_> {
         if self.is_exact && self.least == self.greatest { std::str::from_utf8(self.least).ok() } else { None }
     }
 }
-
-type BatchIter = ParquetRecordBatchReader;
 
 /// A footer by which text columns of these names are read as codes of their dictionary.
 pub(crate) fn with_codes(

@@ -11,7 +11,7 @@ use bytes::Bytes;
 use flate2::read::MultiGzDecoder;
 use lz4_flex::{block, frame};
 use parquet::arrow::arrow_reader::RowGroups;
-use parquet::basic::{Compression, Encoding, Type};
+use parquet::basic::{Compression, Encoding, EncodingMask, Type};
 use parquet::column::page::{Page, PageIterator, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
@@ -278,20 +278,11 @@ pub(crate) fn batch_rows(chunk: &ColumnChunkMetaData, pages: &[RawPage], usual: 
     fitting.clamp(LEAST_BATCH, usual.max(LEAST_BATCH))
 }
 
+/// The parquet crate's encoding of this number.
 fn encoding(raw: RawEncoding) -> Result<Encoding> {
-    Ok(match raw {
-        RawEncoding::PLAIN => Encoding::PLAIN,
-        RawEncoding::PLAIN_DICTIONARY => Encoding::PLAIN_DICTIONARY,
-        RawEncoding::RLE => Encoding::RLE,
-        #[expect(deprecated, reason = "old files have levels in it")]
-        RawEncoding::BIT_PACKED => Encoding::BIT_PACKED,
-        RawEncoding::DELTA_BINARY_PACKED => Encoding::DELTA_BINARY_PACKED,
-        RawEncoding::DELTA_LENGTH_BYTE_ARRAY => Encoding::DELTA_LENGTH_BYTE_ARRAY,
-        RawEncoding::DELTA_BYTE_ARRAY => Encoding::DELTA_BYTE_ARRAY,
-        RawEncoding::RLE_DICTIONARY => Encoding::RLE_DICTIONARY,
-        RawEncoding::BYTE_STREAM_SPLIT => Encoding::BYTE_STREAM_SPLIT,
-        RawEncoding(other) => return fail(format!("a page uses the unknown encoding {other}")),
-    })
+    let bit = u32::try_from(raw.0).ok().and_then(|number| 1_i32.checked_shl(number));
+    let known = bit.and_then(|bit| EncodingMask::try_new(bit).ok()?.encodings().next());
+    known.map_or_else(|| fail(format!("a page uses the unknown encoding {}", raw.0)), Ok)
 }
 
 /// Appends what `packed` unpacks to until `into` holds one byte more than the page claims.
