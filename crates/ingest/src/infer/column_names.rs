@@ -28,7 +28,7 @@ pub(super) fn words(name: &str) -> Vec<(usize, &str)> {
 /// Whether a text begins with a unit that no letter or digit follows.
 fn is_unit_at(text: &str) -> bool {
     let end = text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len());
-    is_unit(&text[..end])
+    unit_of(&text[..end]).is_some()
 }
 
 /// Where a word stands in a list of words.
@@ -40,8 +40,10 @@ pub(super) fn has_word_of(name: &str, list: &str) -> bool {
     words(name).iter().any(|(_, word)| place_in(list, &word.to_lowercase()).is_some())
 }
 
+/// Whether a column seems to hold times; `second` alone is a time, within a name it may be a unit (`deg_per_sec`).
 pub(super) fn is_time(name: &str) -> bool {
     has_word_of(name, "time t timestamp stamp elapsed tick ticks clock utc epoch unix gmt zulu tod")
+        || place_in("s sec second seconds", &name.to_lowercase()).is_some()
 }
 
 /// Whether a time of this name counts from midnight, if its values do not contradict.
@@ -52,23 +54,23 @@ pub(super) fn is_of_day(name: &str) -> bool {
 /// The unit of a time that ends its name.
 pub(super) fn time_unit(name: &str) -> Option<&'static str> {
     let word = words(name).last()?.1.to_lowercase();
-    let units = ["s sec seconds", "ms", "us", "ns", "min", "h hours"];
+    let units = ["s sec second seconds", "ms", "us", "ns", "min", "h hours"];
     units.iter().find(|list| place_in(list, &word).is_some())?.split(' ').next()
 }
 
 const ROLES: [(Role, &str); 4] = [
     (Role::Motor, "motor mot mtr resolver rotor input drive"),
-    (Role::Screw, "screw nut ram lvdt output stroke rod joint"),
+    (Role::Screw, "screw scrw nut ram lvdt output stroke rod joint"),
     (Role::Load, "load force frc torque trq loadcell"),
     (Role::Temperature, "temp temperature"),
 ];
 
 /// Words without information.
-const FILLERS: &str = "position pos angle displacement cell sensor meas value";
+const FILLERS: &str = "position pos posn angle displacement disp cell sensor meas value raw counts";
 
-/// The unit that a word in small letters is.
-fn unit_of(word: &str) -> Option<Unit> {
-    Unit::from_symbol(match word {
+/// The unit of which a text is the symbol, in letters of either case.
+pub(super) fn unit_of(text: &str) -> Option<Unit> {
+    Unit::from_symbol(match text.trim().to_lowercase().as_str() {
         "n" => "N",
         "kn" => "kN",
         "dan" => "daN",
@@ -78,11 +80,6 @@ fn unit_of(word: &str) -> Option<Unit> {
         "k" => "K",
         other => other,
     })
-}
-
-/// Whether a text is the symbol of a unit.
-pub(super) fn is_unit(text: &str) -> bool {
-    unit_of(&text.trim().to_lowercase()).is_some()
 }
 
 /// Words of quantities that are no position, load or temperature.
@@ -189,6 +186,8 @@ mod tests {
             ("rudder_torque_nm", "load; {position}_torque_nm; rudder; N.m"),
             ("LH Aileron Load [kN]", "load; {position} Load [kN]; LH Aileron; kN"),
             ("resolver angle rudder", "motor; resolver angle {position}; rudder; -"),
+            ("27-10 LH AIL EMA MTR POSN (DEG)", "motor; {position} MTR POSN (DEG); 27-10 LH AIL EMA; deg"),
+            ("RUD_SCRW_DISP_raw", "screw; {position}_SCRW_DISP_raw; RUD; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");
         }

@@ -11,16 +11,13 @@ use crate::mapping::IdentityField;
 const SOUNDS: [(IdentityField, &str); 6] = [
     (
         IdentityField::TailNumber,
-        "tail_number tail tail_no registration reg ac_reg aircraft_registration aircraft tail_id aircraft_id ac_id ac msn",
+        "tail_number tail tail_no registration reg aircraft_registration aircraft ac msn",
     ),
-    (
-        IdentityField::FlightId,
-        "flight_id flight_leg_id flight flight_number flight_no flt_no flt_id flt flight_leg leg leg_id sortie",
-    ),
+    (IdentityField::FlightId, "flight_id flight_leg_id flight flight_number flight_no flt_no flt leg sortie"),
     (
         IdentityField::DepartureUtc,
-        "departure_utc departure departure_time dep_time takeoff_utc takeoff takeoff_time off_block_utc off_block off start_utc date_utc \
-         flight_date date",
+        "departure_utc departure departure_time dep_time takeoff_utc takeoff off_block_utc off_block off start_utc \
+         date_utc flight_date date",
     ),
     (IdentityField::Position, "position actuator actuator_position surface"),
     (
@@ -33,11 +30,27 @@ const SOUNDS: [(IdentityField, &str); 6] = [
     ),
 ];
 
+/// Words of which a name of a fact may consist, the first of which it must have: `FLIGHT LEG NBR`, `AircraftReg`.
+const WORDS: [(IdentityField, &str, &str); 4] = [
+    (IdentityField::TailNumber, "tail registration reg aircraft ac msn", "number no nbr num id ident code"),
+    (IdentityField::FlightId, "flight flt leg sortie", "number no nbr num id ident"),
+    (IdentityField::DepartureUtc, "departure dep takeoff", "time utc date datetime"),
+    (IdentityField::Position, "position actuator surface", "name id"),
+];
+
 /// The fact that a name sounds like, and how far behind the best known name of that fact.
 fn rank_of(name: &str) -> Option<(IdentityField, usize)> {
     let name = name.replace('/', "");
-    let plain = words(&name).iter().map(|(_, word)| word.to_lowercase()).collect::<Vec<_>>().join("_");
-    SOUNDS.iter().find_map(|(fact, known)| Some((*fact, place_in(known, &plain)?)))
+    let words: Vec<String> = words(&name).iter().map(|(_, word)| word.to_lowercase()).collect();
+    let plain = words.join("_");
+    let known = SOUNDS.iter().find_map(|(fact, known)| Some((*fact, place_in(known, &plain)?)));
+    let consists_of = |first: &str, others: &str| {
+        words.len() > 1
+            && words.iter().any(|word| place_in(first, word).is_some())
+            && words.iter().all(|word| [first, others].iter().any(|list| place_in(list, word).is_some()))
+    };
+    let composed = || WORDS.iter().find(|(_, first, others)| consists_of(first, others));
+    known.or_else(|| composed().map(|(fact, ..)| (*fact, usize::MAX)))
 }
 
 /// The fact that a name sounds like.
@@ -53,11 +66,13 @@ pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str
     ranked.into_iter().map(|((fact, _), name)| (fact, name)).collect()
 }
 
+/// Whether a text is an instant of ISO 8601, with a time zone or without.
+pub(super) fn is_instant(text: &str) -> bool {
+    text.parse::<jiff::Timestamp>().is_ok() || text.parse::<jiff::civil::DateTime>().is_ok()
+}
+
 /// Folders called `name=value` whose names sound like facts.
 pub(super) fn folders(path: &Path) -> BTreeMap<IdentityField, String> {
-    let is_instant = |value: &str| {
-        value.parse::<jiff::Timestamp>().is_ok() || value.parse::<jiff::civil::DateTime>().is_ok()
-    };
     let fact = |name: &str, value: &str| {
         if is_instant(value) { Some(IdentityField::DepartureUtc) } else { fact_of(name) }
     };
@@ -70,7 +85,7 @@ pub fn folder_value(path: &Path, name: &str) -> Option<String> {
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
-const DEPARTURES: [(&str, &str); 9] = [
+const DEPARTURES: [(&str, &str); 10] = [
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d{6}", "%Y-%m-%d_%H%M%S"),
@@ -80,6 +95,7 @@ const DEPARTURES: [(&str, &str); 9] = [
     (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
     (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
     (r"\d{14}", "%Y%m%d%H%M%S"),
+    (r"\d{12}", "%Y%m%d%H%M"),
 ];
 
 /// Forms of a day and of a time that lie in a folder and in a file name.
@@ -89,10 +105,13 @@ const TIMES: [(&str, &str); 4] =
 
 /// What a tail number looks like.
 const TAIL: &str = r"[A-Z]{1,2}-?[A-Z0-9]{2,6}";
+/// What ends a tail number at the beginning of a file name, and what it looks like then: before a hyphen, a recorder's
+/// name (`FDR-20261119`) must not be one.
+const TAILS_IN_NAMES: [(char, &str); 2] = [('_', TAIL), ('-', r"[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})")];
 
 /// An expression and a departure format for logs whose path holds tail and departure, if this one seems to: as
-/// `TAIL/…departure….parquet`, `TAIL_departure.parquet`, `TAIL/departure/….parquet` or `TAIL/day/time.parquet`. Where
-/// `with_position`, the end of the file name is the position, if it has no digits.
+/// `TAIL/…departure….parquet`, `TAIL/POSITION/…departure….parquet`, `TAIL_departure.parquet`, `TAIL/departure/….parquet`
+/// or `TAIL/day/time.parquet`. Where `with_position`, the path holds the position as [`path_position`] finds it.
 pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String)> {
     let name = path.file_name()?.to_str()?;
     let fits =
@@ -104,13 +123,15 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
     let is_place = with_position && fits(&format!("^{PLACE_END}$"), name);
     let end = if is_place { PLACE_END } else { r"[^/]*\.parquet" };
     if let Some((form, format)) = is_known(name) {
-        let in_name = format!(r"^{TAIL}_[^/]*?{form}");
-        let expression = if !is_tail(folder(1)) && fits(&in_name, name) {
-            format!(r"(?<tail_number>{TAIL})_[^/]*?(?<departure_utc>{form}){end}$")
-        } else {
-            format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form}){end}$")
+        let in_name =
+            TAILS_IN_NAMES.iter().find(|(end, tail)| fits(&format!("^{tail}{end}[^/]*?{form}"), name));
+        let tail = match in_name {
+            Some((end, tail)) if !is_tail(folder(1)) => format!("(?<tail_number>{tail}){end}"),
+            _ if is_tail(folder(1)) || !is_tail(folder(2)) => "(?<tail_number>[^/]+)/".to_owned(),
+            _ if with_position && !is_place => format!("(?<tail_number>[^/]+)/(?<position>{PLACE})/"),
+            _ => "(?<tail_number>[^/]+)/[^/]+/".to_owned(),
         };
-        return Some((expression, (*format).to_owned()));
+        return Some((format!(r"{tail}[^/]*?(?<departure_utc>{form}){end}$"), (*format).to_owned()));
     }
     if let Some((form, format)) = folder(1).and_then(is_known).filter(|_| is_tail(folder(2))) {
         let expression = format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*/{end}$");
@@ -130,12 +151,18 @@ pub fn path_tail(path: &Path) -> Option<String> {
     captured(&path_identity(path, false)?.0, path.to_str()?, "tail_number")
 }
 
+/// What a position in a path looks like.
+const PLACE: &str = "[A-Za-z]+(?:[_ -][A-Za-z]+)*";
 /// The end of a file name that is a position.
-pub const PLACE_END: &str = r"(?:[^/]*?[_ -])??(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
+const PLACE_END: &str = r"(?:[^/]*?[_ -])??(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
 
-/// The position at the end of a file name, if it has no digits.
-pub fn path_position(path: &Path) -> Option<String> {
-    captured(&format!("^{PLACE_END}$"), path.file_name()?.to_str()?, "position")
+/// The position in a path and the expression that finds it: the end of the file name, or the folder below that of the
+/// tail, if they have no digits.
+pub fn path_position(path: &Path) -> Option<(String, String)> {
+    let below_tail = format!(r"(?:^|/){TAIL}/(?<position>{PLACE})/[^/]*\.parquet$");
+    [format!("(?:^|/){PLACE_END}$"), below_tail]
+        .into_iter()
+        .find_map(|expression| Some((captured(&expression, path.to_str()?, "position")?, expression)))
 }
 
 /// What a named group of an expression matches in a text.
@@ -155,6 +182,12 @@ mod tests {
             ("d/TC-JRA/20261119T041300Z_0413.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/TC-JRA/QAR20261119_041300.parquet", "TC-JRA 20261119_041300", "%Y%m%d_%H%M%S"),
             ("d/N412FP/2026-11-19/0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%dT%H%M"),
+            ("d/2026/11/TC-JRA-17-202611190413.parquet", "TC-JRA 202611190413", "%Y%m%d%H%M"),
+            (
+                "d/N412FP/rudder_l/20261119T041300Z.parquet",
+                "N412FP rudder_l 20261119T041300Z",
+                "%Y%m%dT%H%M%SZ",
+            ),
             ("d/TC-JRA_20261119T041300Z.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             (
                 "d/N412FP/20261119T041300Z/rudder_l.parquet",
@@ -167,14 +200,19 @@ mod tests {
                 "%Y%m%dT%H%M%SZ",
             ),
         ] {
-            let position = path_position(Path::new(path));
+            let position = path_position(Path::new(path)).map(|(position, _)| position);
             let (expression, found) = path_identity(Path::new(path), position.is_some()).unwrap();
             let groups = regex::Regex::new(&expression).unwrap().captures(path).unwrap();
             let facts: Vec<&str> = groups.iter().skip(1).flatten().map(|group| group.as_str()).collect();
             assert_eq!((facts.join(" ").as_str(), found.as_str()), (wanted, format), "{expression}");
-            assert!(position.is_none_or(|position| wanted.ends_with(&position)));
+            assert!(position.is_none_or(|position| wanted.contains(&position)));
         }
         assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet"), false), None);
+        assert_eq!(
+            path_tail(Path::new("d/N412FP/rudder_l/20261119T041300Z.parquet")).as_deref(),
+            Some("N412FP")
+        );
+        assert_ne!(path_tail(Path::new("d/FDR-20261119_0413.parquet")).as_deref(), Some("FDR"));
     }
 
     #[test]
@@ -188,9 +226,13 @@ mod tests {
             ("A/C Reg", IdentityField::TailNumber),
             ("flight-leg", IdentityField::FlightId),
             ("DEP_TIME", IdentityField::DepartureUtc),
+            ("AircraftReg", IdentityField::TailNumber),
+            ("FLIGHT LEG NBR", IdentityField::FlightId),
+            ("SurfaceName", IdentityField::Position),
         ] {
             assert_eq!(fact_of(name), Some(fact), "{name}");
         }
+        assert_eq!(["aircraft_type", "flight_phase", "dep"].map(fact_of), [None; 3]);
         let hive =
             folders(Path::new("l/tail=N412FP/off=2026-11-19T04%3A13%3A00Z/actuator=left/part-0.parquet"));
         assert_eq!(hive[&IdentityField::DepartureUtc], "off");

@@ -15,8 +15,9 @@ use arrow::datatypes::DataType;
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::Error;
-use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, is_unit, place_in, time_unit};
-use crate::infer::identity_sources::{fact_of, facts_of, folders};
+use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, place_in, time_unit, unit_of};
+use crate::infer::identity_sources::{fact_of, facts_of, folders, is_instant};
+use crate::log::row_partition::DistinctTexts;
 use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::Unit;
@@ -26,7 +27,7 @@ use crate::parquet::log_file::LogFile;
 use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::DAY_S;
 
-pub use identity_sources::{PLACE_END, folder_value, path_identity, path_position, path_tail};
+pub use identity_sources::{folder_value, path_identity, path_position, path_tail};
 
 /// What a log seems to offer.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,15 +83,15 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let layout = layout(&table, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
-    let is_instant = |name: &str| {
+    let holds_instants = |name: &str| {
         // A column of stamps has as many texts as rows: the statistics of its first rows show one without reading them.
         let stated =
             file.text_bounds(name, 0).map(|bounds| String::from_utf8_lossy(bounds.least).into_owned());
         let text = stated.or_else(|| table.texts(name).ok()?.first().cloned());
-        text.is_some_and(|text| text.parse::<jiff::civil::DateTime>().is_ok())
+        text.is_some_and(|text| is_instant(&text))
     };
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
-    let clock = clock(leaves, is_fact, is_instant);
+    let clock = clock(leaves, is_fact, holds_instants);
     let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
         let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
@@ -123,8 +124,10 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         found.positions = constant(column).into_iter().collect();
     }
     let first = found.positions.iter().next().map_or("", String::as_str);
+    let units = units_by_name(&table, &layout)?;
     for (pattern, unit) in found.channels.values_mut().filter(|(_, unit)| unit.is_none()) {
-        *unit = file.field_metadata(&pattern.replace(PLACEHOLDER, first)).unit;
+        let name = pattern.replace(PLACEHOLDER, first);
+        *unit = units.get(&name).copied().flatten().or_else(|| file.field_metadata(&name).unit);
     }
     found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
     let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
@@ -170,12 +173,29 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
         let is_position =
             fact_of(&leaf.name) == Some(IdentityField::Position) || has_word_of(&leaf.name, POSITION_WORDS);
         let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
-        if texts.len() > 1 && !texts.iter().all(|text| is_unit(text)) {
+        if texts.len() > 1 && !texts.iter().all(|text| unit_of(text).is_some()) {
             layout.position_column = Some(leaf.name.clone());
             break;
         }
     }
     Ok(layout)
+}
+
+/// The units that a column of units beside a long layout's names gives them; `None` for a name with several.
+fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, Option<Unit>>, Error> {
+    let mut units = BTreeMap::new();
+    let file = &table.files[0];
+    let is_of_units =
+        |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && has_word_of(&leaf.name, "unit units uom");
+    if let (Some(names), Some(column)) = (&layout.name_column, file.leaves().iter().find(is_of_units)) {
+        let mut pairs = DistinctTexts::default();
+        pairs.take_file(file, &[names, &column.name])?;
+        for pair in pairs.found() {
+            let unit = unit_of(&pair[1]);
+            units.entry(pair[0].clone()).and_modify(|unit| *unit = None).or_insert(unit);
+        }
+    }
+    Ok(units)
 }
 
 /// The time column: timestamps before numbers and these before texts of instants, names of a time before others; never a
@@ -407,7 +427,7 @@ mod tests {
         assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
         let Layout { value_column, position_column, .. } = found.layout;
         assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
-        assert_eq!(found.channels[&Role::Load].0, "{position}/load");
+        assert_eq!(found.channels[&Role::Load], ("{position}/load".to_owned(), Some(Unit::Newton)));
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
         let epochs = [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true)]
             .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
@@ -419,7 +439,7 @@ mod tests {
     fn a_column_of_places_and_a_clock_of_texts_are_understood() {
         let text = |of: fn(usize) -> String| Column::Text((0..300).map(of).collect());
         let columns = [
-            ("Date Time (UTC)", text(|k| format!("2026-11-19 04:13:{:02}.{:02}", k / 200, k / 2 % 100))),
+            ("Date Time (UTC)", text(|k| format!("2026-11-19 04:13:{:02}.{:02}Z", k / 200, k / 2 % 100))),
             ("time_source", text(|_| "GPS".to_owned())),
             ("lru_location", text(|k| ["left", "right"][k % 2].to_owned())),
             ("motor_deg", Column::Real((0..300).map(f64::from).collect())),

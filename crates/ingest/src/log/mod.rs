@@ -7,7 +7,7 @@ pub mod flight_rows;
 pub mod identity;
 pub mod in_memory;
 pub mod normalized;
-mod row_partition;
+pub(crate) mod row_partition;
 pub(crate) mod row_table;
 mod selection;
 mod types;

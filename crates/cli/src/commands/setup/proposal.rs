@@ -5,9 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
-use ingest::infer::{
-    InferredMapping, PLACE_END, folder_value, path_identity, path_position, path_tail, propose,
-};
+use ingest::infer::{InferredMapping, folder_value, path_identity, path_position, path_tail, propose};
 use ingest::mapping::units::{Dimension, Unit};
 use ingest::mapping::{Epoch, IdentityField};
 use ingest::{Layout, Role};
@@ -284,7 +282,7 @@ impl Proposal {
             let mut tails = own.unwrap_or_else(|| tail_of(log, offer).into_iter().collect());
             tails.retain(|tail| !of_overrides.contains(tail));
             let position = folder_of(log, offer, IdentityField::Position)
-                .or_else(|| path_position(log).filter(|_| needs_position(offer)));
+                .or_else(|| Some(path_position(log).filter(|_| needs_position(offer))?.0));
             let positions = position.map_or_else(|| offer.positions.clone(), |own| BTreeSet::from([own]));
             places.extend(pairs(&tails, &positions));
         }
@@ -590,8 +588,8 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
         [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
     };
     if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
-        if needs_position(offer) && path_position(log).is_some() {
-            let _ = writeln!(text, "# The position is inferred from the file name.\npath = '{PLACE_END}$'");
+        if let Some((_, path)) = path_position(log).filter(|_| needs_position(offer)) {
+            let _ = writeln!(text, "# The position is inferred from the path.\npath = '{path}'");
         }
         return text;
     }
