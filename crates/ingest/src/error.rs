@@ -269,7 +269,7 @@ impl ErrorKind {
             Self::TimeImplausible { least_s, most_s, .. } => Some(format!("{least_s:e} to {most_s:e} s")),
             Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
             Self::TimeUnit { .. } => {
-                Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`".into())
+                Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"".into())
             }
             Self::MetadataContradicts { key, known, .. } => Some(format!("`{key}` = {known}")),
             Self::UnitForPart { wanted, .. } => Some((*wanted).into()),

@@ -4,15 +4,17 @@ use crate::mapping::Role;
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::{Dimension, Unit};
 
-/// A name's words: cut at what is no letter or digit, and where a capital follows a small letter, but for a unit (`kN`).
+/// A name's words: cut at what is no letter or digit, where a digit follows the name of a channel (`LVDT2`), and where a
+/// capital follows a small letter, but for a unit (`kN`).
 pub(super) fn words(name: &str) -> Vec<(usize, &str)> {
     let mut found = Vec::new();
     let mut start = None;
     let mut before = ' ';
     for (at, c) in name.char_indices().chain(std::iter::once((name.len(), ' '))) {
         let is_hump = c.is_uppercase() && before.is_lowercase();
-        let is_cut =
-            !c.is_alphanumeric() || (is_hump && !start.is_some_and(|from| is_unit_at(&name[from..])));
+        let is_number = |from: usize| c.is_ascii_digit() && is_channel(&name[from..at]);
+        let is_cut = !c.is_alphanumeric()
+            || start.is_some_and(|from| is_number(from) || (is_hump && !is_unit_at(&name[from..])));
         if let (true, Some(from)) = (is_cut, start) {
             found.push((from, &name[from..at]));
             start = None;
@@ -23,6 +25,11 @@ pub(super) fn words(name: &str) -> Vec<(usize, &str)> {
         before = c;
     }
     found
+}
+
+/// Whether a word names a channel.
+fn is_channel(word: &str) -> bool {
+    ROLES.iter().any(|(_, known)| place_in(known, &word.to_lowercase()).is_some())
 }
 
 /// Whether a text begins with a unit that no letter or digit follows.
@@ -66,7 +73,7 @@ const ROLES: [(Role, &str); 4] = [
 ];
 
 /// Words without information.
-const FILLERS: &str = "position pos posn angle displacement disp cell sensor meas value raw counts";
+const FILLERS: &str = "position pos posn angle displacement disp cell sensor meas value raw counts of the";
 
 /// The unit of which a text is the symbol, in letters of either case.
 pub(super) fn unit_of(text: &str) -> Option<Unit> {
@@ -147,8 +154,13 @@ impl ParsedName {
         let is_place = |i: &usize| {
             *i != at && !is_unit(*i) && tag != Some(*i) && !says(FILLERS, &words[*i].2) && !is_of_channel(*i)
         };
-        let place: Vec<usize> = (0..words.len()).filter(is_place).collect();
-        let run = place.windows(2).all(|w| w[1] == w[0] + 1);
+        let mut place: Vec<usize> = (0..words.len()).filter(is_place).collect();
+        let is_run = |place: &[usize]| place.windows(2).all(|w| w[1] == w[0] + 1);
+        if !is_run(&place) {
+            // `actuatorLoadLeftAileron`: the actuator is no part of the position.
+            place.retain(|i| !says("actuator act ema servo", &words[*i].2));
+        }
+        let run = is_run(&place);
         let (Some(&first), Some(&end)) = (place.first(), place.last()) else {
             return Some(Self { role, pattern: name.to_owned(), position: None, unit, sensor });
         };
@@ -187,6 +199,12 @@ mod tests {
             ("LH Aileron Load [kN]", "load; {position} Load [kN]; LH Aileron; kN"),
             ("resolver angle rudder", "motor; resolver angle {position}; rudder; -"),
             ("27-10 LH AIL EMA MTR POSN (DEG)", "motor; {position} MTR POSN (DEG); 27-10 LH AIL EMA; deg"),
+            ("actuatorLoadLeftAileron", "load; actuatorLoad{position}; LeftAileron; -"),
+            (
+                "Angle of motor, left aileron [deg]",
+                "motor; Angle of motor, {position} [deg]; left aileron; deg",
+            ),
+            ("AIL_L_LVDT2_MM", "screw; {position}_LVDT2_MM; AIL_L; mm"),
             ("RUD_SCRW_DISP_raw", "screw; {position}_SCRW_DISP_raw; RUD; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");

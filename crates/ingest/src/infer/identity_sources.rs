@@ -11,12 +11,12 @@ use crate::mapping::IdentityField;
 const SOUNDS: [(IdentityField, &str); 6] = [
     (
         IdentityField::TailNumber,
-        "tail_number tail tail_no registration reg aircraft_registration aircraft ac msn",
+        "tail_number tail tail_no registration reg aircraft_registration aircraft airplane ac msn",
     ),
     (IdentityField::FlightId, "flight_id flight_leg_id flight flight_number flight_no flt_no flt leg sortie"),
     (
         IdentityField::DepartureUtc,
-        "departure_utc departure departure_time dep_time takeoff_utc takeoff off_block_utc off_block off start_utc \
+        "departure_utc departure departure_time dep_time takeoff_utc takeoff off_block_utc off_block off start_utc start_time t0 \
          date_utc flight_date date",
     ),
     (IdentityField::Position, "position actuator actuator_position surface"),
@@ -66,9 +66,10 @@ pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str
     ranked.into_iter().map(|((fact, _), name)| (fact, name)).collect()
 }
 
-/// Whether a text is an instant of ISO 8601, with a time zone or without.
+/// Whether a text is an instant of ISO 8601, with a time zone or without; a date alone is none.
 pub(super) fn is_instant(text: &str) -> bool {
-    text.parse::<jiff::Timestamp>().is_ok() || text.parse::<jiff::civil::DateTime>().is_ok()
+    text.parse::<jiff::Timestamp>().is_ok()
+        || (text.contains(':') && text.parse::<jiff::civil::DateTime>().is_ok())
 }
 
 /// Folders called `name=value` whose names sound like facts.
@@ -85,11 +86,14 @@ pub fn folder_value(path: &Path, name: &str) -> Option<String> {
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
-const DEPARTURES: [(&str, &str); 10] = [
+const DEPARTURES: [(&str, &str); 13] = [
+    (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", "%Y-%m-%dT%H:%M:%S"),
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\dT\d{6}", "%Y-%m-%dT%H%M%S"),
     (r"\d{4}-\d\d-\d\d_\d{6}", "%Y-%m-%d_%H%M%S"),
     (r"\d{4}-\d\d-\d\d_\d{4}", "%Y-%m-%d_%H%M"),
+    (r"\d{4}-\d\d-\d\d \d{4}", "%Y-%m-%d %H%M"),
     (r"\d{8}T\d{6}Z", "%Y%m%dT%H%M%SZ"),
     (r"\d{8}T\d{6}", "%Y%m%dT%H%M%S"),
     (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
@@ -107,7 +111,10 @@ const TIMES: [(&str, &str); 4] =
 const TAIL: &str = r"[A-Z]{1,2}-?[A-Z0-9]{2,6}";
 /// What ends a tail number at the beginning of a file name, and what it looks like then: before a hyphen, a recorder's
 /// name (`FDR-20261119`) must not be one.
-const TAILS_IN_NAMES: [(char, &str); 2] = [('_', TAIL), ('-', r"[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})")];
+const TAILS_IN_NAMES: [(char, &str); 3] =
+    [('_', TAIL), (' ', TAIL), ('-', r"[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})")];
+/// A type of aircraft before a tail number: `A320_N412FP`.
+const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]";
 
 /// An expression and a departure format for logs whose path holds tail and departure, if this one seems to: as
 /// `TAIL/…departure….parquet`, `TAIL/POSITION/…departure….parquet`, `TAIL_departure.parquet`, `TAIL/departure/….parquet`
@@ -123,10 +130,11 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
     let is_place = with_position && fits(&format!("^{PLACE_END}$"), name);
     let end = if is_place { PLACE_END } else { r"[^/]*\.parquet" };
     if let Some((form, format)) = is_known(name) {
+        let kind = if fits(&format!("^{AIRCRAFT_TYPE}"), name) { AIRCRAFT_TYPE } else { "" };
         let in_name =
-            TAILS_IN_NAMES.iter().find(|(end, tail)| fits(&format!("^{tail}{end}[^/]*?{form}"), name));
+            TAILS_IN_NAMES.iter().find(|(end, tail)| fits(&format!("^{kind}{tail}{end}[^/]*?{form}"), name));
         let tail = match in_name {
-            Some((end, tail)) if !is_tail(folder(1)) => format!("(?<tail_number>{tail}){end}"),
+            Some((end, tail)) if !is_tail(folder(1)) => format!("{kind}(?<tail_number>{tail}){end}"),
             _ if is_tail(folder(1)) || !is_tail(folder(2)) => "(?<tail_number>[^/]+)/".to_owned(),
             _ if with_position && !is_place => format!("(?<tail_number>[^/]+)/(?<position>{PLACE})/"),
             _ => "(?<tail_number>[^/]+)/[^/]+/".to_owned(),
@@ -182,6 +190,8 @@ mod tests {
             ("d/TC-JRA/20261119T041300Z_0413.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/TC-JRA/QAR20261119_041300.parquet", "TC-JRA 20261119_041300", "%Y%m%d_%H%M%S"),
             ("d/N412FP/2026-11-19/0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%dT%H%M"),
+            ("d/A320_N412FP_2026-11-19T04:13:00.parquet", "N412FP 2026-11-19T04:13:00", "%Y-%m-%dT%H:%M:%S"),
+            ("d/N412FP 2026-11-19 0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%d %H%M"),
             ("d/2026/11/TC-JRA-17-202611190413.parquet", "TC-JRA 202611190413", "%Y%m%d%H%M"),
             (
                 "d/N412FP/rudder_l/20261119T041300Z.parquet",

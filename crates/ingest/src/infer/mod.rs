@@ -83,30 +83,39 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let layout = layout(&table, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
-    let holds_instants = |name: &str| {
+    let epoch_of_texts = |name: &str| {
         // A column of stamps has as many texts as rows: the statistics of its first rows show one without reading them.
         let stated =
             file.text_bounds(name, 0).map(|bounds| String::from_utf8_lossy(bounds.least).into_owned());
         let text = stated.or_else(|| table.texts(name).ok()?.first().cloned());
-        text.is_some_and(|text| is_instant(&text))
+        let is_of_day = |text: &str| text.contains(':') && text.parse::<jiff::civil::Time>().is_ok();
+        match text? {
+            text if is_instant(&text) => Some(Epoch::None),
+            text if is_of_day(&text) => Some(Epoch::Midnight),
+            _ => None,
+        }
     };
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
-    let clock = clock(leaves, is_fact, holds_instants);
+    let clock = clock(leaves, is_fact, epoch_of_texts);
     let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
         let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
         let times = if is_number { numbers(file, &name) } else { Vec::new() };
         let unit = unit.or_else(|| unit_of_steps(&times));
-        epoch = unit.map_or(Epoch::None, |unit| epoch_of(&times, unit, is_of_day(&name)));
+        epoch = match unit {
+            Some(unit) => epoch_of(&times, unit, is_of_day(&name)),
+            None => epoch_of_texts(&name).filter(|_| !is_number).unwrap_or_default(),
+        };
         (name, unit)
     });
+    let is_position = |name: &str| layout.position_column.as_deref() == Some(name);
     let is_clock = |name: &str| clock.as_ref().is_some_and(|(column, _)| column == name);
     let texts = layout.name_column.as_deref().map(|column| table.texts(column)).transpose()?;
     let names: Vec<&str> = match &texts {
         Some(texts) => texts.iter().map(String::as_str).collect(),
         None => {
             let names = numeric.iter().map(|leaf| leaf.name.as_str());
-            names.filter(|name| !is_clock(name) && !is_identity(name)).collect()
+            names.filter(|name| !is_clock(name) && !is_identity(name) && !is_position(name)).collect()
         }
     };
     let (mut found, guesses) = channels(&names, common_root(&numeric));
@@ -169,9 +178,13 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
     let mut layout = Layout { name_column, value_column, position_column: None };
     let is_taken =
         |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
-    for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
-        let is_position =
-            fact_of(&leaf.name) == Some(IdentityField::Position) || has_word_of(&leaf.name, POSITION_WORDS);
+    // A number names an actuator where its column says so: `actuator_id`, but not `position`.
+    let may_name = |leaf: &&LeafColumn| {
+        text(leaf) || (leaf.kind.is_integer() && !leaf.is_listed && has_word_of(&leaf.name, "id no number"))
+    };
+    for leaf in leaves.iter().filter(may_name).filter(|leaf| !is_taken(leaf)) {
+        let is_position = fact_of(&leaf.name) == Some(IdentityField::Position)
+            || (text(&leaf) && has_word_of(&leaf.name, POSITION_WORDS));
         let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
         if texts.len() > 1 && !texts.iter().all(|text| unit_of(text).is_some()) {
             layout.position_column = Some(leaf.name.clone());
@@ -198,12 +211,12 @@ fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, O
     Ok(units)
 }
 
-/// The time column: timestamps before numbers and these before texts of instants, names of a time before others; never a
+/// The time column: timestamps before numbers, these before texts of instants and these before times of the day, names of a time before others; never a
 /// column of one value.
 fn clock(
     leaves: &[LeafColumn],
     is_constant: impl Fn(&str) -> bool,
-    holds_instants: impl Fn(&str) -> bool,
+    epoch_of_texts: impl Fn(&str) -> Option<Epoch>,
 ) -> Option<(String, Option<&'static str>)> {
     let is_instant = |leaf: &LeafColumn| {
         matches!(leaf.kind, DataType::Timestamp(..) | DataType::Time32(_) | DataType::Time64(_))
@@ -213,7 +226,10 @@ fn clock(
         (true, false, _) => Some(1),
         (false, true, Some(_)) if leaf.kind.is_numeric() => Some(2),
         (false, true, None) if leaf.kind.is_numeric() => Some(3),
-        (false, true, _) if leaf.kind == DataType::Utf8 && holds_instants(&leaf.name) => Some(4),
+        (false, true, _) if leaf.kind == DataType::Utf8 => match epoch_of_texts(&leaf.name)? {
+            Epoch::Midnight => Some(5),
+            _ => Some(4),
+        },
         _ => None,
     };
     let ranked = leaves.iter().filter_map(|leaf| Some((rank(leaf)?, leaf)));

@@ -259,9 +259,9 @@ impl Combinations {
         Ok(&self.rows)
     }
 
-    /// The texts of every combination.
+    /// The texts of every combination; none before a batch was seen.
     fn texts(&self) -> Vec<Vec<String>> {
-        let none = vec![Vec::new()];
+        let none = vec![Vec::new(); self.columns.len().min(1)];
         self.columns.iter().fold(none, |before, column| {
             let texts = |(at, text): &(u32, u32)| {
                 let mut texts = before[*at as usize].clone();

@@ -384,7 +384,9 @@ impl RowTable {
             (DataType::Timestamp(unit, zone), _) => {
                 return Ok(TickFormat::of_timestamp(*unit, zone.is_none()));
             }
-            (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, _) => return Ok(TickFormat::text()),
+            (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, _) => {
+                return Ok(TickFormat::text(self.clock.epoch == Epoch::Midnight));
+            }
             (DataType::Time32(unit) | DataType::Time64(unit), _) => return Ok(TickFormat::of_day(*unit)),
             (DataType::Int64, _) if let Some(unit) = self.files[0].duration_unit(column) => {
                 return Ok(TickFormat::of_duration(unit));

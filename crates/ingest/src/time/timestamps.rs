@@ -3,7 +3,7 @@
 use arrow::array::{Array, ArrayRef, AsArray, PrimitiveArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
-use jiff::Timestamp;
+use jiff::{Timestamp, civil};
 
 use crate::error::ErrorKind;
 use crate::parquet::numeric::{append, as_text, wrong_type};
@@ -58,9 +58,11 @@ impl TickFormat {
         !self.is_text && !self.is_whole
     }
 
-    /// ISO 8601 text; an offset in it is taken, and without one the time is local.
-    pub(crate) fn text() -> Self {
-        Self { is_text: true, origin: TickEpoch::Local, ..Self::of_duration(ArrowTimeUnit::Nanosecond) }
+    /// ISO 8601 text; an offset in it is taken, and without one the time is local. Where `may_be_of_day`, a text may be
+    /// a time of the day alone.
+    pub(crate) fn text(may_be_of_day: bool) -> Self {
+        let ticks = if may_be_of_day { Self::of_day } else { Self::of_duration };
+        Self { is_text: true, origin: TickEpoch::Local, ..ticks(ArrowTimeUnit::Nanosecond) }
     }
 }
 
@@ -77,6 +79,7 @@ pub(crate) struct TimestampParser<'a> {
     /// Seconds since the first stamp; of real ticks the ticks themselves, until all are there.
     pub(crate) seconds: Vec<f64>,
     is_zoned: bool,
+    is_of_day: bool,
 }
 
 impl<'a> TimestampParser<'a> {
@@ -91,6 +94,7 @@ impl<'a> TimestampParser<'a> {
             before: f64::NAN,
             seconds,
             is_zoned: false,
+            is_of_day: false,
         }
     }
 
@@ -121,11 +125,13 @@ impl<'a> TimestampParser<'a> {
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
         let value = value.trim();
         let instant = value.parse::<Timestamp>().inspect(|_| self.is_zoned = true).or_else(|_| {
-            value
-                .parse::<jiff::civil::DateTime>()
-                .and_then(|local| jiff::tz::TimeZone::UTC.to_timestamp(local))
+            value.parse::<civil::DateTime>().and_then(|local| jiff::tz::TimeZone::UTC.to_timestamp(local))
         });
-        let tick = instant.ok().and_then(|t| i64::try_from(t.as_nanosecond()).ok());
+        let mut tick = instant.ok().and_then(|t| i64::try_from(t.as_nanosecond()).ok());
+        if let (None, Some(_), Ok(time)) = (tick, self.ticks.wraps_at, value.parse::<civil::Time>()) {
+            self.is_of_day = true;
+            tick = i64::try_from(time.duration_since(civil::Time::midnight()).as_nanos()).ok();
+        }
         let found = || format!("`{value}` in row {row}");
         tick.ok_or_else(|| ErrorKind::TimeUnit { column: self.column.to_owned(), found: found() })
     }
@@ -174,7 +180,11 @@ impl<'a> TimestampParser<'a> {
         let first_s = first.map_or(0.0, |(first_s, _)| first_s);
         let instant =
             || Timestamp::from_nanosecond(first?.1 + 1_000_000_000 * i128::from(self.ticks.zero_s)).ok();
-        let zero = if self.is_zoned { TickEpoch::Utc } else { self.ticks.origin };
+        let zero = match (self.is_of_day, self.is_zoned) {
+            (true, _) => TickEpoch::Midnight,
+            (false, true) => TickEpoch::Utc,
+            (false, false) => self.ticks.origin,
+        };
         let origin = match zero {
             TickEpoch::Utc => instant().map(TimeOrigin::Utc),
             TickEpoch::Local => instant().map(TimeOrigin::Local),

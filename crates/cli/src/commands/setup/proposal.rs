@@ -638,7 +638,9 @@ fn clock(offer: &InferredMapping) -> String {
         ),
         Some((column, None)) => {
             let column = quoted(column);
-            format!("column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n")
+            format!(
+                "column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n{epoch}"
+            )
         }
         None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
     }
