@@ -49,7 +49,7 @@ pub(super) fn has_word_of(name: &str, list: &str) -> bool {
 
 /// Whether a column seems to hold times; `second` alone is a time, within a name it may be a unit (`deg_per_sec`).
 pub(super) fn is_time(name: &str) -> bool {
-    has_word_of(name, "time t timestamp stamp elapsed tick ticks clock utc epoch unix gmt zulu tod")
+    has_word_of(name, "time t timestamp stamp elapsed tick ticks clock utc epoch unix gmt zulu tod since")
         || place_in("s sec second seconds", &name.to_lowercase()).is_some()
 }
 
@@ -58,11 +58,13 @@ pub(super) fn is_of_day(name: &str) -> bool {
     has_word_of(name, "gmt utc zulu tod")
 }
 
-/// The unit of a time that ends its name.
+/// The unit of a time that ends its name or begins it: `t_ms`, `us_since_start`.
 pub(super) fn time_unit(name: &str) -> Option<&'static str> {
-    let word = words(name).last()?.1.to_lowercase();
+    let words = words(name);
     let units = ["s sec second seconds", "ms", "us", "ns", "min", "h hours"];
-    units.iter().find(|list| place_in(list, &word).is_some())?.split(' ').next()
+    [words.last()?, &words[0]].into_iter().find_map(|(_, word)| {
+        units.iter().find(|list| place_in(list, &word.to_lowercase()).is_some())?.split(' ').next()
+    })
 }
 
 const ROLES: [(Role, &str); 4] = [
