@@ -84,6 +84,7 @@ pub(super) fn unit_of(text: &str) -> Option<Unit> {
         "kn" => "kN",
         "dan" => "daN",
         "nm" => "N.m",
+        "knm" => "kN.m",
         "degc" | "c" => "degC",
         "degf" => "degF",
         "k" => "K",
@@ -207,6 +208,7 @@ mod tests {
                 "motor; Angle of motor, {position} [deg]; left aileron; deg",
             ),
             ("AIL_L_LVDT2_MM", "screw; {position}_LVDT2_MM; AIL_L; mm"),
+            ("RUD_ROD_FORCE_LBS", "load; {position}_ROD_FORCE_LBS; RUD; lbf"),
             ("RUD_SCRW_DISP_raw", "screw; {position}_SCRW_DISP_raw; RUD; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");

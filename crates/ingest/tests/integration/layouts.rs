@@ -113,9 +113,12 @@ fn every_unit_reaches_the_same_metres_and_newtons() {
         (Unit::Metre, 1e-3),
         (Unit::Millimetre, 1.0),
         (Unit::Micrometre, 1e3),
+        (Unit::Centimetre, 0.1),
         (Unit::Inch, 1.0 / 25.4),
+        (Unit::Mil, 1e3 / 25.4),
         (Unit::Degree, 72.0),
         (Unit::Radian, 0.4 * std::f64::consts::PI),
+        (Unit::Milliradian, 400.0 * std::f64::consts::PI),
         (Unit::Revolution, 0.2),
     ];
     let loads = [
@@ -123,7 +126,9 @@ fn every_unit_reaches_the_same_metres_and_newtons() {
         (Unit::Kilonewton, 1.0),
         (Unit::Decanewton, 100.0),
         (Unit::PoundForce, 224.808_943_099_710_5),
+        (Unit::KilopoundForce, 0.224_808_943_099_710_5),
         (Unit::NewtonMetre, 5.0 / (2.0 * std::f64::consts::PI)),
+        (Unit::KilonewtonMetre, 5e-3 / (2.0 * std::f64::consts::PI)),
         (Unit::PoundForceInch, 7.043199713697552),
         (Unit::PoundForceFoot, 7.043199713697552 / 12.0),
     ];

@@ -29,7 +29,7 @@ pub(super) fn check(
         for (key, c) in diagnostics(name, channel, wanted, layout, groups) {
             report(&[name, key], c);
         }
-        for choice in channel.choices() {
+        for choice in channel.choices().filter(|choice| !choice.column.is_empty()) {
             if let Some(other) = columns.insert((&choice.column, choice.group.as_deref()), name) {
                 let what = format!("`{}` is mapped to both {other} and {name}", choice.column);
                 let what = if other == name {

@@ -110,7 +110,7 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("screw_mass_kg = 8.0", "screw_mass_kg = -8.0", "bad_parameter"),
         ("lead_m_per_rev = 0.005", "reference_radius_m = 0.1", "key_of_other_kind"),
         ("bandwidth_hz = 10.0", "", "key_missing"),
-        ("unit = \"mm\"", "unit = \"inches\"", "bad_toml"),
+        ("unit = \"mm\"", "unit = \"cubits\"", "bad_toml"),
         ("[logs]", "[logs", "bad_toml"),
         ("column = \"t\"", "column = \"t\"\nrate_hz = 0.0", "not_positive"),
         ("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.0e77", "out_of_range"),
