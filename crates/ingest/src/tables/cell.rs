@@ -38,11 +38,6 @@ pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
     Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest, has_semicolons })
 }
 
-/// A cell that is not what it should be; rows count from 0 here and from 1 for people.
-pub(super) fn bad_cell(file: &Path, row: usize, column: Option<&String>, detail: String) -> Error {
-    Error::new(file, ErrorKind::Table { row: Some(row as u64 + 1), column: column.cloned(), detail })
-}
-
 /// Reads a name.
 ///
 /// # Errors

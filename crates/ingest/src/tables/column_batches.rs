@@ -14,9 +14,8 @@ use arrow::array::{
     Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
     StringBuilder, TimestampMicrosecondArray, new_null_array,
 };
-use arrow::compute::{cast, concat};
+use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
-use arrow::error::ArrowError;
 use jiff::Timestamp;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
@@ -29,7 +28,7 @@ use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
 use crate::parquet::raw_footer;
-use crate::tables::cell::{bad_cell, missing, number, position, utc};
+use crate::tables::cell::{missing, number, position, utc};
 
 /// Rows of a batch.
 const ROWS: usize = 65_536;
@@ -37,9 +36,9 @@ const ROWS: usize = 65_536;
 /// Some rows of a table.
 #[derive(Debug, Clone)]
 pub struct TableBatch {
-    file: PathBuf,
-    header: Vec<String>,
-    batch: RecordBatch,
+    pub(super) file: PathBuf,
+    pub(super) header: Vec<String>,
+    pub(super) batch: RecordBatch,
     /// Rows of the table before these.
     before: usize,
 }
@@ -53,13 +52,6 @@ impl StringColumn {
     pub fn get(&self, row: usize) -> Option<&str> {
         let text = self.0.is_valid(row).then(|| trim_ascii_fast(self.0.value(row)))?;
         (!text.is_empty()).then_some(text)
-    }
-
-    /// The texts of several columns, one after the other.
-    pub(super) fn joined(columns: &[Self]) -> Result<Self, ErrorKind> {
-        let arrays: Vec<&dyn Array> = columns.iter().map(|column| &column.0 as &dyn Array).collect();
-        let detail = |e: ArrowError| ErrorKind::Table { row: None, column: None, detail: e.to_string() };
-        concat(&arrays).map(|texts| Self(texts.as_string().clone())).map_err(detail)
     }
 }
 
@@ -79,10 +71,6 @@ impl TableBatch {
     /// Numbers of its rows.
     pub fn rows(&self) -> Range<usize> {
         0..self.batch.num_rows()
-    }
-
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
     }
 
     /// Where a column stands, if it is there under one of its names.
@@ -143,9 +131,11 @@ impl TableBatch {
         }
     }
 
-    /// A diagnostic about a row's cell.
+    /// A diagnostic about a row's cell; rows count from 0 here and from 1 for people.
     pub fn error(&self, row: usize, column: Option<usize>, detail: String) -> Error {
-        bad_cell(&self.file, self.before + row, column.and_then(|c| self.header.get(c)), detail)
+        let (row, column) =
+            ((self.before + row) as u64 + 1, column.and_then(|c| self.header.get(c).cloned()));
+        Error::new(&self.file, ErrorKind::Table { row: Some(row), column, detail })
     }
 
     fn parsed<T: arrow::datatypes::ArrowPrimitiveType>(

@@ -261,16 +261,22 @@ fn noon(date: civil::Date) -> Result<Timestamp, String> {
 mod tests {
     use super::*;
 
+    const HEADER: &str = "tail_number,flight_id,departure_utc,flight_hours\n";
+
+    /// The flights of a table with this text.
+    fn read(text: &str, names: &ColumnAliases) -> Result<Flights, Vec<Error>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        Flights::read(file.path(), names, &IdentityMapping::default())
+    }
+
     #[test]
     fn a_log_finds_its_flight_by_path_or_by_its_identity() {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("flights.csv");
         let text = "reg,leg,off,flight_hours,path\nN1,0413,2026-11-19T04:13:00Z,2.5,N1/a.parquet\nN1,0500,2026-11-20 05:00,,\n";
-        std::fs::write(&file, text).unwrap();
         let names = [("tail_number", "reg"), ("flight_id", "leg"), ("departure_utc", "off")];
         let names = names.map(|(ours, theirs)| (ours.to_owned(), theirs.to_owned())).into();
         let identity = IdentityMapping::default();
-        let flights = Flights::read(&file, &names, &identity).unwrap();
+        let flights = read(text, &names).unwrap();
         let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), None, &identity);
         assert_eq!(
             (by_path[&IdentityField::FlightId].as_str(), by_path[&IdentityField::FlightHours].as_str()),
@@ -290,13 +296,10 @@ mod tests {
     /// A flight number that flies every day: only the departure tells which row is meant.
     #[test]
     fn an_id_that_recurs_is_found_by_departure() {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("flights.csv");
         let row = |day: u32| format!("N1,FP100,2026-03-{day:02}T06:10:00Z,{day}.5\n");
         let rows: String = (1..=9).map(row).collect();
-        std::fs::write(&file, format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}")).unwrap();
         let identity = IdentityMapping::default();
-        let flights = Flights::read(&file, &ColumnAliases::new(), &identity).unwrap();
+        let flights = read(&format!("{HEADER}{rows}"), &ColumnAliases::new()).unwrap();
         let said = IdentityFields::from([
             (IdentityField::TailNumber, "N1".into()),
             (IdentityField::FlightId, "FP100".into()),
@@ -315,13 +318,7 @@ mod tests {
     /// Two legs of one day and one of the next, each with its date alone: the log's clock has the time.
     #[test]
     fn a_date_alone_is_joined_to_the_log_of_its_id_or_to_the_only_one_of_its_day() {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("flights.csv");
-        let read = |rows: &str| {
-            std::fs::write(&file, format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}"))
-                .unwrap();
-            Flights::read(&file, &ColumnAliases::new(), &IdentityMapping::default())
-        };
+        let read = |rows: &str| read(&format!("{HEADER}{rows}"), &ColumnAliases::new());
         let flights = read("N1,A,2026-03-04,2\nN1,B,2026-03-04,3\nN1,C,2026-03-05,4\n").unwrap();
         let hours = |id: Option<&str>, at: &str| {
             let id = id.map(|id| (IdentityField::FlightId, id.to_owned()));

@@ -80,11 +80,10 @@ fn removal(text: &str) -> Result<Option<Timestamp>, String> {
 mod tests {
     use super::*;
 
-    fn table(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("installations.csv");
-        std::fs::write(&file, text).unwrap();
-        (dir, file)
+    fn read(text: &str) -> Result<Installations, Vec<Error>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        installations(file.path(), &ColumnAliases::new())
     }
 
     const HEADER: &str = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n";
@@ -93,8 +92,7 @@ mod tests {
     #[test]
     fn removals_are_dates_in_utc_or_open() {
         let removed = |text: &str| {
-            let (_dir, file) = table(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,{text}\n"));
-            let stays = installations(&file, &ColumnAliases::new()).ok()?;
+            let stays = read(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,{text}\n")).ok()?;
             let stay = stays.iter().next().unwrap();
             assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
             Some(stay.removed_utc.map(|at| at.to_string()))
@@ -108,9 +106,8 @@ mod tests {
 
     #[test]
     fn every_bad_cell_is_named_by_row_and_column() {
-        let (_dir, file) =
-            table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
-        let errors = installations(&file, &ColumnAliases::new()).unwrap_err();
+        let rows = "N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n";
+        let errors = read(&format!("{HEADER}{rows}")).unwrap_err();
         let places: Vec<_> = errors.iter().map(|e| e.diagnostic().location().unwrap()).collect();
         assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
     }

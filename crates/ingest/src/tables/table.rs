@@ -2,21 +2,23 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 use arrow::array::RecordBatch;
+use arrow::compute::concat_batches;
+use arrow::datatypes::Schema;
+use arrow::error::ArrowError;
 
-use crate::error::Error;
-use crate::tables::cell::{bad_cell, missing, position};
+use crate::error::{Error, ErrorKind};
+use crate::tables::cell::{missing, position};
 use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 
 /// A table, every cell text; an empty cell is none.
 #[derive(Debug, Clone)]
 pub struct Table {
-    file: PathBuf,
-    header: Vec<String>,
+    whole: TableBatch,
     columns: Vec<StringColumn>,
-    rows: usize,
     names: ColumnAliases,
 }
 
@@ -29,7 +31,8 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        Self::of_parts(file, &batches(file, None)?.collect::<Result<Vec<_>, _>>()?)
+        let parts = batches(file, None)?.map(|part| Ok(part?.batch));
+        Self::of_batches(file, &parts.collect::<Result<Vec<_>, Error>>()?)
     }
 
     /// The same table from memory; `name` stands for its file in diagnostics.
@@ -37,20 +40,12 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let part = |batch: &RecordBatch| TableBatch::new(name, batch.clone(), 0);
-        Self::of_parts(name, &batches.iter().map(part).collect::<Vec<_>>())
-    }
-
-    fn of_parts(name: &Path, parts: &[TableBatch]) -> Result<Self, Error> {
-        let header = parts.first().map(|part| part.header().to_vec()).unwrap_or_default();
-        let column = |column: usize| {
-            let texts = parts.iter().map(|part| part.texts(Some(column)));
-            let texts = StringColumn::joined(&texts.collect::<Result<Vec<_>, _>>()?);
-            texts.map_err(|fault| Error::new(name, fault))
-        };
-        let columns = (0..header.len()).map(column).collect::<Result<_, _>>()?;
-        let rows = parts.iter().map(|part| part.rows().len()).sum();
-        Ok(Self { file: name.to_owned(), header, columns, rows, names: ColumnAliases::new() })
+        let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
+        let fault = |e: ArrowError| ErrorKind::Table { row: None, column: None, detail: e.to_string() };
+        let whole = concat_batches(&schema, batches).map_err(|e| Error::new(name, fault(e)))?;
+        let whole = TableBatch::new(name, whole, 0);
+        let columns = (0..whole.header.len()).map(|column| whole.texts(Some(column)));
+        Ok(Self { columns: columns.collect::<Result<_, _>>()?, whole, names: ColumnAliases::new() })
     }
 
     /// The same table, whose columns go by a user's own names.
@@ -62,13 +57,13 @@ impl Table {
 
     /// Numbers of its rows.
     pub fn rows(&self) -> Range<usize> {
-        0..self.rows
+        self.whole.rows()
     }
 
     /// Where a column stands, if it is there under one of its names.
     pub fn find(&self, names: &[&str]) -> Option<usize> {
         let theirs = |name: &str| self.names.get(name).map_or_else(|| name.to_owned(), Clone::clone);
-        names.iter().find_map(|name| position(&self.header, &theirs(name)))
+        names.iter().find_map(|name| position(&self.whole.header, &theirs(name)))
     }
 
     /// Where a column stands.
@@ -77,7 +72,7 @@ impl Table {
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
         let wanted = || self.names.get(names[0]).map_or(names[0], String::as_str);
-        self.find(names).ok_or_else(|| missing(&self.file, wanted(), &self.header))
+        self.find(names).ok_or_else(|| missing(&self.whole.file, wanted(), &self.whole.header))
     }
 
     /// Where columns stand; an error for each that is not there.
@@ -126,6 +121,6 @@ impl Table {
 
     /// The error of a cell.
     pub(super) fn error(&self, row: usize, column: usize, detail: String) -> Error {
-        bad_cell(&self.file, row, self.header.get(column), detail)
+        self.whole.error(row, Some(column), detail)
     }
 }
