@@ -4,15 +4,17 @@
 //! bytes longer; so chunks move, and the footer is rewritten with their new offsets.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Write};
 
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{
     ColumnChunkMetaData, ParquetMetaData, ParquetMetaDataBuilder, ParquetMetaDataReader,
     ParquetMetaDataWriter, RowGroupMetaData,
 };
+use parquet::file::writer::TrackedWrite;
 use polars_parquet_format::thrift::protocol::TCompactOutputProtocol;
 
+use crate::io::read_at;
 use crate::parquet::page_header::Pages;
 
 const MAGIC: &[u8; 4] = b"PAR1";
@@ -20,7 +22,7 @@ const MAGIC: &[u8; 4] = b"PAR1";
 /// Copies a Parquet file page by page, each with its checksum.
 pub(crate) fn copy(from: &File, to: &mut File) -> Result<(), ParquetError> {
     let footer = ParquetMetaDataReader::new().parse_and_finish(from)?;
-    let mut sink = CountingWriter { writer: BufWriter::with_capacity(1 << 20, to), written: 0 };
+    let mut sink = TrackedWrite::new(BufWriter::with_capacity(1 << 20, to));
     sink.write_all(MAGIC)?;
     let mut groups = Vec::with_capacity(footer.num_row_groups());
     for group in footer.row_groups() {
@@ -47,58 +49,37 @@ fn rebuilt(
 
 fn copy_chunk(
     from: &File,
-    sink: &mut CountingWriter<'_>,
+    sink: &mut TrackedWrite<impl Write>,
     chunk: &ColumnChunkMetaData,
 ) -> Result<ColumnChunkMetaData, ParquetError> {
     let (start, bytes) = chunk.byte_range();
-    let began = sink.written;
+    let began = sink.bytes_written() as i64;
     let (mut pages, mut header_growth, mut first_data) = (Pages::of(from, start, bytes), 0, None);
     while let Some(mut page) = pages.next().map_err(ParquetError::General)? {
         let mut body = vec![0; page.header.compressed_page_size as usize];
-        let mut file = from;
-        file.seek(SeekFrom::Start(page.body_start))?;
-        file.read_exact(&mut body)?;
+        read_at::read_exact(from, &mut body, page.body_start)?;
         if page.header.dictionary_page_header.is_none() {
-            first_data.get_or_insert(sink.written);
+            first_data.get_or_insert(sink.bytes_written() as i64);
         }
         page.header.crc = Some(crc32fast::hash(&body) as i32);
-        let header_start = sink.written;
+        let header_start = sink.bytes_written();
         let mut protocol = TCompactOutputProtocol::new(&mut *sink);
         page.header.write_to_out_protocol(&mut protocol).map_err(|e| ParquetError::General(e.to_string()))?;
-        header_growth += (sink.written - header_start) as i64 - page.header_bytes as i64;
+        header_growth += (sink.bytes_written() - header_start) as i64 - page.header_bytes as i64;
         sink.write_all(&body)?;
     }
-    let dictionary = chunk.dictionary_page_offset().map(|_| began as i64);
     chunk
         .clone()
         .into_builder()
-        .set_data_page_offset(first_data.unwrap_or(began) as i64)
-        .set_dictionary_page_offset(dictionary)
-        .set_total_compressed_size((sink.written - began) as i64)
+        .set_data_page_offset(first_data.unwrap_or(began))
+        .set_dictionary_page_offset(chunk.dictionary_page_offset().map(|_| began))
+        .set_total_compressed_size(sink.bytes_written() as i64 - began)
         .set_total_uncompressed_size(chunk.uncompressed_size() + header_growth)
         .set_offset_index_offset(None)
         .set_offset_index_length(None)
         .set_column_index_offset(None)
         .set_column_index_length(None)
         .build()
-}
-
-/// A writer that knows where it is.
-struct CountingWriter<'f> {
-    writer: BufWriter<&'f mut File>,
-    written: u64,
-}
-
-impl Write for CountingWriter<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.writer.write(bytes)?;
-        self.written += written as u64;
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
 }
 
 #[cfg(test)]
