@@ -59,11 +59,11 @@ pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
 }
 
 /// The name of each fact among some names, the best known one first.
-pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str> {
+pub(super) fn facts_of(names: &[&str]) -> BTreeMap<IdentityField, String> {
     let mut ranked: Vec<_> = names.iter().rev().filter_map(|name| Some((rank_of(name)?, *name))).collect();
     // The last name of a fact is the one that remains: the best known, and of equal ones the first.
     ranked.sort_by_key(|((_, rank), _)| std::cmp::Reverse(*rank));
-    ranked.into_iter().map(|((fact, _), name)| (fact, name)).collect()
+    ranked.into_iter().map(|((fact, _), name)| (fact, name.to_owned())).collect()
 }
 
 /// Whether a text is an instant of ISO 8601, with a time zone or without; a date alone is none.

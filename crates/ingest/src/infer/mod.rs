@@ -75,8 +75,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
     let file = &table.files[0];
     let leaves = file.leaves();
-    let stated = facts_of(&file.metadata_keys()).into_iter().map(|(fact, name)| (fact, name.to_owned()));
-    let mut metadata: BTreeMap<IdentityField, String> = stated.collect();
+    let mut metadata = facts_of(&file.metadata_keys());
     metadata.remove(&IdentityField::Position);
     let constant = |name: &str| table.constant(name, "fact").ok().flatten();
     let (columns, by_row) = identity_columns(&table, &metadata);
@@ -161,9 +160,9 @@ fn identity_columns(
     let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
     let varies = |name: &str| !is_constant(name) && table.texts(name).is_ok_and(|texts| texts.len() > 1);
     let by_row = facts.iter().any(|(fact, name)| of_flight(*fact) && varies(name));
-    let is_date = |name: &str| leaves.iter().any(|leaf| leaf.name == name && leaf.kind == DataType::Date32);
+    let is_date = |name: &str| leaves.iter().any(|leaf| leaf.name == *name && leaf.kind == DataType::Date32);
     facts.retain(|fact, name| is_constant(name) || (by_row && (of_flight(*fact) || is_date(name))));
-    (facts.into_iter().map(|(fact, name)| (fact, name.to_owned())).collect(), by_row)
+    (facts, by_row)
 }
 
 /// The layout that columns of names, values and positions show.

@@ -317,12 +317,13 @@ fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) ->
             });
             match unpacked {
                 Some(unpacked) if into.is_empty() => *into = unpacked,
-                Some(mut unpacked) => into.append(&mut unpacked),
+                Some(unpacked) => into.extend(unpacked),
                 None => return fail("a page cannot be unpacked to the size that it claims"),
             }
         }
-        Compression::UNCOMPRESSED => into.extend_from_slice(packed),
-        other @ Compression::LZO => return fail(format!("its compression {other} is not read")),
+        other @ (Compression::UNCOMPRESSED | Compression::LZO) => {
+            return fail(format!("its compression {other} is not read"));
+        }
     }
     Ok(())
 }
@@ -331,13 +332,11 @@ fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) ->
 fn fixed(left: usize, into: &mut Vec<u8>, unpack: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<()> {
     let before = into.len();
     into.resize(before + left, 0);
-    match unpack(&mut into[before..]) {
-        Some(bytes) => {
-            into.truncate(before + bytes);
-            Ok(())
-        }
-        None => fail("a page cannot be unpacked to the size that it claims"),
-    }
+    let Some(bytes) = unpack(&mut into[before..]) else {
+        return fail("a page cannot be unpacked to the size that it claims");
+    };
+    into.truncate(before + bytes);
+    Ok(())
 }
 
 /// Hadoop's form of LZ4: blocks, each after its two sizes. `None` where the blocks do not fill the buffer exactly.
