@@ -1,9 +1,9 @@
-//! The installations table: which unit was installed where, from when to when.
+//! Tables of units: which one was installed where, from when to when, and which were modified or re-identified.
 
 use std::path::Path;
 
 use jiff::Timestamp;
-use records::{Installation, Installations};
+use records::{Alias, Installation, Installations};
 
 use crate::error::{Error, ErrorKind};
 use crate::tables::cell::{name, number, utc};
@@ -33,6 +33,25 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
         Error::new(file, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
     };
     Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
+}
+
+/// Reads the aliases table: `former_serial_number`, `serial_number`, and optionally `former_part_number`, `part_number`.
+///
+/// # Errors
+/// A missing column, or the first cell that cannot be read.
+pub fn aliases(file: &Path) -> Result<Vec<Alias>, Error> {
+    let table = Table::read(file)?;
+    let [former, serial] = [table.column(&["former_serial_number"])?, table.column(&["serial_number"])?];
+    let [former_part, part] = ["former_part_number", "part_number"].map(|name| table.find(&[name]));
+    let row = |row: usize| {
+        Ok(Alias {
+            former_part_number: table.optional(row, former_part, name)?,
+            former_serial_number: table.required(row, former, name)?,
+            part_number: table.optional(row, part, name)?,
+            serial_number: table.required(row, serial, name)?,
+        })
+    };
+    table.rows().map(row).collect()
 }
 
 struct InstallationColumns {

@@ -2,15 +2,13 @@
 //!
 //! A small table is read whole as text ([`Table`]), a long one in batches with typed columns ([`TableBatch`]).
 
-mod aliases;
 pub(crate) mod cell;
 mod column_batches;
 pub mod flights;
 mod installations;
 mod table;
 
-pub use aliases::aliases;
 pub use cell::{name, number, utc};
 pub use column_batches::{StringColumn, TableBatch, TableSplits, batches, trim_ascii_fast};
-pub use installations::installations;
+pub use installations::{aliases, installations};
 pub use table::{ColumnAliases, Table};
