@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let is_by_position = value == "-";
     let prefix = if is_by_position { "" } else { "{position}_" };
     let channel = |column: &str, unit| ChannelMapping {
-        column: format!("{prefix}{column}").as_str().into(),
+        column: format!("{prefix}{column}"),
         unit,
         ..Default::default()
     };
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         clock: ClockMapping {
             column: Some(time.clone()),
             unit: Some(TimeUnit::Second),
-            ..ClockMapping::default()
+            ..Default::default()
         },
         layout: if is_by_position {
             Layout { position_column: Some(name.clone()), ..Layout::default() }

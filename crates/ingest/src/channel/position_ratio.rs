@@ -1,5 +1,7 @@
 //! Ratio of the two positions of an actuator: how far the screw moves for a metre of the motor at the screw axis.
 
+use crate::channel::stats::quantile;
+
 /// Samples that are compared at most.
 const MAX_SAMPLES: usize = 20_000;
 /// Rounds of reweighting, and residuals that count for nothing, in robust standard deviations (Tukey's bisquare).
@@ -42,11 +44,6 @@ pub fn position_ratio(motor_m: &[f64], dx_m: &[f64], load_n: &[f64]) -> Option<f
 fn usual_range(mut values: Vec<f64>) -> Option<(f64, f64)> {
     let (low, high) = (quantile(&mut values, 0.01)?, quantile(&mut values, 0.99)?);
     Some((2.0 * low - high, 2.0 * high - low))
-}
-
-fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    let at = (share * values.len().checked_sub(1)? as f64).round() as usize;
-    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// δX = offset + of_motor · motor + of_load · load.

@@ -137,6 +137,12 @@ fn max(known: f64, new: f64) -> f64 {
     if new > known { new } else { known }
 }
 
+/// The value below which this share of all values lies; reorders them.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    let at = (share * values.len().checked_sub(1)? as f64).round() as usize;
+    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+}
+
 /// Largest less smallest value; minus infinity where there is none.
 pub(crate) fn range(values: &[f64]) -> f64 {
     let (low, high) = span(values);

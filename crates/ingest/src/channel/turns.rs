@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use crate::channel::stats::quantile;
 use crate::time::clock::BREAK_STEPS;
 use crate::time::zero_order_hold::median_sample_interval;
 
@@ -61,8 +62,8 @@ pub(crate) fn restore_turns(position_m: &mut [f64], evidence: TurnEvidence<'_>) 
     };
     let (mut recent, mut excluded) = (Vec::with_capacity(2 * COMPARED), 0);
     for run in runs {
-        let first: Vec<f64> = run.clone().filter_map(|i| ahead(position_m, i)).take(COMPARED).collect();
-        if let (Some(now), Some(before)) = (median(first), median(recent.clone())) {
+        let mut first: Vec<f64> = run.clone().filter_map(|i| ahead(position_m, i)).take(COMPARED).collect();
+        if let (Some(now), Some(before)) = (quantile(&mut first, 0.5), quantile(&mut recent.clone(), 0.5)) {
             let turns = (now - before) / evidence.turn_m;
             if (turns - turns.round()).abs() > CLEAR_SHARE {
                 excluded += position_m[run.clone()].iter().filter(|v| !v.is_nan()).count();
@@ -159,11 +160,6 @@ fn lag_of_load_and_speed(
         return [(vv * fa - fv * va) / determinant, (ff * va - fv * fa) / determinant];
     }
     [if ff > 0.0 { fa / ff } else { 0.0 }, 0.0]
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -42,12 +42,9 @@ const BATCH_ROWS: usize = 8192;
 fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
     let ErrorKind::NotParquet { detail } = error else { return error };
     let mut head = [0; foreign_format::HEAD_BYTES];
-    let length =
-        source.want(once(0..head.len() as u64)).map(|()| read_at::read_at(source.file(), &mut head, 0));
-    let head = match length {
-        Ok(Ok(length)) => &head[..length],
-        _ => &[],
-    };
+    let fetched = source.want(once(0..head.len() as u64));
+    let length = fetched.ok().and_then(|()| read_at::read_at(source.file(), &mut head, 0).ok());
+    let head = &head[..length.unwrap_or(0)];
     if head.starts_with(b"PARE") {
         return ErrorKind::Encrypted { column: None };
     }
