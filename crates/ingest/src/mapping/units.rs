@@ -95,8 +95,7 @@ impl Unit {
         self.entry().1
     }
 
-    /// Factor and offset of `SI = value · factor + offset`; temperatures are converted to °C. Factors are exact by
-    /// definition (NIST SP 811, 2008, appendix B: 1 in = 25.4 mm, 1 lbf = 4.448 221 615 260 5 N).
+    /// Factor and offset of `SI = value · factor + offset`; temperatures are converted to °C.
     pub(crate) fn to_si(self) -> (f64, f64) {
         let (_, _, factor, offset) = self.entry();
         (factor, offset)

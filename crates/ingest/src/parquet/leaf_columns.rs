@@ -35,35 +35,27 @@ pub(crate) struct LeafColumn {
 pub(crate) fn leaves(fields: &Fields) -> Vec<LeafColumn> {
     let mut found = Vec::new();
     for (root, field) in fields.iter().enumerate() {
-        walk(field, composed(field.name()).into_owned(), root, LeafPath::default(), &mut found);
+        let (name, kind) = (composed(field.name()).into_owned(), DataType::Null);
+        let column = LeafColumn { name, index: 0, root, is_field: false, kind, is_listed: false };
+        walk(field, column, &mut found);
     }
     found
 }
 
-/// Lists and structs that contain a leaf.
-#[derive(Debug, Clone, Copy, Default)]
-struct LeafPath {
-    is_listed: bool,
-    is_field: bool,
-}
-
-fn walk(field: &Field, name: String, root: usize, path: LeafPath, found: &mut Vec<LeafColumn>) {
+/// Adds the leaves of a field; `path` is a leaf as far as the way to the field determines it.
+fn walk(field: &Field, path: LeafColumn, found: &mut Vec<LeafColumn>) {
     match field.data_type() {
         DataType::Struct(inner) => {
             for field in inner {
-                let path = LeafPath { is_field: true, ..path };
-                walk(field, format!("{name}.{}", composed(field.name())), root, path, found);
+                let name = format!("{}.{}", path.name, composed(field.name()));
+                walk(field, LeafColumn { name, is_field: true, ..path.clone() }, found);
             }
         }
-        DataType::List(inner) | DataType::LargeList(inner) | DataType::FixedSizeList(inner, _) => {
-            walk(inner, name, root, LeafPath { is_listed: true, ..path }, found);
-        }
-        DataType::Map(inner, _) => walk(inner, name, root, LeafPath { is_listed: true, ..path }, found),
-        kind => {
-            let (index, kind) = (found.len(), kind.clone());
-            let LeafPath { is_listed, is_field } = path;
-            found.push(LeafColumn { name, index, root, is_field, kind, is_listed });
-        }
+        DataType::List(inner)
+        | DataType::LargeList(inner)
+        | DataType::FixedSizeList(inner, _)
+        | DataType::Map(inner, _) => walk(inner, LeafColumn { is_listed: true, ..path }, found),
+        kind => found.push(LeafColumn { index: found.len(), kind: kind.clone(), ..path }),
     }
 }
 

@@ -70,9 +70,9 @@ pub(crate) struct LogFile {
     source: ByteSource,
     footer: ArrowReaderMetadata,
     footer_start: u64,
-    /// The same footer, by which text columns are read as the codes of their dictionary.
+    /// The same footer, by which text columns are read as the codes of their dictionary; none where the reader refuses it.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
-    /// The schema of Arrow's writers, once it was asked for.
+    /// The schema that Arrow's writers note in the footer, once it was asked for; none where it is missing or damaged.
     noted: OnceLock<Option<Schema>>,
     leaves: Vec<LeafColumn>,
     /// Places of the leaves of each name.
@@ -158,33 +158,30 @@ impl LogFile {
         self.find(name).is_some()
     }
 
-    fn named(&self, name: &str) -> impl Iterator<Item = &LeafColumn> {
-        self.by_name.get(name).into_iter().flatten().map(|place| &self.leaves[*place])
+    /// The columns of a name, or the fields of structs where no column has it: a column called `a.b` comes before field
+    /// `b` of struct `a`.
+    fn named(&self, name: &str) -> Vec<&LeafColumn> {
+        let places = self.by_name.get(&*composed(name)).into_iter().flatten();
+        let leaves = places.map(|place| &self.leaves[*place]);
+        let (fields, columns): (Vec<_>, Vec<_>) = leaves.partition(|leaf| leaf.is_field);
+        if columns.is_empty() { fields } else { columns }
     }
 
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        let name = composed(name);
-        let mut named = self.named(&name);
-        let first = named.next()?;
-        // A column called `a.b` comes before field `b` of struct `a`.
-        if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
-    }
-
-    /// How many columns have this name, or fields where no column has.
-    fn count_of(&self, found: &LeafColumn) -> usize {
-        self.named(&found.name).filter(|leaf| leaf.is_field == found.is_field).count()
+        self.named(name).first().copied()
     }
 
     /// A leaf by its name.
     pub(crate) fn leaf(&self, name: &str) -> Result<&LeafColumn, Error> {
-        let found = self.find(name).ok_or_else(|| {
-            let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
-            self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
-        })?;
-        match self.count_of(found) {
-            1 => Ok(found),
-            count => Err(self.error(ErrorKind::DuplicateColumn { column: name.to_owned(), count })),
-        }
+        let (found, column) = (self.named(name), name.to_owned());
+        Err(self.error(match found[..] {
+            [leaf] => return Ok(leaf),
+            [] => {
+                let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
+                ErrorKind::ColumnMissing { column, nearest }
+            }
+            _ => ErrorKind::DuplicateColumn { column, count: found.len() },
+        }))
     }
 
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
@@ -203,11 +200,6 @@ impl LogFile {
     /// A column as Arrow's writers note it; found by its place, as a log may have ten thousand columns.
     fn noted_field(&self, name: &str) -> Option<&Field> {
         let leaf = self.find(name).filter(|leaf| !leaf.is_field)?;
-        self.arrow_schema()?.fields().get(leaf.root).map(Arc::as_ref)
-    }
-
-    /// The schema that Arrow's writers note in the footer; none where it is missing or damaged.
-    fn arrow_schema(&self) -> Option<&Schema> {
         let noted = || {
             self.metadata("ARROW:schema")?;
             let file = self.footer.metadata().file_metadata();
@@ -216,7 +208,7 @@ impl LogFile {
                 .ok()?
                 .ok()
         };
-        self.noted.get_or_init(noted).as_ref()
+        self.noted.get_or_init(noted).as_ref()?.fields().get(leaf.root).map(Arc::as_ref)
     }
 
     /// A value of the footer's key-value metadata.
@@ -370,7 +362,8 @@ impl LogFile {
         scan: Scan<'_>,
     ) -> Result<ParquetRecordBatchReader, Error> {
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
-        let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
+        let coded = || self.coded.get_or_init(|| with_codes(&self.footer, |_| true).ok()).as_ref();
+        let footer = is_coded.then(coded).flatten().unwrap_or(&self.footer);
         let schema = footer.parquet_schema();
         let mask = ProjectionMask::leaves(schema, [leaf.index]);
         let hint = is_coded.then(|| footer.schema().fields());
@@ -391,12 +384,6 @@ impl LogFile {
         let is_code = |e: Encoding| matches!(e, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY);
         let has_dictionary = self.chunk(group, leaf).encodings().any(is_code);
         has_dictionary && self.footer.schema().field(leaf.root).data_type() == &DataType::Utf8
-    }
-
-    /// The footer with every text column as codes of a dictionary; none where the reader refuses it.
-    fn coded_footer(&self) -> Option<&ArrowReaderMetadata> {
-        let coded = || with_codes(&self.footer, |_| true).ok();
-        self.coded.get_or_init(coded).as_ref()
     }
 
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
