@@ -139,11 +139,12 @@ impl ParsedName {
             Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),
             Role::Temperature => unit.dimension() == Dimension::Temperature,
         };
-        // A unit ends a name, or follows the channel.
+        // A unit ends a name, follows the channel, or begins the name.
         let unit_at = |i: usize| Some((i, unit_of(&words[i].2).filter(fits)?));
         let follower = (at + 1..words.len()).find(|i| !says(FILLERS, &words[*i].2));
         let last = Some(words.len() - 1).filter(|last| *last != at);
-        let found = last.and_then(unit_at).or_else(|| follower.and_then(unit_at));
+        let ends = [last, follower, (at > 0).then_some(0)];
+        let found = ends.into_iter().flatten().find_map(unit_at);
         let unit = found.map(|(_, unit)| unit);
         let is_unit = |i: usize| found.is_some_and(|(at, _)| at == i);
         let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(SENSORS, &words[*i].2));
@@ -209,6 +210,7 @@ mod tests {
             ),
             ("AIL_L_LVDT2_MM", "screw; {position}_LVDT2_MM; AIL_L; mm"),
             ("RUD_ROD_FORCE_LBS", "load; {position}_ROD_FORCE_LBS; RUD; lbf"),
+            ("MM_SCREW_RUDDER", "screw; MM_SCREW_{position}; RUDDER; mm"),
             ("RUD_SCRW_DISP_raw", "screw; {position}_SCRW_DISP_raw; RUD; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");

@@ -86,7 +86,7 @@ pub fn folder_value(path: &Path, name: &str) -> Option<String> {
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
-const DEPARTURES: [(&str, &str); 13] = [
+const DEPARTURES: [(&str, &str); 15] = [
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", "%Y-%m-%dT%H:%M:%S"),
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
@@ -100,6 +100,9 @@ const DEPARTURES: [(&str, &str); 13] = [
     (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
     (r"\d{14}", "%Y%m%d%H%M%S"),
     (r"\d{12}", "%Y%m%d%H%M"),
+    // The clock has the time of the day.
+    (r"\d{4}-\d\d-\d\d", "%Y-%m-%d"),
+    (r"20\d\d[01]\d[0-3]\d", "%Y%m%d"),
 ];
 
 /// Forms of a day and of a time that lie in a folder and in a file name.
@@ -141,17 +144,17 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
         };
         return Some((format!(r"{tail}[^/]*?(?<departure_utc>{form}){end}$"), (*format).to_owned()));
     }
-    if let Some((form, format)) = folder(1).and_then(is_known).filter(|_| is_tail(folder(2))) {
-        let expression = format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*/{end}$");
-        return Some((expression, (*format).to_owned()));
-    }
-    let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)))?;
-    let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name))?;
-    let expression = format!(
-        r"(?<tail_number>[^/]+)/(?<departure_date>{})/[^/]*?(?<departure_time>{})[^/]*\.parquet$",
-        day.0, time.0
-    );
-    is_tail(folder(2)).then(|| (expression, format!("{}T{}", day.1, time.1)))
+    let tail = r"(?<tail_number>[^/]+)/";
+    let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)));
+    let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
+    let (expression, format) = if let Some(((day, days), (time, times))) = day.zip(time) {
+        let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet$");
+        (parts, format!("{days}T{times}"))
+    } else {
+        let (form, format) = folder(1).and_then(is_known)?;
+        (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}$"), (*format).to_owned())
+    };
+    is_tail(folder(2)).then(|| (format!("{tail}{expression}"), format))
 }
 
 /// The tail number in a path of one of the forms that [`path_identity`] knows.
@@ -191,6 +194,7 @@ mod tests {
             ("d/TC-JRA/QAR20261119_041300.parquet", "TC-JRA 20261119_041300", "%Y%m%d_%H%M%S"),
             ("d/N412FP/2026-11-19/0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%dT%H%M"),
             ("d/A320_N412FP_2026-11-19T04:13:00.parquet", "N412FP 2026-11-19T04:13:00", "%Y-%m-%dT%H:%M:%S"),
+            ("d/N412FP_2026-11-19_17.parquet", "N412FP 2026-11-19", "%Y-%m-%d"),
             ("d/N412FP 2026-11-19 0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%d %H%M"),
             ("d/2026/11/TC-JRA-17-202611190413.parquet", "TC-JRA 202611190413", "%Y%m%d%H%M"),
             (

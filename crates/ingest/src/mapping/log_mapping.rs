@@ -169,7 +169,7 @@ pub struct ClockMapping {
     pub column: Option<String>,
     /// Unit of the column; `count` is a counter of samples. Not needed for Arrow timestamps and text.
     pub unit: Option<TimeUnit>,
-    /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time.
+    /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time. With `midnight`, texts may be times of the day.
     #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero.

@@ -476,6 +476,11 @@ pub(super) fn check_clock(
     source: &Source<'_>,
     found: &mut Vec<Diagnostic>,
 ) {
+    if clock.column.as_deref() == Some("") {
+        let c = Diagnostic::new("empty_name", "`clock.column` names no column")
+            .hint("name it, or delete the key and give `rate_hz`, the rate of evenly spaced rows");
+        found.push(source.at(&[path, &["column"]].concat(), c));
+    }
     if clock.column.is_none() && clock.rate_hz.is_none() {
         let c = Diagnostic::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
             .hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\"");

@@ -642,6 +642,6 @@ fn clock(offer: &InferredMapping) -> String {
                 "column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n{epoch}"
             )
         }
-        None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
+        None => "# No time column was recognised: name it, or delete `column` and give `rate_hz`.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
     }
 }
