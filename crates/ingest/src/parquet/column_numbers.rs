@@ -2,8 +2,6 @@
 //!
 //! Chunks of doubles and floats that hold no lists are read here; the others by Arrow's reader.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use parquet::basic::Type;
 use parquet::column::page::PageReader;
 use parquet::column::reader::ColumnReaderImpl;
@@ -13,6 +11,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 
 use crate::channel::column_builder::{BATCH, ColumnBuilder};
 use crate::parquet::page_reader::Pages;
+use crate::parquet::raw_footer::caught;
 use crate::parquet::row_selection::RowSelection;
 
 /// Whether the numbers of a chunk are read here.
@@ -31,14 +30,10 @@ pub(crate) fn append(
     wanted: RowSelection<'_>,
     into: &mut ColumnBuilder,
 ) -> std::result::Result<(), String> {
-    let read = AssertUnwindSafe(|| match chunk.column_type() {
+    caught(|| match chunk.column_type() {
         Type::DOUBLE => append_typed::<DoubleType>(pages, chunk, wanted, into, |value| value),
         _ => append_typed::<FloatType>(pages, chunk, wanted, into, f64::from),
-    });
-    match catch_unwind(read) {
-        Ok(read) => read.map_err(|e| e.to_string()),
-        Err(_) => Err("its pages are inconsistent".into()),
-    }
+    })
 }
 
 fn append_typed<T: DataType>(

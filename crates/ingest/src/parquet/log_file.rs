@@ -32,7 +32,7 @@ use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
-use crate::parquet::raw_footer::{self, Footer};
+use crate::parquet::raw_footer::{self, Footer, not_parquet};
 use crate::parquet::row_selection::RowSelection;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
@@ -53,11 +53,11 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
             return ErrorKind::EncodingUnsupported { encoding };
         }
         let detail = format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "));
-        return ErrorKind::NotParquet { detail };
+        return not_parquet(detail);
     }
     match foreign_format::of(head) {
         Some(format) => ErrorKind::ForeignFormat { format },
-        None => ErrorKind::NotParquet { detail: "not a Parquet file".into() },
+        None => not_parquet("not a Parquet file"),
     }
 }
 
@@ -97,24 +97,27 @@ impl Scan<'_> {
 
 impl LogFile {
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        let fail = |fault| Error::new(path, fault);
-        let source = ByteSource::open(path).map_err(fail)?;
+        Self::read_footer(path).map_err(|fault| Error::new(path, fault))
+    }
+
+    fn read_footer(path: &Path) -> Result<Self, ErrorKind> {
+        let source = ByteSource::open(path)?;
         let file = source.file();
-        let length = transient::with_retry(|| file.metadata()).map_err(|source| fail(source.into()))?;
+        let length = transient::with_retry(|| file.metadata())?;
         if length.is_dir() {
-            return Err(fail(std::io::Error::from(std::io::ErrorKind::IsADirectory).into()));
+            return Err(std::io::Error::from(std::io::ErrorKind::IsADirectory).into());
         }
         if length.len() == 0 {
-            return Err(fail(ErrorKind::Empty));
+            return Err(ErrorKind::Empty);
         }
         let read = raw_footer::read(file, |range| source.want(once(range)));
-        let Footer { metadata, start } = read.map_err(|error| fail(footer_error(&source, error)))?;
+        let Footer { metadata, start } = read.map_err(|error| footer_error(&source, error))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let footer = ArrowReaderMetadata::try_new(metadata, options)
-            .map_err(|e| fail(ErrorKind::NotParquet { detail: e.to_string() }))?;
+        let footer =
+            ArrowReaderMetadata::try_new(metadata, options).map_err(|e| not_parquet(e.to_string()))?;
         if footer.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns).any(is_before_start) {
-            return Err(fail(ErrorKind::NotParquet { detail: "its footer has an offset below zero".into() }));
+            return Err(not_parquet("its footer has an offset below zero"));
         }
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let mut by_name: HashMap<String, Vec<usize>> = HashMap::with_capacity(leaves.len());
@@ -125,10 +128,7 @@ impl LogFile {
         let (path, flight_rows) = (path.to_owned(), Vec::new());
         let opened =
             Self { path, flight_rows, source, footer, footer_start: start, coded, noted, leaves, by_name };
-        if opened.rows() == 0 {
-            return Err(opened.error(ErrorKind::Empty));
-        }
-        Ok(opened)
+        if opened.rows() == 0 { Err(ErrorKind::Empty) } else { Ok(opened) }
     }
 
     /// The same file, of which the rows of one flight are meant.

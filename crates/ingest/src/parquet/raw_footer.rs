@@ -1,9 +1,10 @@
 //! The footer as it is written: its claims are bounded before a parser takes memory for them, and causes of errors are
 //! found that the parquet crate does not name: encryption, and encodings of later versions of the format.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::ops::Range;
-use std::panic::catch_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
@@ -44,15 +45,26 @@ pub(crate) fn read(
     want: impl Fn(Range<u64>) -> Result<(), ErrorKind>,
 ) -> Result<Footer, ErrorKind> {
     let (start, bytes) = raw(file, want)?;
-    let damaged = || ErrorKind::NotParquet { detail: "its pages are inconsistent".into() };
-    let decoded = catch_unwind(|| ParquetMetaDataReader::decode_metadata(&bytes)).map_err(|_| damaged())?;
-    let metadata = decoded.map_err(|e| ErrorKind::NotParquet { detail: e.to_string() })?;
+    let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&bytes)).map_err(not_parquet)?;
     Ok(Footer { metadata: Arc::new(metadata), start })
+}
+
+/// A result of the parquet crate, which panics on some damaged bytes.
+pub(crate) fn caught<T, E: Display>(read: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(read)) {
+        Ok(result) => result.map_err(|e| e.to_string()),
+        Err(_) => Err("its pages are inconsistent".into()),
+    }
+}
+
+/// The fault of a file that cannot be read as Parquet.
+pub(crate) fn not_parquet(detail: impl Into<String>) -> ErrorKind {
+    ErrorKind::NotParquet { detail: detail.into() }
 }
 
 /// Start and bytes of a footer whose claims can be.
 fn raw(file: &File, want: impl Fn(Range<u64>) -> Result<(), ErrorKind>) -> Result<(u64, Vec<u8>), ErrorKind> {
-    let corrupt = || ErrorKind::NotParquet { detail: "Invalid Parquet file. Corrupt footer".into() };
+    let corrupt = || not_parquet("Invalid Parquet file. Corrupt footer");
     let length = read_at::file_length(file)?;
     want(length.saturating_sub(USUAL_FOOTER)..length)?;
     let end = length.checked_sub(8).ok_or_else(corrupt)?;
@@ -65,9 +77,8 @@ fn raw(file: &File, want: impl Fn(Range<u64>) -> Result<(), ErrorKind>) -> Resul
     want(start..length)?;
     let mut footer = vec![0; bytes as usize];
     read_at::read_exact(file, &mut footer, start)?;
-    let claims = Thrift { rest: &footer }.file_claims().ok_or_else(|| ErrorKind::NotParquet {
-        detail: "its footer is damaged: it claims more than it holds".into(),
-    })?;
+    let damaged = || not_parquet("its footer is damaged: it claims more than it holds");
+    let claims = Thrift { rest: &footer }.file_claims().ok_or_else(damaged)?;
     bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
     bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
     bounds::check_rows("rows", claims.rows, length)?;

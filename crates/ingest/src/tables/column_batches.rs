@@ -6,7 +6,6 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -27,7 +26,7 @@ use crate::io::read_at;
 use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
-use crate::parquet::raw_footer;
+use crate::parquet::raw_footer::{self, caught, not_parquet};
 use crate::tables::cell::{missing, number, position, utc};
 
 /// Rows of a batch.
@@ -228,15 +227,6 @@ impl TableSplits {
     }
 }
 
-/// A result of the parquet crate, which panics on some damaged bytes.
-fn caught<T, E: std::fmt::Display>(read: impl FnOnce() -> Result<T, E>) -> Result<T, ErrorKind> {
-    let torn = |detail: String| ErrorKind::NotParquet { detail };
-    match catch_unwind(AssertUnwindSafe(read)) {
-        Ok(result) => result.map_err(|e| torn(e.to_string())),
-        Err(_) => Err(torn("its pages are inconsistent".into())),
-    }
-}
-
 fn parquet(
     file: &Path,
     wanted: Option<&[&str]>,
@@ -244,7 +234,8 @@ fn parquet(
 ) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
     let opened = whole(file)?;
     let metadata = raw_footer::read(&opened, |_| Ok(()))?.metadata;
-    let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()))?;
+    let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()));
+    let found = found.map_err(not_parquet)?;
     let with_coded = || with_codes(&found, |name| coded.contains(&name.trim()));
     let footer = if coded.is_empty() { found } else { with_coded().unwrap_or(found) };
     let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
@@ -278,9 +269,11 @@ fn groups(
         let hint = Some(footer.schema().fields());
         let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;
         ParquetRecordBatchReader::try_new_with_row_groups(&levels, &rows, ROWS, None)
-    })?;
+    })
+    .map_err(not_parquet)?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);
-    let batches = Box::new(std::iter::from_fn(move || caught(|| reader.next().transpose()).transpose()));
+    let batch = move || caught(|| reader.next().transpose()).map_err(not_parquet).transpose();
+    let batches = Box::new(std::iter::from_fn(batch));
     Ok(Rows { schema, batches, before })
 }
 
