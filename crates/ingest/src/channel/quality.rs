@@ -134,8 +134,7 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
         // Two samples away, since the step that reaches the limit is shortened.
         let before = run.start.checked_sub(2).map(|i| values[i]);
         let (Some(before), Some(after)) = (before, values.get(run.end + 1)) else { continue };
-        let cut = (before - at).abs() >= speed && (after - at).abs() >= speed;
-        if cut {
+        if (before - at).abs() >= speed && (after - at).abs() >= speed {
             count[usize::from(at == max)] += 1;
             samples += run.len();
         }

@@ -31,10 +31,14 @@ pub struct Mapping {
 impl Mapping {
     /// Clock, layout and identity of the files of a group, or of the main logs.
     pub(crate) fn of_group(&self, group: Option<&str>) -> (&ClockMapping, &Layout, &IdentityMapping) {
-        let main = (&self.clock, &self.layout, &self.identity);
-        group.and_then(|name| self.groups.get(name)).map_or(main, |group| {
-            let (clock, identity) = (group.clock.as_ref(), group.identity.as_ref());
-            (clock.unwrap_or(main.0), &group.layout, identity.unwrap_or(main.2))
+        let (clock, identity) = (&self.clock, &self.identity);
+        let group = group.and_then(|name| self.groups.get(name));
+        group.map_or((clock, &self.layout, identity), |group| {
+            (
+                group.clock.as_ref().unwrap_or(clock),
+                &group.layout,
+                group.identity.as_ref().unwrap_or(identity),
+            )
         })
     }
 }
@@ -361,9 +365,8 @@ impl ChannelMapping {
 
     /// Bits of the status word that are set and clear in a valid sample, where it has such bits.
     pub(crate) fn status_bits(&self) -> Option<(u64, u64)> {
-        let bits = |bits: Option<u64>| bits.unwrap_or(0);
-        let has_bits = self.valid_bits.or(self.invalid_bits).is_some();
-        has_bits.then(|| (bits(self.valid_bits), bits(self.invalid_bits)))
+        self.valid_bits.or(self.invalid_bits)?;
+        Some((self.valid_bits.unwrap_or(0), self.invalid_bits.unwrap_or(0)))
     }
 
     /// How far the samples lie from the stamps of their rows, s.

@@ -69,7 +69,10 @@ impl RowGroups for BoundedGroups<'_> {
         let chunks: Vec<_> =
             self.chosen().map(|group| (group.column(column).clone(), group.num_rows())).collect();
         let (file, batch_rows) = (Arc::clone(&self.file), self.batch_rows);
-        Ok(Box::new(Chunks { file, chunks: chunks.into_iter(), batch_rows }))
+        Ok(Box::new(Chunks(chunks.into_iter().map(move |(chunk, rows)| {
+            let pages = page_header::bounded(&file, &chunk, rows).map_err(ParquetError::General)?;
+            Ok(Box::new(Pages::new(Arc::clone(&file), &chunk, pages, batch_rows)) as Box<dyn PageReader>)
+        }))))
     }
 
     fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
@@ -81,25 +84,16 @@ impl RowGroups for BoundedGroups<'_> {
     }
 }
 
-/// The chunks of one column, each with the rows of its group.
-struct Chunks {
-    file: Arc<File>,
-    chunks: vec::IntoIter<(ColumnChunkMetaData, i64)>,
-    batch_rows: usize,
-}
+/// Readers of the chunks of one column, under the trait that the parquet crate asks for.
+struct Chunks<I>(I);
 
-impl PageIterator for Chunks {}
+impl<I: Iterator<Item = Result<Box<dyn PageReader>>> + Send> PageIterator for Chunks<I> {}
 
-impl Iterator for Chunks {
-    type Item = Result<Box<dyn PageReader>>;
+impl<I: Iterator<Item = Result<Box<dyn PageReader>>>> Iterator for Chunks<I> {
+    type Item = I::Item;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (chunk, rows) = self.chunks.next()?;
-        let pages = page_header::bounded(&self.file, &chunk, rows).map_err(ParquetError::General);
-        Some(pages.map(|pages| {
-            Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows))
-                as Box<dyn PageReader>
-        }))
+        self.0.next()
     }
 }
 
