@@ -69,6 +69,9 @@ pub(crate) fn date_alone(text: &str, mapping: &IdentityMapping) -> Option<civil:
     }
 }
 
+/// The latest first stamp of a clock that counts from midnight, s: the flight may begin some hours into the next day.
+const MOST_OF_DAY_S: f64 = DAY_S + 12_000.0;
+
 /// A departure of which the log names the date: by its absolute clock, or by one that counts from midnight.
 pub(crate) fn departure_on(
     date: civil::Date,
@@ -90,6 +93,10 @@ pub(crate) fn departure_on(
         let detail = "a date without a time of the day: several flights of a day would be one. Add the time to the log or to the flights table, or set `clock.epoch = \"midnight\"` if the clock counts the seconds of the day";
         return Err(invalid(detail.into()));
     };
+    if first_s >= MOST_OF_DAY_S {
+        let what = format!("its clock begins {first_s} s after midnight");
+        return Err(invalid(format!("{what}: one that reads as HHMMSS does not count seconds")));
+    }
     let local =
         date.to_datetime(civil::Time::midnight()) + duration((first_s + earliest_s).rem_euclid(DAY_S));
     let name = mapping.time_zone.as_deref();
