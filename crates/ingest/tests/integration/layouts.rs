@@ -389,7 +389,7 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     assert!(refused.message.contains("HHMMSS"), "{refused}");
     m.clock.unit = None;
     let texts: Vec<_> = (0..200).map(|k| format!("23:59:{:05.2}", 50.0 + 0.05 * f64::from(k))).collect();
-    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(arrow::array::StringArray::from(texts)))];
+    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(StringArray::from(texts)))];
     assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
     let of_day = (0..200).map(|k| Some(86_390_000 + 50 * k)).collect::<Time32MillisecondArray>();
     let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(of_day))];
