@@ -44,10 +44,14 @@ impl RawValue {
         }
     }
 
-    /// The texts that these values are, where any of them is a text: the column is then read as text.
+    /// Whether any of these values is a text: the column is then read as text.
+    fn has_text(values: &[Self]) -> bool {
+        values.iter().any(|value| matches!(value, Self::Text(_)))
+    }
+
+    /// The texts that these values are, where the column is read as text.
     pub(crate) fn texts(values: &[Self]) -> Vec<String> {
-        let has_text = values.iter().any(|value| matches!(value, Self::Text(_)));
-        if has_text { values.iter().map(Self::as_text).collect() } else { Vec::new() }
+        if Self::has_text(values) { values.iter().map(Self::as_text).collect() } else { Vec::new() }
     }
 }
 
@@ -84,7 +88,7 @@ impl SampleFilter {
     /// Whether a raw value will do. A missing one does not.
     fn holds(&self, value: f64) -> bool {
         // A column of texts is read as 1 where it holds one of them.
-        let is_text = !RawValue::texts(&self.equals).is_empty();
+        let is_text = RawValue::has_text(&self.equals);
         let one_of = self.equals.is_empty()
             || if is_text { value > 0.5 } else { self.equals.iter().any(|wanted| wanted.is(value)) };
         let reaches = self.at_least.is_none_or(|least| value >= least);
