@@ -4,21 +4,21 @@ use std::sync::Arc;
 
 use arrow::array::{
     ArrayRef, BooleanArray, Float64Array, Int16Array, Int64Array, StringArray, Time32MillisecondArray,
-    UInt16Array, UInt64Array,
+    TimestampMillisecondArray, UInt16Array, UInt64Array,
 };
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, TimeUnit as ArrowUnit};
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Mapping, RawValue};
+use ingest::{ActuatorChannels, ChannelMapping, RawValue};
 
-use crate::layouts::{self, channel, identity, place, plain, write};
+use crate::layouts::{self, channel, identity, only, plain};
 
 const STEP_S: f64 = 0.01;
 const ROWS: usize = 1000;
 
 fn reals(of: impl Fn(f64) -> f64) -> ArrayRef {
-    Arc::new((0..ROWS).map(|k| of(k as f64 * STEP_S)).collect::<Float64Array>())
+    layouts::reals((0..ROWS).map(|k| of(k as f64 * STEP_S)))
 }
 
 fn holed(of: impl Fn(usize) -> Option<f64>) -> ArrayRef {
@@ -36,12 +36,6 @@ fn screw(t: f64) -> f64 {
 
 fn columns() -> Vec<(&'static str, ArrayRef)> {
     vec![("t", reals(|t| t)), ("m", reals(motor)), ("s", reals(screw)), ("f", reals(|t| 1e3 * t.cos()))]
-}
-
-fn read(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<ActuatorChannels, Error> {
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write(&file, columns);
-    layouts::read(&file, mapping, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn with(
@@ -63,7 +57,7 @@ fn worst(a: &ActuatorChannels) -> (f64, usize) {
 
 #[test]
 fn even_channels_pass_untouched() {
-    let a = read(&plain(), &columns()).unwrap();
+    let a = only(&plain(), &columns()).unwrap();
     let bits = (0..ROWS).all(|k| a.motor_m[k].to_bits() == motor(k as f64 * STEP_S).to_bits());
     assert!(bits && a.flags.is_empty(), "{:?}", a.flags);
 }
@@ -73,9 +67,9 @@ fn a_known_latency_is_taken_away() {
     for (latency_s, instant_s) in [(0.005, 0.0), (0.020, 0.0), (0.0, 0.004), (0.013, 0.003)] {
         let late = reals(|t| screw(t - latency_s + instant_s));
         let mut m = plain();
-        m.channels.screw_position =
-            Some(ChannelMapping { latency_s, instant_s, ..channel("s", Unit::Metre) });
-        let (error_m, known) = worst(&read(&m, &with(columns(), "s", late)).unwrap());
+        let screw_channel = ChannelMapping { latency_s, instant_s, ..channel("s", Unit::Metre) };
+        m.channels.screw_position = Some(screw_channel);
+        let (error_m, known) = worst(&only(&m, &with(columns(), "s", late)).unwrap());
         assert!(
             error_m < 1e-7 && known >= ROWS - 4,
             "{latency_s} s, {instant_s} s: {error_m} m, {known} samples"
@@ -90,7 +84,7 @@ fn a_channel_with_its_own_time_column_is_brought_to_the_motors_instants() {
         Some(ChannelMapping { time_column: Some("ts".into()), ..channel("s", Unit::Metre) });
     let own = |t: f64| 1.003 * t + 0.0042;
     let columns = with(with(columns(), "s", reals(|t| screw(own(t)))), "ts", reals(own));
-    let (error_m, known) = worst(&read(&m, &columns).unwrap());
+    let (error_m, known) = worst(&only(&m, &columns).unwrap());
     assert!(error_m < 1e-7 && known > ROWS - 4, "{error_m} m, {known} samples");
 }
 
@@ -101,12 +95,12 @@ fn a_slower_position_is_joined_by_lines_and_a_slower_load_is_held() {
         m.channels.screw_position = Some(ChannelMapping { rate_hz: Some(50.0), ..channel("s", Unit::Metre) });
         let at = |k: usize| if repeated { Some(k / 2 * 2) } else { k.is_multiple_of(2).then_some(k) };
         let slow = |of: fn(f64) -> f64| holed(move |k| at(k).map(|k| of(k as f64 * STEP_S)));
-        let a = read(&m, &with(columns(), "s", slow(screw))).unwrap();
+        let a = only(&m, &with(columns(), "s", slow(screw))).unwrap();
         let (error_m, known) = worst(&a);
         assert!(error_m < 1e-6 && known >= ROWS - 1, "repeated {repeated}: {error_m} m, {known} samples");
     }
     let load = holed(|k| k.is_multiple_of(10).then_some(k as f64));
-    let a = read(&plain(), &with(columns(), "f", load)).unwrap();
+    let a = only(&plain(), &with(columns(), "f", load)).unwrap();
     assert_eq!((a.load_n[25], a.segments.len(), a.segments[0].len()), (20.0, 1, ROWS));
 }
 
@@ -115,14 +109,14 @@ fn a_hole_is_never_bridged() {
     let mut m = plain();
     m.channels.screw_position = Some(ChannelMapping { latency_s: 0.005, ..channel("s", Unit::Metre) });
     let late = holed(|k| (!(300..320).contains(&k)).then(|| screw(k as f64 * STEP_S - 0.005)));
-    let a = read(&m, &with(columns(), "s", late)).unwrap();
+    let a = only(&m, &with(columns(), "s", late)).unwrap();
     assert!(a.dx_m[300..318].iter().all(|dx| dx.is_nan()), "{:?}", &a.dx_m[298..322]);
     assert!(worst(&a).0 < 1e-7);
 }
 
 #[test]
 fn the_redundant_channel_that_lives_is_taken() {
-    let dead: [(&str, ArrayRef); 3] = [
+    let dead = [
         ("nan", holed(|_| None)),
         ("stuck", reals(|_| 0.0)),
         ("half", holed(|k| (k > 600).then_some(k as f64))),
@@ -134,11 +128,11 @@ fn the_redundant_channel_that_lives_is_taken() {
             ..channel("s", Unit::Metre)
         });
         let second = reals(|t| -1e3 * screw(t));
-        let a = read(&m, &with(with(columns(), "s", first), "s2", Arc::clone(&second))).unwrap();
+        let a = only(&m, &with(with(columns(), "s", first), "s2", Arc::clone(&second))).unwrap();
         assert!(worst(&a).0 < 1e-12 && a.flags == ["screw_alternative"], "{why}: {:?}", a.flags);
         let mut without = columns();
         without.retain(|(name, _)| *name != "s");
-        let a = read(&m, &with(without, "s2", second)).unwrap();
+        let a = only(&m, &with(without, "s2", second)).unwrap();
         assert!(worst(&a).0 < 1e-12, "{why}");
     }
 }
@@ -161,24 +155,18 @@ fn a_sample_that_is_not_valid_is_missing() {
         let mut m = plain();
         m.channels.motor_position =
             ChannelMapping { valid_column: Some("ok".into()), valid_values, ..channel("m", Unit::Metre) };
-        let a = read(&m, &with(columns(), "ok", mark)).unwrap();
-        let missing: Vec<usize> = (0..ROWS).filter(|&k| a.dx_m[k].is_nan()).collect();
-        assert_eq!(missing, (200..240).collect::<Vec<_>>());
+        let a = only(&m, &with(columns(), "ok", mark)).unwrap();
+        assert!((0..ROWS).all(|k| a.dx_m[k].is_nan() == (200..240).contains(&k)));
     }
 }
 
 /// A status word of 16 or 64 bits: bit 2 says powered, bit 5 says failed, and others are in use.
 #[test]
 fn bits_of_a_status_word_mark_valid_samples() {
-    let bad = |k: usize| (200..240).contains(&k);
-    let word = |k: usize| {
-        if !bad(k) {
-            0b0100
-        } else if k < 220 {
-            0b10_0100
-        } else {
-            0
-        }
+    let word = |k: usize| match k {
+        200..220 => 0b10_0100,
+        220..240 => 0,
+        _ => 0b0100,
     };
     let short = (0..ROWS).map(|k| (word(k) | 0b1000) as i16 | i16::MIN).collect::<Int16Array>();
     let long = (0..ROWS).map(|k| (word(k) | (k as u64) << 40) | 1 << 63).collect::<UInt64Array>();
@@ -190,11 +178,10 @@ fn bits_of_a_status_word_mark_valid_samples() {
         ..channel("m", Unit::Metre)
     };
     for words in [Arc::new(short) as ArrayRef, Arc::new(long)] {
-        let a = read(&m, &with(columns(), "ok", words)).unwrap();
-        let missing: Vec<usize> = (0..ROWS).filter(|&k| a.dx_m[k].is_nan()).collect();
-        assert_eq!(missing, (200..240).collect::<Vec<_>>());
+        let a = only(&m, &with(columns(), "ok", words)).unwrap();
+        assert!((0..ROWS).all(|k| a.dx_m[k].is_nan() == (200..240).contains(&k)));
     }
-    let real = read(&m, &with(columns(), "ok", reals(|_| 4.0))).unwrap_err().diagnostic();
+    let real = only(&m, &with(columns(), "ok", reals(|_| 4.0))).unwrap_err().diagnostic();
     assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
 }
 
@@ -223,6 +210,7 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
     let (second, millisecond) = (Some(TimeUnit::Second), Some(TimeUnit::Millisecond));
     let (none, there) = (Epoch::None, Some("Europe/Istanbul"));
     let utc = Some("2025-11-19T04:13:00.25Z");
+    let day_count = reals(|t| 46_345.25 + t / 86_400.0);
     let cases: [Case; 15] = [
         (reals(|t| 10.0 + t), second, none, there, None),
         (reals(|t| 7.0 + t / 60.0), Some(TimeUnit::Minute), none, there, None),
@@ -239,13 +227,7 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
         // The type of a duration wins over the mapped unit.
         (of_type(whole(5000, 10), DataType::Duration(ArrowUnit::Millisecond)), second, none, there, None),
         (Arc::new(count.collect::<UInt16Array>()), Some(TimeUnit::Count), none, there, None),
-        (
-            reals(|t| 46_345.25 + t / 86_400.0),
-            Some(TimeUnit::Day),
-            Epoch::Excel,
-            Some("UTC"),
-            Some("2026-11-19T06:00:00Z"),
-        ),
+        (day_count, Some(TimeUnit::Day), Epoch::Excel, Some("UTC"), Some("2026-11-19T06:00:00Z")),
     ];
     for (clock, unit, epoch, zone, start) in cases {
         let case = format!("{} {unit:?} {epoch:?} {zone:?}", clock.data_type());
@@ -257,7 +239,7 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
         m.identity.path = Some(r"(?<tail_number>N\w+)_".into());
         m.identity.time_zone = zone.map(str::to_owned);
         let columns = with(columns(), "t", clock);
-        let a = read(&m, &columns).unwrap();
+        let a = only(&m, &columns).unwrap();
         // A double holds days since 1899 to a microsecond.
         let tolerance_s = if epoch == Epoch::Excel { 2e-6 } else { 1e-9 };
         assert!((a.step_s - 0.01).abs() < tolerance_s, "{case}: {} s", a.step_s);
@@ -270,15 +252,12 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
 
 #[test]
 fn clocks_without_a_common_zero_are_refused() {
-    let instants: ArrayRef = Arc::new(
-        (0..ROWS as i64)
-            .map(|k| Some(1_763_525_580_250 + 10 * k))
-            .collect::<arrow::array::TimestampMillisecondArray>(),
-    );
+    let instants = (0..ROWS as i64).map(|k| 1_763_525_580_250 + 10 * k);
+    let instants = Arc::new(TimestampMillisecondArray::from_iter_values(instants));
     let mut m = plain();
     m.channels.screw_position =
         Some(ChannelMapping { time_column: Some("ts".into()), ..channel("s", Unit::Metre) });
-    let error = read(&m, &with(columns(), "ts", instants)).unwrap_err();
+    let error = only(&m, &with(columns(), "ts", instants)).unwrap_err();
     assert_eq!(error.diagnostic().code, "clocks_differ");
 }
 
@@ -287,6 +266,6 @@ fn the_relative_position_may_be_logged_itself() {
     let mut m = plain();
     m.channels.screw_position = None;
     m.channels.relative_position = Some(channel("d", Unit::Micrometre));
-    let a = read(&m, &with(columns(), "d", reals(|t| 1e6 * (screw(t) - motor(t))))).unwrap();
+    let a = only(&m, &with(columns(), "d", reals(|t| 1e6 * (screw(t) - motor(t))))).unwrap();
     assert!(worst(&a).0 < 1e-12);
 }

@@ -6,23 +6,19 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Float64Array, StructArray};
 use arrow::datatypes::{DataType, Field};
 use ingest::mapping::units::Unit;
-use ingest::{ActuatorChannels, Error, Geometry, Log, LogFiles, Mapping};
+use ingest::{Error, Log, LogFiles};
 
-use crate::layouts::{self, channel, place, plain, write};
+use crate::layouts::{channel, place, plain, read, reals, write};
 
 #[path = "../../../../tests/hostile/corpus.rs"]
 mod corpus;
 
 fn values() -> ArrayRef {
-    Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()))
+    reals((0..2000).map(f64::from))
 }
 
 fn sound(file: &Path) {
     write(file, &["t", "m", "s", "f"].map(|name| (name, values())));
-}
-
-fn read(file: &Path, m: &Mapping) -> Result<ActuatorChannels, Error> {
-    layouts::read(file, m, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn code(result: Result<Log, Error>) -> String {
@@ -54,8 +50,7 @@ fn files_that_are_no_logs_are_distinguished() {
 
 #[test]
 fn a_log_cut_short_anywhere_is_no_whole_file() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("whole.parquet");
+    let (dir, file) = place("whole.parquet");
     sound(&file);
     let bytes = std::fs::read(&file).unwrap();
     for cut in [4, bytes.len() / 3, bytes.len() / 2, bytes.len() - 9, bytes.len() - 1] {
@@ -68,8 +63,7 @@ fn a_log_cut_short_anywhere_is_no_whole_file() {
 /// The digest must notice what a reader without page checksums cannot.
 #[test]
 fn a_flipped_byte_changes_the_digest() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("whole.parquet");
+    let (dir, file) = place("whole.parquet");
     sound(&file);
     let m = plain();
     let digest = |file: &Path| {
@@ -94,26 +88,21 @@ fn a_clock_without_a_unit_is_never_guessed() {
     sound(&file);
     let mut m = plain();
     m.clock.unit = None;
-    let error = read(&file, &m).unwrap_err();
-    assert_eq!(error.diagnostic().code, "time_unit_unknown");
+    assert_eq!(read(&file, &m).unwrap_err().diagnostic().code, "time_unit_unknown");
     m.clock.column = None;
-    let error = read(&file, &m).unwrap_err();
-    assert_eq!(error.diagnostic().code, "no_clock");
+    assert_eq!(read(&file, &m).unwrap_err().diagnostic().code, "no_clock");
 }
 
 /// Two columns of one name: neither is taken, and the error names them.
 #[test]
 fn a_name_that_two_columns_have_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("twice.parquet");
+    let (_dir, file) = place("twice.parquet");
     let values = values();
     for column in ["t", "s"] {
         write(&file, &["t", "m", "s", "f", column].map(|name| (name, Arc::clone(&values))));
         let diagnostic = read(&file, &plain()).unwrap_err().diagnostic();
-        assert_eq!(
-            (diagnostic.code.as_str(), diagnostic.column.as_deref()),
-            ("duplicate_column", Some(column))
-        );
+        let found = (diagnostic.code.as_str(), diagnostic.column.as_deref());
+        assert_eq!(found, ("duplicate_column", Some(column)));
     }
     write(&file, &["t", "m", "s", "f", "spare", "spare"].map(|name| (name, Arc::clone(&values))));
     assert!(read(&file, &plain()).is_ok());
@@ -124,10 +113,8 @@ fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
     let (_dir, file) = place("struct.parquet");
     let values = values();
     let field = |name: &str| Arc::new(Field::new(name, DataType::Float64, true));
-    let record: ArrayRef = Arc::new(StructArray::from(vec![
-        (field("deg"), Arc::clone(&values)),
-        (field("raw"), Arc::clone(&values)),
-    ]));
+    let fields = ["deg", "raw"].map(|name| (field(name), Arc::clone(&values)));
+    let record: ArrayRef = Arc::new(StructArray::from(fields.to_vec()));
     write(&file, &[("t", Arc::clone(&values)), ("m", record), ("s", Arc::clone(&values)), ("f", values)]);
     let diagnostic = read(&file, &plain()).unwrap_err().diagnostic();
     assert_eq!((diagnostic.code.as_str(), diagnostic.column.as_deref()), ("column_type", Some("m")));
@@ -137,8 +124,7 @@ fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
 /// A byte order mark before a name, a no-break space and a Cyrillic letter in one show by their code points.
 #[test]
 fn names_that_look_alike_are_told_apart() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("alike.parquet");
+    let (_dir, file) = place("alike.parquet");
     let values = values();
     let alike = [
         ("\u{feff}screw_mm", "screw_mm", "U+FEFF"),

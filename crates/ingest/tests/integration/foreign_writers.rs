@@ -3,18 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use ingest::log::identity::IdentityFields;
-use ingest::mapping::units::{TimeUnit, Unit};
+use ingest::mapping::units::Unit;
 use ingest::mapping::{IdentityField, IdentityMapping};
-use ingest::{
-    ActuatorChannels, ChannelMapping, Channels, ClockMapping, Geometry, GroupMapping, Layout, Log, LogFiles,
-    Mapping,
-};
+use ingest::{ActuatorChannels, ChannelMapping, GroupMapping, Layout, Log, LogFiles, Mapping};
 use records::Position;
 
-use crate::layouts::channel;
-
-const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+use crate::layouts::{self, LINEAR, channel, opened, own_identity};
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers").join(name)
@@ -22,28 +16,14 @@ fn file(name: &str) -> PathBuf {
 
 fn mapping(before: &str) -> Mapping {
     let named = |what: &str, unit| channel(&format!("{before}{what}"), unit);
-    Mapping {
-        identity: IdentityMapping {
-            values: [
-                (IdentityField::TailNumber, "N1".into()),
-                (IdentityField::DepartureUtc, "2026-11-19T04:13:00Z".into()),
-            ]
-            .into(),
-            ..IdentityMapping::default()
-        },
-        clock: ClockMapping {
-            column: Some("time_s".into()),
-            unit: Some(TimeUnit::Second),
-            ..ClockMapping::default()
-        },
-        channels: Channels {
-            motor_position: named("motor_deg", Unit::Degree),
-            screw_position: Some(named("screw_mm", Unit::Millimetre)),
-            load: named("load_n", Unit::Newton),
-            ..Channels::default()
-        },
-        ..Mapping::default()
-    }
+    let screw = named("screw_mm", Unit::Millimetre);
+    let mut mapping =
+        layouts::mapping(named("motor_deg", Unit::Degree), screw, named("load_n", Unit::Newton));
+    mapping.clock.column = Some("time_s".into());
+    let values = [(IdentityField::TailNumber, "N1"), (IdentityField::DepartureUtc, "2026-11-19T04:13:00Z")];
+    let values = values.map(|(field, text)| (field, text.to_owned())).into();
+    mapping.identity = IdentityMapping { values, ..IdentityMapping::default() };
+    mapping
 }
 
 pub(crate) fn wide() -> Mapping {
@@ -52,7 +32,7 @@ pub(crate) fn wide() -> Mapping {
 
 fn actuators(files: &LogFiles, mapping: &Mapping) -> Vec<ActuatorChannels> {
     let log = Log::open(files, &Arc::new(mapping.clone())).unwrap();
-    let own = log.identity(|_, _| IdentityFields::new()).unwrap().position;
+    let own = own_identity(&log).unwrap().position;
     let found = log.actuators(&mapping.channels, own.as_ref()).unwrap();
     found.iter().map(|at| log.read_actuator(at, &mapping.channels, LINEAR).unwrap()).collect()
 }
@@ -139,8 +119,7 @@ fn hive_folders_say_which_flight_and_actuator_a_file_is() {
     for position in ["left", "right"] {
         let path =
             file(&format!("hive/tail=N1/off=2026-11-19T04%3A13%3A00Z/actuator={position}/part-0.parquet"));
-        let log = Log::open(&LogFiles::one(&path), &Arc::new(m.clone())).unwrap();
-        let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
+        let identity = own_identity(&opened(&path, &m)).unwrap();
         assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
         assert_eq!(identity.position, Some(Position::new(position).unwrap()));
         found.extend(actuators(&LogFiles::one(path), &m));
@@ -158,7 +137,7 @@ fn loads_in_a_file_of_their_own_at_their_own_rate_move_in_lines() {
         groups: [("loads".to_owned(), vec![file("group_loads.parquet")])].into(),
     };
     assert_is_the_flight(&actuators(&files, &m), "groups", 0.0, 2);
-    let log = Log::open(&LogFiles::one(file("group_positions.parquet")), &Arc::new(m.clone())).unwrap();
+    let log = opened(&file("group_positions.parquet"), &m);
     let error = log.actuators(&m.channels, None).unwrap_err();
     assert_eq!(error.diagnostic().code, "group_missing");
 }

@@ -14,8 +14,10 @@ use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema};
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::units::{TimeUnit, Unit};
 use ingest::mapping::{Epoch, IdentityField, IdentityMapping};
+use ingest::parquet::writer::{Column, write_parquet};
 use ingest::{
-    ActuatorChannels, ChannelMapping, Channels, ClockMapping, Error, Geometry, Log, LogFiles, Mapping,
+    ActuatorChannels, ChannelMapping, Channels, ClockMapping, Error, Geometry, Identity, Log, LogFiles,
+    Mapping,
 };
 use parquet::arrow::ArrowWriter;
 use records::Position;
@@ -64,7 +66,13 @@ pub(crate) fn mapping(motor: ChannelMapping, screw: ChannelMapping, load: Channe
 
 /// Motor, screw and load in the columns `m`, `s` and `f`.
 pub(crate) fn plain() -> Mapping {
-    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
+    prefixed("")
+}
+
+/// The same columns with a prefix.
+pub(crate) fn prefixed(prefix: &str) -> Mapping {
+    let named = |name: &str, unit| channel(&format!("{prefix}{name}"), unit);
+    mapping(named("m", Unit::Metre), named("s", Unit::Metre), named("f", Unit::Newton))
 }
 
 /// A file in a folder of its own, which goes with it.
@@ -74,28 +82,48 @@ pub(crate) fn place(name: &str) -> (tempfile::TempDir, PathBuf) {
     (dir, file)
 }
 
+/// A log of these columns, whose path names tail and departure.
+pub(crate) fn written(columns: &[(&str, ArrayRef)]) -> (tempfile::TempDir, PathBuf) {
+    let (dir, file) = place("N1_20261119T041300Z.parquet");
+    write(&file, columns);
+    (dir, file)
+}
+
 pub(crate) fn opened(file: &Path, mapping: &Mapping) -> Log {
     Log::open(&LogFiles::one(file), &Arc::new(mapping.clone())).unwrap()
 }
 
-/// Opens a log and reads its only actuator.
-pub(crate) fn read(file: &Path, mapping: &Mapping, geometry: Geometry) -> Result<ActuatorChannels, Error> {
+/// Opens a log and reads its only actuator, with a lead of 5 mm.
+pub(crate) fn read(file: &Path, mapping: &Mapping) -> Result<ActuatorChannels, Error> {
+    read_with(file, mapping, LINEAR)
+}
+
+/// The same with another geometry.
+pub(crate) fn read_with(
+    file: &Path,
+    mapping: &Mapping,
+    geometry: Geometry,
+) -> Result<ActuatorChannels, Error> {
     let log = Log::open(&LogFiles::one(file), &Arc::new(mapping.clone()))?;
     let at = log.actuators(&mapping.channels, Some(&Position::new("a").unwrap()))?;
     log.read_actuator(&at[0], &mapping.channels, geometry)
 }
 
-const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+pub(crate) const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
 
 /// Writes, opens and reads the only actuator of a log.
-fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)], geometry: Geometry) -> ActuatorChannels {
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write(&file, columns);
-    read(&file, mapping, geometry).unwrap()
+pub(crate) fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<ActuatorChannels, Error> {
+    let (_dir, file) = written(columns);
+    read(&file, mapping)
 }
 
-fn reals(values: &[f64]) -> ArrayRef {
-    Arc::new(Float64Array::from(values.to_vec()))
+pub(crate) fn reals(values: impl IntoIterator<Item = f64>) -> ArrayRef {
+    Arc::new(values.into_iter().map(Some).collect::<Float64Array>())
+}
+
+/// What the log itself says of its flight.
+pub(crate) fn own_identity(log: &Log) -> Result<Identity, records::Diagnostic> {
+    log.identity(|_, _| IdentityFields::new()).map_err(|e| e.diagnostic())
 }
 
 fn near(found: &[f64], wanted: &[f64]) {
@@ -108,7 +136,7 @@ fn near(found: &[f64], wanted: &[f64]) {
 /// One millimetre, 5 mm lead: 72° or 0.2 turns of the motor; 1 lbf is 4.448… N.
 #[test]
 fn every_unit_reaches_the_same_metres_and_newtons() {
-    let t = reals(&[0.0, 0.1]);
+    let t = reals([0.0, 0.1]);
     let positions = [
         (Unit::Metre, 1e-3),
         (Unit::Millimetre, 1.0),
@@ -135,23 +163,13 @@ fn every_unit_reaches_the_same_metres_and_newtons() {
     for (unit, millimetre) in positions {
         for (load_unit, kilonewton) in loads {
             let m = mapping(channel("m", unit), channel("s", Unit::Metre), channel("f", load_unit));
-            let values = [millimetre, 2.0 * millimetre];
-            let a = only(
-                &m,
-                &[
-                    ("t", t.clone()),
-                    ("m", reals(&values)),
-                    ("s", reals(&[1e-3, 2e-3])),
-                    ("f", reals(&[kilonewton, -kilonewton])),
-                ],
-                LINEAR,
-            );
+            let (motor, load) = (reals([millimetre, 2.0 * millimetre]), reals([kilonewton, -kilonewton]));
+            let columns = [("t", t.clone()), ("m", motor), ("s", reals([1e-3, 2e-3])), ("f", load)];
+            let a = only(&m, &columns).unwrap();
             near(&a.motor_m, &[1e-3, 2e-3]);
             a.dx_m.iter().for_each(|dx| assert!(dx.abs() < 1e-15, "{} leaves {dx} m", unit.as_str()));
-            a.load_n
-                .iter()
-                .zip([1e3, -1e3])
-                .for_each(|(f, w)| assert!((f - w).abs() < 1e-8, "{} gives {f} N", load_unit.as_str()));
+            let off_n = a.load_n.iter().zip([1e3, -1e3]).map(|(f, w)| (f - w).abs());
+            off_n.for_each(|off| assert!(off < 1e-8, "{} is off by {off} N", load_unit.as_str()));
         }
     }
 }
@@ -168,12 +186,12 @@ fn signs_counts_sentinels_and_gears_are_taken_as_mapped() {
     let screw = ChannelMapping { missing: vec![-9999.0], ..channel("s", Unit::Millimetre) };
     let m = mapping(motor, screw, channel("f", Unit::Newton));
     let columns: [(&str, ArrayRef); 4] = [
-        ("t", reals(&[0.0, 0.1])),
+        ("t", reals([0.0, 0.1])),
         ("m", Arc::new(Int16Array::from(vec![2, 6]))),
-        ("s", reals(&[1.0, -9999.0])),
-        ("f", reals(&[0.0, 1.0])),
+        ("s", reals([1.0, -9999.0])),
+        ("f", reals([0.0, 1.0])),
     ];
-    let a = only(&m, &columns, LINEAR);
+    let a = only(&m, &columns).unwrap();
     // −(2·0.5 + 1) turns over a gear of 2 and a lead of 5 mm.
     near(&a.motor_m, &[-0.005, -0.010]);
     near(&a.dx_m[..1], &[0.006]);
@@ -184,7 +202,7 @@ fn signs_counts_sentinels_and_gears_are_taken_as_mapped() {
 fn every_numeric_type_is_read() {
     let decimals = Decimal128Array::from(vec![1_000_i128, 2_000]).with_precision_and_scale(10, 3).unwrap();
     let dictionary: DictionaryArray<Int32Type> =
-        DictionaryArray::new(Int32Array::from(vec![0, 1]), reals(&[1.0, 2.0]));
+        DictionaryArray::new(Int32Array::from(vec![0, 1]), reals([1.0, 2.0]));
     let kinds: Vec<ArrayRef> = vec![
         Arc::new(Float16Array::from(vec![half::f16::from_f32(1.0), half::f16::from_f32(2.0)])),
         Arc::new(Float32Array::from(vec![1.0, 2.0])),
@@ -198,30 +216,21 @@ fn every_numeric_type_is_read() {
     for kind in kinds {
         let name = kind.data_type().to_string();
         let columns =
-            [("t", reals(&[0.0, 0.1])), ("m", kind), ("s", reals(&[1.0, 2.0])), ("f", reals(&[1.0, 2.0]))];
-        let a = only(&m, &columns, LINEAR);
-        assert_eq!(a.motor_m, [1.0, 2.0], "{name}");
+            [("t", reals([0.0, 0.1])), ("m", kind), ("s", reals([1.0, 2.0])), ("f", reals([1.0, 2.0]))];
+        assert_eq!(only(&m, &columns).unwrap().motor_m, [1.0, 2.0], "{name}");
     }
 }
 
 #[test]
 fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    let x = || reals(&[0.0, 1.0]);
-    write(
-        &file,
-        &[("t", x()), ("left_m", x()), ("left_s", x()), ("left_f", x()), ("right_m", x()), ("right_s", x())],
-    );
-    let m = mapping(
-        channel("{position}_m", Unit::Metre),
-        channel("{position}_s", Unit::Metre),
-        channel("{position}_f", Unit::Newton),
-    );
+    let names = ["t", "left_m", "left_s", "left_f", "right_m", "right_s"];
+    let (_dir, file) = written(&names.map(|name| (name, reals([0.0, 1.0]))));
+    let m = prefixed("{position}_");
     let log = opened(&file, &m);
     let found = log.actuators(&m.channels, None).unwrap();
     let told: Vec<_> = found.iter().map(|p| (p.position.as_str(), p.lacking.clone())).collect();
     assert_eq!(told, [("left", vec![]), ("right", vec!["right_f".to_owned()])]);
-    let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
+    let identity = own_identity(&log).unwrap();
     assert_eq!(identity.tail_number.as_str(), "N1");
     assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
 }
@@ -229,56 +238,39 @@ fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
 #[test]
 fn metadata_wins_over_columns_and_columns_over_the_path() {
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    let x = || ingest::parquet::writer::Column::Real(vec![0.0, 1.0]);
-    let text = |t: &str| ingest::parquet::writer::Column::Text(vec![t.to_owned(); 2]);
-    let columns = [("t".to_owned(), x()), ("tail".into(), text("N2")), ("flight".into(), text("0413"))];
-    ingest::parquet::writer::write_parquet(
-        &file,
-        &columns,
-        &[("reg".into(), "N3".into()), ("fh".into(), "1.5".into())],
-    )
-    .unwrap();
+    let text = |t: &str| Column::Text(vec![t.to_owned(); 2]);
+    let columns = [("t", Column::Real(vec![0.0, 1.0])), ("tail", text("N2")), ("flight", text("0413"))];
+    let metadata = [("reg", "N3"), ("fh", "1.5")].map(|(key, value)| (key.into(), value.into()));
+    write_parquet(&file, &columns.map(|(name, values)| (name.into(), values)), &metadata).unwrap();
     let mut m = plain();
     m.identity.columns = BTreeMap::from([
         (IdentityField::TailNumber, "tail".into()),
         (IdentityField::FlightId, "flight".into()),
     ]);
-    let tail = |m: &Mapping| {
-        let log = opened(&file, m);
-        log.identity(|_, _| IdentityFields::new()).unwrap()
-    };
-    assert_eq!(tail(&m).tail_number.as_str(), "N2");
+    let found = |m: &Mapping| own_identity(&opened(&file, m)).unwrap();
+    assert_eq!(found(&m).tail_number.as_str(), "N2");
     m.identity.metadata = BTreeMap::from([
         (IdentityField::TailNumber, "reg".into()),
         (IdentityField::FlightHours, "fh".into()),
     ]);
-    let identity = tail(&m);
+    let identity = found(&m);
     assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), ("N3", "0413"));
     assert_eq!(identity.flight_hours, Some(1.5));
 }
 
 #[test]
 fn text_where_numbers_should_stand_is_refused_by_name() {
-    let m = plain();
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    let text: ArrayRef = Arc::new(StringArray::from(vec!["0.1", "0.2"]));
-    write(
-        &file,
-        &[("t", reals(&[0.0, 1.0])), ("m", text), ("s", reals(&[0.0, 1.0])), ("f", reals(&[0.0, 1.0]))],
-    );
-    let error = read(&file, &m, LINEAR).unwrap_err();
-    assert_eq!(error.diagnostic().code, "column_type");
-    assert_eq!(error.diagnostic().column.as_deref(), Some("m"));
+    let (x, text) = (reals([0.0, 1.0]), Arc::new(StringArray::from(vec!["0.1", "0.2"])));
+    let columns: [(&str, ArrayRef); 4] = [("t", x.clone()), ("m", text), ("s", x.clone()), ("f", x)];
+    let refused = only(&plain(), &columns).unwrap_err().diagnostic();
+    assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("column_type", Some("m")));
 }
 
 /// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.
 #[test]
 fn a_dot_in_a_name_is_part_of_the_name() {
-    let m =
-        mapping(channel("ail.m", Unit::Metre), channel("ail.s", Unit::Metre), channel("ail.f", Unit::Newton));
-    let x = || reals(&[1.0, 2.0]);
-    let a = only(&m, &[("t", reals(&[0.0, 0.1])), ("ail.m", x()), ("ail.s", x()), ("ail.f", x())], LINEAR);
-    assert_eq!(a.motor_m, [1.0, 2.0]);
+    let columns = ["t", "ail.m", "ail.s", "ail.f"].map(|name| (name, reals([1.0, 2.0])));
+    assert_eq!(only(&prefixed("ail."), &columns).unwrap().motor_m, [1.0, 2.0]);
 }
 
 /// Two flights of a minute and more, five hours apart, in a file that names no flight: their mean would be no gap of
@@ -287,12 +279,10 @@ fn a_dot_in_a_name_is_part_of_the_name() {
 fn two_flights_in_one_log_are_refused_with_both_spans() {
     let m = plain();
     let read = |m: &Mapping, first: usize, pause_s: f64| {
-        let t: Vec<f64> = (0..3000).map(|k| 0.1 * k as f64 + if k < first { 0.0 } else { pause_s }).collect();
-        let x: ArrayRef =
-            Arc::new((0..3000).map(|k| Some((f64::from(k) * 0.01).sin())).collect::<Float64Array>());
-        let (_dir, file) = place("N1_20261119T041300Z.parquet");
-        write(&file, &[("t", reals(&t)), ("m", x.clone()), ("s", x.clone()), ("f", x.clone()), ("leg", x)]);
-        read(&file, m, LINEAR).map_err(|e| e.diagnostic())
+        let t = reals((0..3000).map(|k| 0.1 * k as f64 + if k < first { 0.0 } else { pause_s }));
+        let x = reals((0..3000).map(|k| (f64::from(k) * 0.01).sin()));
+        let columns = [("t", t), ("m", x.clone()), ("s", x.clone()), ("f", x.clone()), ("leg", x)];
+        only(m, &columns).map_err(|e| e.diagnostic())
     };
     let refused = read(&m, 1000, 18_000.0).unwrap_err();
     assert_eq!((refused.code.as_str(), refused.row), ("several_flights", Some(1000)));
@@ -322,10 +312,10 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
         Field::new("s", DataType::Float64, true),
     ];
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write_fields(&file, fields.to_vec(), vec![reals(&[0.0, 0.1]), counts, reals(&[1.0, 2.0])]);
+    write_fields(&file, fields.to_vec(), vec![reals([0.0, 0.1]), counts, reals([1.0, 2.0])]);
     let read = |motor: ChannelMapping| {
         let m = mapping(motor, channel("s", Unit::Metre), channel("s", Unit::Newton));
-        read(&file, &m, LINEAR).map_err(|e| e.diagnostic())
+        read(&file, &m).map_err(|e| e.diagnostic())
     };
     near(&read(channel("m", Unit::Millimetre)).unwrap().motor_m, &[2e-3, 3e-3]);
     let same = ChannelMapping { scale: 0.01, offset: -5.0, ..channel("m", Unit::Millimetre) };
@@ -351,13 +341,13 @@ fn units_of_the_arrow_fields_are_proposed() {
     };
     let fields = [("time_s", "s"), ("rudder_motor", "deg"), ("rudder_screw", "rad"), ("rudder_load", "N·m")];
     let (_dir, file) = place("x.parquet");
-    write_fields(&file, fields.map(|(name, unit)| field(name, unit)).to_vec(), vec![reals(&[0.0, 0.1]); 4]);
+    write_fields(&file, fields.map(|(name, unit)| field(name, unit)).to_vec(), vec![reals([0.0, 0.1]); 4]);
     let found = ingest::infer::propose(&file).unwrap();
     let units: Vec<_> = found.channels.values().map(|(_, unit)| *unit).collect();
     assert_eq!(units, [Some(Unit::Degree), Some(Unit::Radian), Some(Unit::NewtonMetre)]);
 }
 
-/// The identity of a log whose motor, screw and load are one column.
+/// The departure of a log of this name, from what the log itself says.
 pub(crate) fn identity(
     name: &str,
     m: &Mapping,
@@ -365,9 +355,7 @@ pub(crate) fn identity(
 ) -> Result<String, records::Diagnostic> {
     let (_dir, file) = place(name);
     write(&file, columns);
-    let log = opened(&file, m);
-    let identity = log.identity(|_, _| IdentityFields::new()).map_err(|e| e.diagnostic())?;
-    Ok(identity.departure_utc.to_string())
+    own_identity(&opened(&file, m)).map(|identity| identity.departure_utc.to_string())
 }
 
 /// Istanbul is three hours ahead of UTC. The log begins at 23:59:50, and goes on after midnight.
@@ -377,8 +365,8 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     m.identity.path = Some(r"(?<tail_number>N\w+)_(?<departure_date>\d{8})".into());
     m.identity.departure_format = Some("%Y%m%d".into());
     m.identity.time_zone = Some("Europe/Istanbul".into());
-    let seconds: Vec<f64> = (0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0)).collect();
-    let columns = [("t", reals(&seconds))];
+    let seconds = (0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0));
+    let columns = [("t", reals(seconds))];
     let of = |m: &Mapping| identity("N1_20261119.parquet", m, &columns);
     let refused = of(&m).unwrap_err();
     assert!(refused.code == "identity_invalid" && refused.message.contains("clock.epoch"), "{refused}");
@@ -396,13 +384,8 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
     // An absolute clock gives the time, unless it is of another day.
     let instant = |day: i64| -> ArrayRef {
-        let first = 1_794_000_000_000 + 86_400_000 * day;
-        Arc::new(
-            (0..200)
-                .map(|k| Some(first + 50 * k))
-                .collect::<TimestampMillisecondArray>()
-                .with_timezone("UTC"),
-        )
+        let stamps = (0..200).map(|k| 1_794_000_000_000 + 86_400_000 * day + 50 * k);
+        Arc::new(TimestampMillisecondArray::from_iter_values(stamps).with_timezone("UTC"))
     };
     assert_eq!(identity("N1_20261106.parquet", &m, &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
     let other = identity("N1_20261106.parquet", &m, &[("t", instant(3))]).unwrap_err();
@@ -429,8 +412,8 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
 fn a_landing_stands_for_the_departure() {
     let mut m = plain();
     m.identity.path = Some(r"(?<tail_number>N\w+)_(?<landing_utc>\d{8}T\d{6}Z)".into());
-    let seconds: Vec<f64> = (0..201).map(|k| 50.0 + 0.1 * f64::from(k)).collect();
-    let of = |m: &Mapping| identity("N1_20261119T041300Z.parquet", m, &[("t", reals(&seconds))]).unwrap();
+    let columns = [("t", reals((0..201).map(|k| 50.0 + 0.1 * f64::from(k))))];
+    let of = |m: &Mapping| identity("N1_20261119T041300Z.parquet", m, &columns).unwrap();
     assert_eq!(of(&m), "2026-11-19T04:12:40Z");
     m.identity.values.insert(IdentityField::FlightHours, "2.0".into());
     assert_eq!(of(&m), "2026-11-19T02:13:00Z");
@@ -440,22 +423,10 @@ fn a_landing_stands_for_the_departure() {
 #[test]
 fn accents_of_names_are_composed() {
     let composed = "{position}_h\u{f6}he";
-    let m = mapping(
-        channel(composed, Unit::Metre),
-        channel("{position}_s", Unit::Metre),
-        channel("f", Unit::Newton),
-    );
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    let x = || reals(&[1.0, 2.0]);
-    write(
-        &file,
-        &[
-            ("t", reals(&[0.0, 0.1])),
-            ("au\u{df}eno\u{308}_ho\u{308}he", x()),
-            ("au\u{df}en\u{f6}_s", x()),
-            ("f", x()),
-        ],
-    );
+    let screw = channel("{position}_s", Unit::Metre);
+    let m = mapping(channel(composed, Unit::Metre), screw, channel("f", Unit::Newton));
+    let names = ["t", "au\u{df}eno\u{308}_ho\u{308}he", "au\u{df}en\u{f6}_s", "f"];
+    let (_dir, file) = written(&names.map(|name| (name, reals([1.0, 2.0]))));
     let log = opened(&file, &m);
     let found = log.actuators(&m.channels, None).unwrap();
     assert_eq!((found.len(), found[0].position.as_str()), (1, "au\u{df}en\u{f6}"));
@@ -466,13 +437,10 @@ fn accents_of_names_are_composed() {
 /// `FLT_NO` begins as `{position}_FORCE_LBF` does, and is not meant.
 #[test]
 fn the_closest_column_shares_the_end_of_the_pattern() {
-    let m = mapping(
-        channel("{position}_FORCE_LBF", Unit::Metre),
-        channel("s", Unit::Metre),
-        channel("f", Unit::Newton),
-    );
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write(&file, &["t", "FLT_NO", "AIL_L_LOAD_LBF", "s", "f"].map(|name| (name, reals(&[0.0, 1.0]))));
+    let mut m = plain();
+    m.channels.motor_position = channel("{position}_FORCE_LBF", Unit::Metre);
+    let names = ["t", "FLT_NO", "AIL_L_LOAD_LBF", "s", "f"];
+    let (_dir, file) = written(&names.map(|name| (name, reals([0.0, 1.0]))));
     let log = opened(&file, &m);
     let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
     assert!(hint.contains("`AIL_L_LOAD_LBF`"), "{hint}");
@@ -487,24 +455,21 @@ fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
         };
         Arc::new(ListArray::from_iter_primitive::<Float64Type, _, _>((0..50).map(row)))
     };
-    let t = reals(&(0..50).map(|row| 0.1 * f64::from(row)).collect::<Vec<_>>());
-    let columns: [(&str, ArrayRef); 4] = [
-        ("t", t.clone()),
+    let columns = [
+        ("t", reals((0..50).map(|row| 0.1 * f64::from(row)))),
         ("m", lists(10, &|t| t)),
         ("s", lists(10, &|t| t + 1e-3)),
         ("f", lists(5, &|t| 100.0 * t)),
     ];
     let mut m = plain();
-    let a = only(&m, &columns, LINEAR);
+    let a = only(&m, &columns).unwrap();
     assert_eq!((a.dx_m.len(), a.segments.len()), (500, 1));
     // The load of 50 Hz is held over the next sample of 100 Hz.
     let held = |k: usize| 100.0 * 0.02 * (k / 2) as f64;
     let worst = (0..500).map(|k| (a.load_n[k] - held(k)).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst} N");
     (m.clock.column, m.clock.rate_hz) = (None, Some(100.0));
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write(&file, &columns);
-    let refused = read(&file, &m, LINEAR).unwrap_err().diagnostic();
+    let refused = only(&m, &columns).unwrap_err().diagnostic();
     assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
 }
 
@@ -525,15 +490,11 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
             rows.sort_by_key(|row| row.0);
         }
         let numbers = |of: &dyn Fn(f64, f64) -> f64| -> ArrayRef {
-            reals(
-                &rows.iter().map(|&(flight, k)| of(flights[flight].2, (k / each) as f64)).collect::<Vec<_>>(),
-            )
+            reals(rows.iter().map(|&(flight, k)| of(flights[flight].2, (k / each) as f64)))
         };
         let moves = |t: f64| 1e-2 * (0.1 * t).sin();
         let (motor, screw) = (numbers(&|_, t| moves(t)), numbers(&|k, t| moves(t) + 1e-3 * k));
-        let names = ["m", "s", "f"].map(|name| format!("{{position}}_{name}"));
-        let [m, s, f] = [0, 1, 2].map(|k| channel(&names[k], [Unit::Metre, Unit::Metre, Unit::Newton][k]));
-        let mut mapping = mapping(m, s, f);
+        let mut mapping = prefixed("{position}_");
         mapping.identity = IdentityMapping {
             columns: [(IdentityField::TailNumber, "tail"), (IdentityField::FlightId, "leg")]
                 .map(|(field, name)| (field, name.to_owned()))
@@ -554,9 +515,8 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
             columns.push(("name", column(&rows, &name)));
             let value =
                 |k: usize| [&motor, &screw, &motor][k % 3].as_any().downcast_ref::<Float64Array>().unwrap();
-            let values: Vec<f64> =
-                rows.iter().enumerate().map(|(row, &(_, k))| value(k).value(row)).collect();
-            columns.push(("value", reals(&values)));
+            let values = rows.iter().enumerate().map(|(row, &(_, k))| value(k).value(row));
+            columns.push(("value", reals(values)));
         } else {
             columns.extend([("left_m", motor.clone()), ("left_s", screw), ("left_f", motor)]);
         }
@@ -568,7 +528,7 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
         let mut digests = std::collections::BTreeSet::new();
         for (path, (tail, leg, dx_mm, position)) in paths.iter().zip(flights) {
             let log = opened(path, &mapping);
-            let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
+            let identity = own_identity(&log).unwrap();
             assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), (tail, leg));
             let found = log.actuators(&mapping.channels, None).unwrap();
             assert_eq!(found.len(), 1);
@@ -583,7 +543,7 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
             digests.insert(log.digest(&[(&mapping.channels, &found[0])]).unwrap());
         }
         assert_eq!(digests.len(), 3);
-        let whole = opened(&file, &mapping).identity(|_, _| IdentityFields::new()).unwrap_err();
-        assert!(whole.diagnostic().hint.unwrap().contains("identity.by_row"));
+        let whole = own_identity(&opened(&file, &mapping)).unwrap_err();
+        assert!(whole.hint.unwrap().contains("identity.by_row"));
     }
 }

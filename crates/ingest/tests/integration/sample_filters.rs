@@ -3,18 +3,16 @@
 use std::fs::{self, File};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array, RecordBatch};
-use ingest::mapping::units::Unit;
-use ingest::{ActuatorChannels, Error, Geometry, Log, LogFiles, Mapping, SampleFilter};
+use arrow::array::RecordBatch;
+use ingest::{ActuatorChannels, Mapping, SampleFilter};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
 
-use crate::layouts::{self, channel, mapping};
+use crate::layouts::{self, LINEAR, opened, plain, prefixed, read, reals};
 
 const ROWS: usize = 3000;
 /// Where the state is 1.
@@ -29,23 +27,19 @@ struct Laid {
 }
 
 fn written(folder: &Path, laid: Laid) -> PathBuf {
-    let column = |value: fn(usize) -> f64| -> ArrayRef {
-        Arc::new(Float64Array::from((0..ROWS).map(value).collect::<Vec<_>>()))
-    };
+    let column = |value: fn(usize) -> f64| reals((0..ROWS).map(value));
     let state = |k: usize| f64::from(u8::from(STRETCHES.iter().any(|s| s.contains(&k))));
+    // Few values, a hole within a stretch, and a leap that no stretch holds.
+    let screw = |k: usize| match k {
+        1210..1215 => f64::NAN,
+        600 => 9.0,
+        _ => (k % 17) as f64 * 1e-4,
+    };
     let columns = [
         ("t", column(|k| k as f64 * 0.01)),
         ("state", column(state)),
         ("m", column(|k| (k as f64 * 0.003).sin() * 0.02)),
-        // Few values, a hole within a stretch, and a leap that no stretch holds.
-        (
-            "s",
-            column(|k| match k {
-                1210..1215 => f64::NAN,
-                600 => 9.0,
-                _ => (k % 17) as f64 * 1e-4,
-            }),
-        ),
+        ("s", column(screw)),
         ("f", column(|k| (k as f64 * 0.011).cos() * 5e3)),
     ];
     let batch = RecordBatch::try_from_iter(columns).unwrap();
@@ -64,19 +58,17 @@ fn written(folder: &Path, laid: Laid) -> PathBuf {
     file
 }
 
-fn conditional(is_conditional: bool) -> Mapping {
-    let mut mapping =
-        mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
-    if is_conditional {
-        let when =
-            SampleFilter { column: "state".into(), equals: vec![1.0.into()], ..SampleFilter::default() };
-        mapping.channels.when.push(when);
-    }
-    mapping
+/// The condition that a column is 1.
+fn when(column: &str) -> SampleFilter {
+    SampleFilter { column: column.into(), equals: vec![1.0.into()], ..SampleFilter::default() }
 }
 
-fn read(file: &Path, mapping: &Mapping) -> Result<ActuatorChannels, Error> {
-    layouts::read(file, mapping, Geometry::Linear { lead_m_per_rev: None })
+fn conditional(is_conditional: bool) -> Mapping {
+    let mut mapping = plain();
+    if is_conditional {
+        mapping.channels.when.push(when("state"));
+    }
+    mapping
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -174,11 +166,7 @@ fn a_condition_that_is_never_met_leaves_nothing() {
 #[test]
 #[expect(clippy::single_range_in_vec_init, reason = "one stretch is a list of one")]
 fn conditions_apply_to_each_actuator() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("N1_20261119T041300Z.parquet");
-    let column = |value: fn(usize) -> f64| -> ArrayRef {
-        Arc::new(Float64Array::from((0..100).map(value).collect::<Vec<_>>()))
-    };
+    let column = |value: fn(usize) -> f64| reals((0..100).map(value));
     let mut columns = vec![
         ("t", column(|k| k as f64 * 0.01)),
         ("a_t", column(|k| k as f64 * 0.01)),
@@ -187,22 +175,13 @@ fn conditions_apply_to_each_actuator() {
         ("b_mode", column(|k| (k / 90) as f64)),
     ];
     columns.extend(["a_m", "a_s", "a_f", "b_m", "b_s", "b_f"].map(|name| (name, column(|k| k as f64))));
-    layouts::write(&file, &columns);
-    let mut mapping = mapping(
-        channel("{position}_m", Unit::Metre),
-        channel("{position}_s", Unit::Metre),
-        channel("{position}_f", Unit::Newton),
-    );
+    let (_dir, file) = layouts::written(&columns);
+    let mut mapping = prefixed("{position}_");
     let segments = |mapping: &Mapping| -> Vec<Vec<Range<usize>>> {
-        let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone())).unwrap();
+        let log = opened(&file, mapping);
         let positions = log.actuators(&mapping.channels, None).unwrap();
-        let read = |at| log.read_actuator(at, &mapping.channels, Geometry::Linear { lead_m_per_rev: None });
+        let read = |at| log.read_actuator(at, &mapping.channels, LINEAR);
         positions.iter().map(|at| read(at).unwrap().segments).collect()
-    };
-    let when = |column: &str| SampleFilter {
-        column: column.into(),
-        equals: vec![1.0.into()],
-        ..SampleFilter::default()
     };
     mapping.channels.when = vec![when("{position}_mode")];
     assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);

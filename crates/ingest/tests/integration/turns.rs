@@ -1,15 +1,13 @@
 //! Wrapped motor angles of simulated flights, whose recorder pauses or marks samples as invalid: the relative position
 //! keeps the turn of the simulator.
 
-use std::sync::Arc;
-
-use arrow::array::{ArrayRef, Float64Array};
 use ingest::mapping::units::Unit;
 use ingest::{ActuatorChannels, ChannelMapping, Geometry};
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
 
-use crate::layouts::{self, channel, mapping, place, write};
+use crate::layouts::{LINEAR, channel, mapping, read_with, reals, written};
 
+/// That of [`LINEAR`].
 const LEAD_M: f64 = 0.005;
 const RADIUS_M: f64 = 0.1;
 const GEAR: f64 = 120.0;
@@ -20,10 +18,6 @@ enum Loss {
     RowsMissing,
     MotorMissing,
     MarkedInvalid,
-}
-
-fn reals(values: impl Iterator<Item = f64>) -> ArrayRef {
-    Arc::new(values.map(|v| (!v.is_nan()).then_some(v)).collect::<Float64Array>())
 }
 
 /// The flight as an actuator that pushes or turns logs it, with its rows that are not lost, and as it is read back.
@@ -44,14 +38,14 @@ fn read(flight: &Flight, is_rotary: bool, loss: Option<(Loss, usize)>) -> (Vec<u
         Some(Loss::MarkedInvalid) if is_lost(k) => 123.0,
         _ => angle(k),
     };
+    let screw =
+        |k: usize| if is_rotary { (flight.screw_m[k] / RADIUS_M).to_degrees() } else { flight.screw_m[k] };
+    let load = |k: usize| flight.load_n[k] * if is_rotary { RADIUS_M } else { 1.0 };
     let columns = [
         ("t", of(&|k| flight.time_s[k])),
         ("m", of(&motor)),
-        (
-            "s",
-            of(&|k| if is_rotary { (flight.screw_m[k] / RADIUS_M).to_degrees() } else { flight.screw_m[k] }),
-        ),
-        ("f", of(&|k| if is_rotary { flight.load_n[k] * RADIUS_M } else { flight.load_n[k] })),
+        ("s", of(&screw)),
+        ("f", of(&load)),
         ("ok", of(&|k| f64::from(u8::from(!is_lost(k))))),
     ];
     let (screw, load) =
@@ -63,14 +57,9 @@ fn read(flight: &Flight, is_rotary: bool, loss: Option<(Loss, usize)>) -> (Vec<u
         ..channel("m", Unit::Degree)
     };
     let mapping = mapping(wrapped, channel("s", screw), channel("f", load));
-    let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write(&file, &columns);
-    let geometry = if is_rotary {
-        Geometry::Rotary { reference_radius_m: RADIUS_M }
-    } else {
-        Geometry::Linear { lead_m_per_rev: Some(LEAD_M) }
-    };
-    (kept, layouts::read(&file, &mapping, geometry).unwrap())
+    let (_dir, file) = written(&columns);
+    let geometry = if is_rotary { Geometry::Rotary { reference_radius_m: RADIUS_M } } else { LINEAR };
+    (kept, read_with(&file, &mapping, geometry).unwrap())
 }
 
 #[test]
