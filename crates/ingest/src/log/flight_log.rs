@@ -9,6 +9,7 @@ use jiff::tz::TimeZone;
 use records::Position;
 
 use crate::channel::si_conversion::Geometry;
+use crate::channel::stats::span;
 use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
@@ -102,8 +103,7 @@ impl Log {
             for file in std::mem::take(&mut sheet.files) {
                 let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
                 let alone = RowTable::new(vec![file], clock, layout);
-                let samples = SampleSelector { leaf: column.clone(), rows: Vec::new() };
-                let stamps = alone.stamps(&samples, None)?;
+                let stamps = alone.stamps(&SampleSelector::every_row(&column), None)?;
                 starts.push((stamps.origin, alone.files));
             }
             let first = starts[0].0;
@@ -201,17 +201,11 @@ impl Log {
 
     /// The earliest and the latest stamp of the log, if it has a time column.
     fn clock_span(&self) -> Result<Option<ClockSpan>, Error> {
-        let Some(column) =
-            self.main().clock.column.as_ref().filter(|column| self.main().files[0].has(column))
-        else {
-            return Ok(None);
-        };
-        let every_row = SampleSelector { leaf: column.clone(), rows: Vec::new() };
-        let stamps = self.main().stamps(&every_row, None)?;
-        let (mut earliest_s, mut latest_s) = (f64::INFINITY, f64::NEG_INFINITY);
-        for s in stamps.seconds.iter().filter(|s| !s.is_nan()) {
-            (earliest_s, latest_s) = (earliest_s.min(*s), latest_s.max(*s));
-        }
+        let table = self.main();
+        let column = table.clock.column.as_ref().filter(|column| table.files[0].has(column));
+        let Some(column) = column else { return Ok(None) };
+        let stamps = table.stamps(&SampleSelector::every_row(column), None)?;
+        let (earliest_s, latest_s) = span(&stamps.seconds);
         Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 
@@ -259,8 +253,7 @@ impl Log {
     fn no_position(&self, channels: &Channels, partly: &[ActuatorColumns]) -> Result<Error, Error> {
         let mut fewest = (usize::MAX, &channels.motor_position);
         for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)) {
-            let name =
-                |at: &ActuatorColumns| ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            let name = |at: &ActuatorColumns| column_at(&map.column, &at.position);
             let count = partly.iter().filter(|at| !at.lacking.contains(&name(at))).count();
             if count < fewest.0 {
                 fewest = (count, map);
@@ -316,7 +309,7 @@ impl Log {
                 continue;
             };
             let first = self.present(map, &position)?.into_iter().next();
-            let name = ColumnPattern::new(&map.column).column_for(position.as_str());
+            let name = column_at(&map.column, &position);
             if first.is_none() && role != Role::Temperature {
                 // A group without a file is no lack of this actuator, and neither is a struct in a number's place.
                 self.sheet_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
@@ -335,7 +328,7 @@ impl Log {
     ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
         let mut found = Vec::new();
         for choice in map.choices() {
-            let name = ColumnPattern::new(&choice.column).column_for(position.as_str());
+            let name = column_at(&choice.column, position);
             if self.names_for(choice)?.contains(&name) {
                 found.push((choice, name));
             }
@@ -359,16 +352,10 @@ impl Log {
     /// # Errors
     /// When channels are named by a column, and it cannot be read.
     pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<(), Error> {
-        for table in self.tables.values() {
-            if table.layout.name_column.is_some() {
-                table.names()?;
-            }
+        for table in self.tables.values().filter(|table| table.layout.name_column.is_some()) {
+            table.names()?;
         }
-        self.each_use(used, |sheet, position, samples| {
-            if sheet.holds(samples) {
-                sheet.announce(samples, position);
-            }
-        });
+        self.each_use(used, |sheet, position, samples| sheet.announce(samples, position));
         Ok(())
     }
 
@@ -379,12 +366,11 @@ impl Log {
         mut take: impl FnMut(&RowTable, &str, &SampleSelector),
     ) {
         for (channels, at) in used {
-            let position = at.position.as_str();
+            let (position, named) = (at.position.as_str(), |column: &String| column_at(column, &at.position));
             let conditions: Vec<ChannelMapping> = channels.when.iter().map(ChannelMapping::from).collect();
             let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
             for map in maps.flat_map(ChannelMapping::choices).chain(&conditions) {
                 let Some(sheet) = self.sheet(map) else { continue };
-                let named = |column: &String| ColumnPattern::new(column).column_for(position);
                 let samples = sheet.samples(&named(&map.column), position);
                 take(sheet, position, &samples);
                 if let Some(valid) = &map.valid_column {
@@ -453,10 +439,10 @@ impl Log {
         // The mean of the flight, whatever counts of it.
         let whole = SampleSelection::whole(&master.line);
         let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
+        let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
         flags.extend(screw_flags.into_iter().chain(load_flags));
         let read =
             RawChannels { motor, screw, load, is_relative: channels.is_relative(), output_locked, selection };
-        let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
         Ok(assemble(at.position.clone(), read, &master.line, temperature_c, flags))
     }
 
@@ -471,7 +457,7 @@ impl Log {
             return Ok(SampleSelection::whole(&master.line));
         }
         let position = at.position.as_str();
-        let named = |column: &String| ColumnPattern::new(column).column_for(position);
+        let named = |column: &String| column_at(column, &at.position);
         let of = |when: &SampleFilter| {
             let samples = self.sheet_of(&ChannelMapping::from(when))?.samples(&named(&when.column), position);
             Ok((samples, when.time_column.as_ref().map(named)))
@@ -501,7 +487,7 @@ impl Log {
         let mut segments = line.segments.clone();
         for condition in &channels.when {
             let map = ChannelMapping::from(condition);
-            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            let name = column_at(&map.column, &at.position);
             let sheet = self.sheet_of(&map)?;
             if !self.names_for(&map)?.contains(&name) {
                 return Err(sheet.lacks(&name));
@@ -588,7 +574,7 @@ impl Log {
             }
         }
         let Some((mut channel, apart, rest, k)) = found else {
-            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            let name = column_at(&map.column, &at.position);
             return Err(self.sheet(map).unwrap_or(self.main()).lacks(&name));
         };
         let counted = channel.values.len() - apart;
@@ -622,6 +608,11 @@ struct ReferenceChannel<'c> {
     master: ChannelSampling<'c>,
     selection: SampleSelection,
     flags: Vec<String>,
+}
+
+/// The column of a pattern at a position.
+fn column_at(pattern: &str, position: &Position) -> String {
+    ColumnPattern::new(pattern).column_for(position.as_str())
 }
 
 /// Identity fields in the files of a row table.

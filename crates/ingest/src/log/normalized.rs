@@ -58,12 +58,9 @@ impl Normalized {
         let step_s = number("step_s").ok_or_else(|| fail("`step_s` is missing".into()))?;
         let segments = text("segments").map_or_else(|| Some(Vec::new()), |text| pairs(text, ".."));
         let segments = segments.ok_or_else(|| fail("its stretches cannot be read".into()))?;
-        let facts = IdentityField::ALL
-            .iter()
-            .filter_map(|fact| Some((*fact, text(fact.as_str())?.to_owned())))
-            .collect();
+        let fact = |fact: &IdentityField| Some((*fact, text(fact.as_str())?.to_owned()));
         Ok(Some(Self {
-            facts,
+            facts: IdentityField::ALL.iter().filter_map(fact).collect(),
             step_s,
             segments: segments.into_iter().map(|(start, end)| start..end).collect(),
             breaks: text("breaks").and_then(|text| pairs(text, ":")).unwrap_or_default(),
@@ -82,22 +79,20 @@ impl Normalized {
         position: Position,
         geometry: Geometry,
     ) -> Result<ActuatorChannels, Error> {
+        let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
         let (now, then) = (geometry.metres_per_radian(), self.metres_per_radian);
         if now != then {
             let said = |v: Option<f64>| v.map_or_else(|| "no lead".to_owned(), |v| format!("{v} m/rad"));
-            let detail = format!("with {}, where the part has {}", said(then), said(now));
-            return Err(file.error(ErrorKind::Normalized { detail }));
+            return Err(fail(format!("with {}, where the part has {}", said(then), said(now))));
         }
         let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
         let read = [motor?, dx?, load?];
         if read.iter().any(|(_, seen)| seen.missing < self.apart) {
-            let detail = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
-            return Err(file.error(ErrorKind::Normalized { detail }));
+            let fewer = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
+            return Err(fail(fewer));
         }
         if self.segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
-            return Err(
-                file.error(ErrorKind::Normalized { detail: "a segment ends after the last row".into() })
-            );
+            return Err(fail("a segment ends after the last row".into()));
         }
         let quality = read
             .each_ref()
@@ -161,13 +156,9 @@ pub fn write(
     encoding: Encoding,
 ) -> Result<(), Error> {
     let time_s = (0..channels.dx_m.len()).map(|k| channels.time_s(k)).collect();
-    let columns = [
-        ("time_s", Column::Real(time_s)),
-        ("motor_m", Column::Real(channels.motor_m.clone())),
-        ("dx_m", Column::Real(channels.dx_m.clone())),
-        ("load_n", Column::Real(channels.load_n.clone())),
-    ];
-    let columns: Vec<(String, Column)> = columns.into_iter().map(|(name, c)| (name.to_owned(), c)).collect();
+    let [motor_m, dx_m, load_n] = [&channels.motor_m, &channels.dx_m, &channels.load_n].map(Clone::clone);
+    let columns = [("time_s", time_s), ("motor_m", motor_m), ("dx_m", dx_m), ("load_n", load_n)];
+    let columns = columns.map(|(name, values)| (name.to_owned(), Column::Real(values)));
     write_encoded(file, &columns, &footer(channels, identity, geometry, provenance), encoding)
 }
 

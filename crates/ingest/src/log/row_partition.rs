@@ -36,6 +36,13 @@ pub(crate) struct SampleSelector {
     pub(crate) rows: Vec<(String, String)>,
 }
 
+impl SampleSelector {
+    /// Every row of a leaf.
+    pub(crate) fn every_row(leaf: &str) -> Self {
+        Self { leaf: leaf.to_owned(), rows: Vec::new() }
+    }
+}
+
 /// Columns and the texts that mark the rows of a channel or an actuator.
 type Rows = Vec<(String, String)>;
 
@@ -95,7 +102,7 @@ impl Partition {
         samples: &SampleSelector,
         leaf: &str,
     ) -> Result<Arc<Vec<ArrayRef>>, Error> {
-        let is_listed = |name: &str| files.iter().any(|f| f.leaf(name).is_ok_and(|leaf| leaf.is_listed));
+        let is_listed = |name: &str| files.iter().any(|file| file.is_listed(name));
         // A list in the channel's own leaf gives a row its samples.
         let aligned = (leaf != samples.leaf && is_listed(&samples.leaf)).then(|| samples.leaf.clone());
         let mut state = self.state();

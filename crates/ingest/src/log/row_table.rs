@@ -32,7 +32,7 @@ use crate::time::timestamps::{TickEpoch, TickFormat, TimestampParser};
 const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
 
 /// The files of one kind that belong to one flight.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct RowTable {
     pub(crate) files: Vec<LogFile>,
     pub(crate) clock: ClockMapping,
@@ -50,16 +50,7 @@ pub(crate) struct RowTable {
 impl RowTable {
     /// Some files read as one table.
     pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
-        let (line, leaf_names) = (OnceLock::new(), OnceLock::new());
-        Self {
-            files,
-            clock,
-            layout,
-            line,
-            leaf_names,
-            texts: Mutex::default(),
-            partition: Partition::default(),
-        }
+        Self { files, clock, layout, ..Self::default() }
     }
 
     /// The same files by another clock and layout.
@@ -70,7 +61,7 @@ impl RowTable {
 
     /// Whether a row holds a list of this leaf's samples in any file.
     pub(crate) fn is_listed(&self, leaf: &str) -> bool {
-        self.files.iter().any(|file| file.leaf(leaf).is_ok_and(|leaf| leaf.is_listed))
+        self.files.iter().any(|file| file.is_listed(leaf))
     }
 
     /// An error of the whole table names its first file.
@@ -134,9 +125,9 @@ impl RowTable {
             for file in &self.files {
                 file.append_numbers(&samples.leaf, wanted.offset(values.len()), &mut values)?;
             }
-            return Ok(values.finish());
+        } else {
+            self.each(samples, &samples.leaf, |array| append(&samples.leaf, array, &mut values))?;
         }
-        self.each(samples, &samples.leaf, |array| append(&samples.leaf, array, &mut values))?;
         Ok(values.finish())
     }
 
@@ -196,7 +187,7 @@ impl RowTable {
     }
 
     /// Whether a channel's name is here, as a leaf or in the column of names.
-    pub(crate) fn holds(&self, samples: &SampleSelector) -> bool {
+    fn holds(&self, samples: &SampleSelector) -> bool {
         let named = samples.rows.first().filter(|_| self.layout.name_column.is_some());
         match named {
             Some((column, name)) => self.texts(column).is_ok_and(|texts| texts.contains(name)),
@@ -204,9 +195,9 @@ impl RowTable {
         }
     }
 
-    /// Announces samples that will be read for a position, so that one pass over the files gathers them all.
+    /// Announces samples that will be read for a position, as far as they are here, so that one pass over the files gathers them all.
     pub(crate) fn announce(&self, samples: &SampleSelector, position: &str) {
-        if !samples.rows.is_empty() {
+        if !samples.rows.is_empty() && self.holds(samples) {
             let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
             self.partition.announce(samples, leaves.cloned(), position);
         }
@@ -240,31 +231,28 @@ impl RowTable {
         }
         for file in &self.files {
             // The channel's own leaf comes along: a list in it gives a row its samples.
-            let is_listed = file.leaf(&samples.leaf).is_ok_and(|leaf| leaf.is_listed);
-            let own = (leaf != samples.leaf && is_listed).then_some(samples.leaf.as_str());
-            let names: Vec<&str> = std::iter::once(leaf).chain(own).collect();
-            file.scan(&names, Scan::PLAIN, |arrays| take(&arrays[0]))?;
+            let has_own = leaf != samples.leaf && file.is_listed(&samples.leaf);
+            let names = [leaf, samples.leaf.as_str()];
+            file.scan(&names[..=usize::from(has_own)], Scan::PLAIN, |arrays| take(&arrays[0]))?;
         }
         Ok(())
     }
 
     /// Every text that a column holds.
     pub(crate) fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
-        let known = |texts: &BTreeMap<String, Arc<BTreeSet<String>>>| texts.get(column).cloned();
-        if let Some(texts) = known(&self.texts.lock().unwrap_or_else(PoisonError::into_inner)) {
-            return Ok(texts);
+        let texts = || self.texts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = texts().get(column) {
+            return Ok(Arc::clone(known));
         }
         let mut distinct = DistinctTexts::default();
         if self.is_of_many() {
-            let rows = SampleSelector { leaf: column.to_owned(), rows: Vec::new() };
+            let rows = SampleSelector::every_row(column);
             self.each(&rows, column, |array| distinct.take(&[column], std::slice::from_ref(array)))?;
         } else {
             self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
         }
-        let found: BTreeSet<String> = distinct.found().into_iter().flatten().collect();
-        let found = Arc::new(found);
-        let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
-        texts.insert(column.to_owned(), Arc::clone(&found));
+        let found: Arc<BTreeSet<String>> = Arc::new(distinct.found().into_iter().flatten().collect());
+        texts().insert(column.to_owned(), Arc::clone(&found));
         Ok(found)
     }
 
@@ -278,24 +266,19 @@ impl RowTable {
         let mut take = |array: &ArrayRef| {
             let shown = if is_uniform(array) { array.slice(0, 1) } else { Arc::clone(array) };
             let text = as_text(column, &shown)?;
-            let begun = row;
-            for value in text.as_string::<i32>() {
-                match (value, &first) {
-                    (Some(value), Some(before)) if value != before => {
-                        let (found, before) = (value.to_owned(), before.clone());
-                        let column = column.to_owned();
-                        return Err(ErrorKind::IdentityChanges { fact, column, row, found, before });
-                    }
-                    (Some(value), None) => first = Some(value.to_owned()),
-                    _ => {}
+            for (row, value) in (row..).zip(text.as_string::<i32>()) {
+                let Some(value) = value else { continue };
+                let before = first.get_or_insert_with(|| value.to_owned());
+                if value != before {
+                    let (column, found, before) = (column.to_owned(), value.to_owned(), before.clone());
+                    return Err(ErrorKind::IdentityChanges { fact, column, row, found, before });
                 }
-                row += 1;
             }
-            row = begun + array.len() as u64;
+            row += array.len() as u64;
             Ok(())
         };
         if self.is_of_many() {
-            let rows = SampleSelector { leaf: column.to_owned(), rows: Vec::new() };
+            let rows = SampleSelector::every_row(column);
             if self.files.iter().all(|file| file.has(column)) {
                 self.each(&rows, column, take)?;
             }
@@ -314,10 +297,7 @@ impl RowTable {
             return Ok(Timestamps::uniform(self.count(samples)?, rate_hz));
         };
         let ticks = self.ticks(column)?;
-        let lists = |file: &LogFile| {
-            let listed = |name: &str| file.leaf(name).is_ok_and(|leaf| leaf.is_listed);
-            listed(&samples.leaf) && !listed(column)
-        };
+        let lists = |file: &LogFile| file.is_listed(&samples.leaf) && !file.is_listed(column);
         let is_every_row = self.holds_all(samples);
         if is_every_row && self.files.iter().any(lists) {
             return self.burst_stamps(samples, column, ticks);

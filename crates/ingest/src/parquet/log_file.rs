@@ -184,6 +184,11 @@ impl LogFile {
         }))
     }
 
+    /// Whether a row holds a list of this leaf's samples; not where there is no such leaf.
+    pub(crate) fn is_listed(&self, name: &str) -> bool {
+        self.leaf(name).is_ok_and(|leaf| leaf.is_listed)
+    }
+
     /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
         match self.noted_field(name)?.data_type() {

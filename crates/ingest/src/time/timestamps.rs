@@ -1,6 +1,6 @@
 //! Timestamps of a time column: integers, reals, Arrow timestamps or text, to seconds since the first one.
 
-use arrow::array::{Array, ArrayRef, AsArray, PrimitiveArray};
+use arrow::array::{Array, ArrayRef, AsArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::{Timestamp, civil};
@@ -106,16 +106,13 @@ impl<'a> TimestampParser<'a> {
                 self.push_whole(tick);
             }
         } else if self.ticks.is_whole {
-            // A time of the day in 32 bits becomes a number of 32 bits only.
-            let array = match array.data_type() {
-                DataType::Time32(_) => &cast(array, &DataType::Int32)
-                    .map_err(|_| wrong_type(self.column, array, "time stamps"))?,
-                _ => array,
+            let whole = match array.data_type() {
+                // A time of the day in 32 bits becomes a number of 32 bits only.
+                DataType::Time32(_) => cast(array, &DataType::Int32).and_then(|a| cast(&a, &DataType::Int64)),
+                _ => cast(array, &DataType::Int64),
             };
-            let whole =
-                cast(array, &DataType::Int64).map_err(|_| wrong_type(self.column, array, "time stamps"))?;
-            let whole: &PrimitiveArray<Int64Type> = whole.as_primitive();
-            whole.iter().for_each(|tick| self.push_whole(tick));
+            let whole = whole.map_err(|_| wrong_type(self.column, array, "time stamps"))?;
+            whole.as_primitive::<Int64Type>().iter().for_each(|tick| self.push_whole(tick));
         } else {
             append(self.column, array, &mut self.seconds)?;
         }
@@ -172,14 +169,14 @@ impl<'a> TimestampParser<'a> {
             self.convert_reals();
         }
         let per_second = self.ticks.per_second;
-        let whole = self
-            .first_whole
-            .map(|first| (first as f64 / per_second, i128::from(first) * (1e9 / per_second) as i128));
-        let real = self.first_real.map(|first| (first / per_second, (first / per_second * 1e9) as i128));
-        let first = whole.or(real);
-        let first_s = first.map_or(0.0, |(first_s, _)| first_s);
-        let instant =
-            || Timestamp::from_nanosecond(first?.1 + 1_000_000_000 * i128::from(self.ticks.zero_s)).ok();
+        let (first_s, first_ns) = match (self.first_whole, self.first_real.map(|first| first / per_second)) {
+            (Some(first), _) => {
+                (first as f64 / per_second, Some(i128::from(first) * (1e9 / per_second) as i128))
+            }
+            (None, real_s) => (real_s.unwrap_or(0.0), real_s.map(|first_s| (first_s * 1e9) as i128)),
+        };
+        let zero_ns = 1_000_000_000 * i128::from(self.ticks.zero_s);
+        let instant = || Timestamp::from_nanosecond(first_ns? + zero_ns).ok();
         let zero = match (self.is_of_day, self.is_zoned) {
             (true, _) => TickEpoch::Midnight,
             (false, true) => TickEpoch::Utc,

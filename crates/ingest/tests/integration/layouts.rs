@@ -373,7 +373,7 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     m.clock.epoch = Epoch::Midnight;
     assert_eq!(of(&m).unwrap(), "2026-11-19T20:59:50Z");
     let packed: Vec<f64> = (0..200).map(|k| 210_130.0 + 0.1 * f64::from(k)).collect();
-    let refused = identity("N1_20261119.parquet", &m, &[("t", reals(&packed))]).unwrap_err();
+    let refused = identity("N1_20261119.parquet", &m, &[("t", reals(packed))]).unwrap_err();
     assert!(refused.message.contains("HHMMSS"), "{refused}");
     m.clock.unit = None;
     let texts: Vec<_> = (0..200).map(|k| format!("23:59:{:05.2}", 50.0 + 0.05 * f64::from(k))).collect();
