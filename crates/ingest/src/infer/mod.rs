@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, place_in, time_unit, unit_of};
 use crate::infer::identity_sources::{fact_of, facts_of, folders, is_instant};
 use crate::log::row_partition::DistinctTexts;
-use crate::log::row_table::RowTable;
+use crate::log::row_table::{EXCEL_ZERO_S, RowTable};
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::Unit;
 use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
@@ -245,12 +245,13 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
         step if (2.0..=500.0).contains(&step) => Some("ms"),
         step if (2e3..=5e5).contains(&step) => Some("us"),
         step if (2e6..=5e8).contains(&step) => Some("ns"),
+        step if (2e-4..=0.5).contains(&(step * DAY_S)) => Some("d"),
         _ => None,
     }
 }
 
 /// Units of times, and how many seconds each is.
-const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+const UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", DAY_S)];
 
 /// A column of numbers; none where it cannot be read.
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
@@ -261,12 +262,14 @@ fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     }
 }
 
-/// 1970 where times lie between 1990 and 2100 when they count from there; midnight where they lie within a day and
+/// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie within a day and
 /// the name of the column has it.
 fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
     let Some((_, scale)) = UNITS.iter().find(|(known, _)| *known == unit) else { return Epoch::None };
+    let is_of_now = |since_1970_s: f64| (631_152_000.0..4_102_444_800.0).contains(&since_1970_s);
     match times.iter().find(|time| !time.is_nan()).map(|first| first * scale) {
-        Some(first_s) if (631_152_000.0..4_102_444_800.0).contains(&first_s) => Epoch::Unix,
+        Some(first_s) if unit == "d" && is_of_now(first_s + EXCEL_ZERO_S as f64) => Epoch::Excel,
+        Some(first_s) if is_of_now(first_s) => Epoch::Unix,
         Some(first_s) if is_of_day && (0.0..DAY_S).contains(&first_s) => Epoch::Midnight,
         _ => Epoch::None,
     }
@@ -444,9 +447,11 @@ mod tests {
         assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
         assert_eq!(found.channels[&Role::Load], ("{position}/load".to_owned(), Some(Unit::Newton)));
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
-        let epochs = [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true)]
-            .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
-        assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight]);
+        let epochs =
+            [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true), (46_345.0, "d", false)]
+                .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
+        assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight, Epoch::Excel]);
+        assert_eq!(unit_of_steps(&[46_345.0, 46_345.0 + 0.01 / 86_400.0]), Some("d"));
     }
 
     /// One row per position and instant, whose clock is a text.

@@ -29,7 +29,7 @@ use crate::time::clock::{DAY_S, TimeBase, Timestamps};
 use crate::time::timestamps::{TickEpoch, TickFormat, TimestampParser};
 
 /// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
-const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
+pub(crate) const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
 
 /// The files of one kind that belong to one flight.
 #[derive(Debug, Default)]

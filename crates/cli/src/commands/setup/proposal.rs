@@ -628,7 +628,10 @@ fn clock(offer: &InferredMapping) -> String {
     let epoch = match offer.epoch {
         Epoch::Unix => "epoch = \"unix\"   # high: its values lie between 1990 and 2100\n",
         Epoch::Midnight => "epoch = \"midnight\"   # medium: its name, and values below a day\n",
-        Epoch::None | Epoch::Excel => "",
+        Epoch::Excel => {
+            "epoch = \"excel\"   # high: as days since 1899, its values lie between 1990 and 2100\n"
+        }
+        Epoch::None => "",
     };
     match &offer.clock {
         Some((column, Some(unit))) => format!(
