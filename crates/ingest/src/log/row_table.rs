@@ -195,7 +195,8 @@ impl RowTable {
         }
     }
 
-    /// Announces samples that will be read for a position, as far as they are here, so that one pass over the files gathers them all.
+    /// Announces samples that will be read for a position, as far as they are here, so that one pass over the files gathers
+    /// them all.
     pub(crate) fn announce(&self, samples: &SampleSelector, position: &str) {
         if !samples.rows.is_empty() && self.holds(samples) {
             let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
