@@ -197,9 +197,10 @@ impl ErrorKind {
     fn diagnostic(&self) -> Diagnostic {
         let mut c = Diagnostic::new(self.code(), self);
         self.place(&mut c);
-        (c.found, c.expected) = (self.found(), self.expected());
-        c.hint =
-            Some(self.named_remedy().or_else(|| self.get_message().map(str::to_owned)).unwrap_or_default());
+        c.found = self.found();
+        c.expected = self.expected();
+        let remedy = self.named_remedy().or_else(|| self.get_message().map(str::to_owned));
+        c.hint = Some(remedy.unwrap_or_default());
         c
     }
 

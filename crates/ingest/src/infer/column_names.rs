@@ -47,10 +47,13 @@ pub(super) fn has_word_of(name: &str, list: &str) -> bool {
     words(name).iter().any(|(_, word)| place_in(list, &word.to_lowercase()).is_some())
 }
 
+/// Names of seconds, the symbol first.
+const SECONDS: &str = "s sec second seconds";
+
 /// Whether a column seems to hold times; `second` alone is a time, within a name it may be a unit (`deg_per_sec`).
 pub(super) fn is_time(name: &str) -> bool {
     has_word_of(name, "time t timestamp stamp elapsed tick ticks clock utc epoch unix gmt zulu tod since")
-        || place_in("s sec second seconds", &name.to_lowercase()).is_some()
+        || place_in(SECONDS, &name.to_lowercase()).is_some()
 }
 
 /// Whether a time of this name counts from midnight, if its values do not contradict.
@@ -61,7 +64,7 @@ pub(super) fn is_of_day(name: &str) -> bool {
 /// The unit of a time that ends its name or begins it: `t_ms`, `us_since_start`.
 pub(super) fn time_unit(name: &str) -> Option<&'static str> {
     let words = words(name);
-    let units = ["s sec second seconds", "ms", "us", "ns", "min", "h hours"];
+    let units = [SECONDS, "ms", "us", "ns", "min", "h hours"];
     [words.last()?, &words[0]].into_iter().find_map(|(_, word)| {
         units.iter().find(|list| place_in(list, &word.to_lowercase()).is_some())?.split(' ').next()
     })

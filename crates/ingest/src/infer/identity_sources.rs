@@ -30,7 +30,8 @@ const SOUNDS: [(IdentityField, &str); 6] = [
     ),
 ];
 
-/// Words of which a name of a fact may consist, the first of which it must have: `FLIGHT LEG NBR`, `AircraftReg`.
+/// Words of which the name of a fact may consist: one or more of the first list, and any of the second (`FLIGHT LEG NBR`,
+/// `AircraftReg`).
 const WORDS: [(IdentityField, &str, &str); 4] = [
     (IdentityField::TailNumber, "tail registration reg aircraft ac msn", "number no nbr num id ident code"),
     (IdentityField::FlightId, "flight flt leg sortie", "number no nbr num id ident"),
@@ -130,8 +131,9 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
     let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^{TAIL}$"), text));
     let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
     let is_known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
-    let is_place = with_position && fits(&format!("^{PLACE_END}$"), name);
-    let end = if is_place { PLACE_END } else { r"[^/]*\.parquet" };
+    let place_end = place_end();
+    let is_place = with_position && fits(&format!("^{place_end}$"), name);
+    let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
     if let Some((form, format)) = is_known(name) {
         let kind = if fits(&format!("^{AIRCRAFT_TYPE}"), name) { AIRCRAFT_TYPE } else { "" };
         let in_name =
@@ -164,14 +166,17 @@ pub fn path_tail(path: &Path) -> Option<String> {
 
 /// What a position in a path looks like.
 const PLACE: &str = "[A-Za-z]+(?:[_ -][A-Za-z]+)*";
+
 /// The end of a file name that is a position.
-const PLACE_END: &str = r"(?:[^/]*?[_ -])??(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
+fn place_end() -> String {
+    format!(r"(?:[^/]*?[_ -])??(?<position>{PLACE})\.parquet")
+}
 
 /// The position in a path and the expression that finds it: the end of the file name, or the folder below that of the
 /// tail, if they have no digits.
 pub fn path_position(path: &Path) -> Option<(String, String)> {
     let below_tail = format!(r"(?:^|/){TAIL}/(?<position>{PLACE})/[^/]*\.parquet$");
-    [format!("(?:^|/){PLACE_END}$"), below_tail]
+    [format!("(?:^|/){}$", place_end()), below_tail]
         .into_iter()
         .find_map(|expression| Some((captured(&expression, path.to_str()?, "position")?, expression)))
 }
@@ -219,7 +224,7 @@ mod tests {
             let groups = regex::Regex::new(&expression).unwrap().captures(path).unwrap();
             let facts: Vec<&str> = groups.iter().skip(1).flatten().map(|group| group.as_str()).collect();
             assert_eq!((facts.join(" ").as_str(), found.as_str()), (wanted, format), "{expression}");
-            assert!(position.is_none_or(|position| wanted.contains(&position)));
+            assert_eq!(position.as_deref(), groups.name("position").map(|group| group.as_str()), "{path}");
         }
         assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet"), false), None);
         assert_eq!(

@@ -98,12 +98,14 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let clock = clock(leaves, is_fact, epoch_of_texts);
     let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
-        let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
+        let kind = leaves.iter().find(|leaf| leaf.name == name).map(|leaf| &leaf.kind);
+        let is_number = kind.is_some_and(DataType::is_numeric);
         let times = if is_number { numbers(file, &name) } else { Vec::new() };
         let unit = unit.or_else(|| unit_of_steps(&times));
         epoch = match unit {
             Some(unit) => epoch_of(&times, unit, is_of_day(&name)),
-            None => epoch_of_texts(&name).filter(|_| !is_number).unwrap_or_default(),
+            None if kind == Some(&DataType::Utf8) => epoch_of_texts(&name).unwrap_or_default(),
+            None => Epoch::None,
         };
         (name, unit)
     });
@@ -193,7 +195,7 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
     Ok(layout)
 }
 
-/// The units that a column of units beside a long layout's names gives them; `None` for a name with several.
+/// The unit of each name of a long layout, by its column of units; `None` for a name with several units.
 fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, Option<Unit>>, Error> {
     let mut units = BTreeMap::new();
     let file = &table.files[0];
@@ -210,8 +212,8 @@ fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, O
     Ok(units)
 }
 
-/// The time column: timestamps before numbers, these before texts of instants and these before times of the day, names of a time before others; never a
-/// column of one value.
+/// The time column: timestamps before numbers, numbers before texts of instants, and these before texts of times of the
+/// day; names of a time before others; never a column of one value.
 fn clock(
     leaves: &[LeafColumn],
     is_constant: impl Fn(&str) -> bool,
@@ -262,8 +264,8 @@ fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     }
 }
 
-/// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie within a day and
-/// the name of the column has it.
+/// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie
+/// within a day and the name of the column has it.
 fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
     let Some((_, scale)) = UNITS.iter().find(|(known, _)| *known == unit) else { return Epoch::None };
     let is_of_now = |since_1970_s: f64| (631_152_000.0..4_102_444_800.0).contains(&since_1970_s);
@@ -358,7 +360,9 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
         let is_redundant = |other: &Pattern<'_>| sensor.is_some() && other.2.is_some() && other.0 == *places;
         let others = ranked.iter().skip(1).filter(|(_, other)| is_redundant(other));
         let others: Vec<_> = others.map(|(name, (_, unit, _))| ((*name).to_owned(), *unit)).collect();
-        found.alternatives.extend((!others.is_empty()).then_some((role, others)));
+        if !others.is_empty() {
+            found.alternatives.insert(role, others);
+        }
         if Role::NEEDED.contains(&role) {
             shared.get_or_insert_with(|| places.clone()).retain(|place| places.contains(place));
         }

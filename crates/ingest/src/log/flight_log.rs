@@ -366,7 +366,8 @@ impl Log {
         mut take: impl FnMut(&RowTable, &str, &SampleSelector),
     ) {
         for (channels, at) in used {
-            let (position, named) = (at.position.as_str(), |column: &String| column_at(column, &at.position));
+            let position = at.position.as_str();
+            let named = |column: &String| column_at(column, &at.position);
             let conditions: Vec<ChannelMapping> = channels.when.iter().map(ChannelMapping::from).collect();
             let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
             for map in maps.flat_map(ChannelMapping::choices).chain(&conditions) {

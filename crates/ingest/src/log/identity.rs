@@ -69,7 +69,8 @@ pub(crate) fn date_alone(text: &str, mapping: &IdentityMapping) -> Option<civil:
     }
 }
 
-/// The latest first stamp of a clock that counts from midnight, s: the flight may begin some hours into the next day.
+/// The latest first stamp of a clock that counts seconds from midnight, s: a flight may begin three hours into the next
+/// day, and a clock that reads as HHMMSS lies above from ten o'clock on.
 const MOST_OF_DAY_S: f64 = DAY_S + 12_000.0;
 
 /// A departure of which the log names the date: by its absolute clock, or by one that counts from midnight.

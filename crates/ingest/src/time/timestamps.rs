@@ -78,24 +78,12 @@ pub(crate) struct TimestampParser<'a> {
     before: f64,
     /// Seconds since the first stamp; of real ticks the ticks themselves, until all are there.
     pub(crate) seconds: Vec<f64>,
-    is_zoned: bool,
-    is_of_day: bool,
 }
 
 impl<'a> TimestampParser<'a> {
     pub(crate) fn new(column: &'a str, ticks: TickFormat, rows: usize) -> Self {
         let seconds = Vec::with_capacity(rows.min(1 << 26));
-        Self {
-            column,
-            ticks,
-            first_whole: None,
-            first_real: None,
-            turns: 0.0,
-            before: f64::NAN,
-            seconds,
-            is_zoned: false,
-            is_of_day: false,
-        }
+        Self { column, ticks, first_whole: None, first_real: None, turns: 0.0, before: f64::NAN, seconds }
     }
 
     pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), ErrorKind> {
@@ -121,12 +109,21 @@ impl<'a> TimestampParser<'a> {
 
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
         let value = value.trim();
-        let instant = value.parse::<Timestamp>().inspect(|_| self.is_zoned = true).or_else(|_| {
-            value.parse::<civil::DateTime>().and_then(|local| jiff::tz::TimeZone::UTC.to_timestamp(local))
-        });
-        let mut tick = instant.ok().and_then(|t| i64::try_from(t.as_nanosecond()).ok());
-        if let (None, Some(_), Ok(time)) = (tick, self.ticks.wraps_at, value.parse::<civil::Time>()) {
-            self.is_of_day = true;
+        let zoned = value.parse::<Timestamp>().ok();
+        if zoned.is_some() && self.ticks.origin == TickEpoch::Local {
+            self.ticks.origin = TickEpoch::Utc;
+        }
+        let local = || {
+            let local = value.parse::<civil::DateTime>().ok()?;
+            jiff::tz::TimeZone::UTC.to_timestamp(local).ok()
+        };
+        let instant = zoned.or_else(local);
+        let mut tick = instant.and_then(|t| i64::try_from(t.as_nanosecond()).ok());
+        if tick.is_none()
+            && self.ticks.wraps_at.is_some()
+            && let Ok(time) = value.parse::<civil::Time>()
+        {
+            self.ticks.origin = TickEpoch::Midnight;
             tick = i64::try_from(time.duration_since(civil::Time::midnight()).as_nanos()).ok();
         }
         let found = || format!("`{value}` in row {row}");
@@ -177,12 +174,7 @@ impl<'a> TimestampParser<'a> {
         };
         let zero_ns = 1_000_000_000 * i128::from(self.ticks.zero_s);
         let instant = || Timestamp::from_nanosecond(first_ns? + zero_ns).ok();
-        let zero = match (self.is_of_day, self.is_zoned) {
-            (true, _) => TickEpoch::Midnight,
-            (false, true) => TickEpoch::Utc,
-            (false, false) => self.ticks.origin,
-        };
-        let origin = match zero {
+        let origin = match self.ticks.origin {
             TickEpoch::Utc => instant().map(TimeOrigin::Utc),
             TickEpoch::Local => instant().map(TimeOrigin::Local),
             TickEpoch::Midnight => Some(TimeOrigin::OfDay(first_s)),

@@ -282,7 +282,7 @@ impl Proposal {
             let mut tails = own.unwrap_or_else(|| tail_of(log, offer).into_iter().collect());
             tails.retain(|tail| !of_overrides.contains(tail));
             let position = folder_of(log, offer, IdentityField::Position)
-                .or_else(|| Some(path_position(log).filter(|_| needs_position(offer))?.0));
+                .or_else(|| Some(needed_position(log, offer)?.0));
             let positions = position.map_or_else(|| offer.positions.clone(), |own| BTreeSet::from([own]));
             places.extend(pairs(&tails, &positions));
         }
@@ -567,6 +567,11 @@ fn needs_position(offer: &InferredMapping) -> bool {
         && offer.layout.position_column.is_none()
 }
 
+/// The position that only the path of a log names, and the expression that finds it.
+fn needed_position(log: &Path, offer: &InferredMapping) -> Option<(String, String)> {
+    if needs_position(offer) { path_position(log) } else { None }
+}
+
 fn identity(offer: &InferredMapping, log: &Path) -> String {
     let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
         let facts: Vec<String> =
@@ -588,7 +593,7 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
         [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
     };
     if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
-        if let Some((_, path)) = path_position(log).filter(|_| needs_position(offer)) {
+        if let Some((_, path)) = needed_position(log, offer) {
             let _ = writeln!(text, "# The position is inferred from the path.\npath = '{path}'");
         }
         return text;
