@@ -220,7 +220,10 @@ impl Imports {
                     at = end;
                 }
                 TokenTree::Group(group) => self.read(group.stream()),
-                TokenTree::Ident(word) if word == "use" => {
+                // `use<'a>` in a return type lists what it captures, and imports nothing.
+                TokenTree::Ident(word)
+                    if word == "use" && !tokens.get(at + 1).is_some_and(|t| is_sign(t, '<')) =>
+                {
                     let is_public = tokens[at.saturating_sub(2)..at].iter().any(|t| t.to_string() == "pub");
                     let end = tokens[at..].iter().position(|token| is_sign(token, ';')).unwrap();
                     self.expand(&tokens[at + 1..at + end], &[], is_public);
