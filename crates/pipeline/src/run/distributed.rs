@@ -18,14 +18,14 @@ use job::Config;
 use records::row_schema::{from_batch, to_batch};
 use records::{GapRecord, Installations};
 use serde::{Deserialize, Serialize};
-use store::{LogOutcome, LogRecord, LogResult, RecordKey, RunRecord, Writer};
+use store::{LogOutcome, LogRecord, RecordKey};
 
 use crate::error::Error;
 use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
-use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
+use crate::run::flight_ownership::ProcessedLog;
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::scheduler::{Context, RunInputs, Touched, WorkerContext, execute_run};
+use crate::run::scheduler::{Context, RunInputs, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::StepCount;
 
@@ -73,7 +73,6 @@ pub fn process_task(
         config: config.clone(),
         installations: installations.clone(),
         plan: Plan::default(),
-        planned: (RunRecord::default(), Vec::new()),
         run_id: task.run_id.clone(),
         program_version: program_version.to_owned(),
     };
@@ -123,51 +122,35 @@ pub fn run(
     at_a_time: usize,
     engine: &mut Engine<'_>,
 ) -> Result<RunSummary, Error> {
-    execute_run(config, request, context, 0, |inputs, writer, report| {
-        inputs.begin(writer)?;
-        let budget = MemoryBudget::new(config.document.run.memory_mib);
-        let steps = StepCount::default();
-        let worker = &WorkerContext { inputs, budget: &budget, steps: &steps };
-        let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config);
-        report.not_reached = 0;
+    execute_run(config, request, context, 0, |inputs, store| {
         for works in inputs.plan.work.chunks(at_a_time.max(1)) {
-            process_batch((worker, context), works, engine, (writer, &mut ledger, report))?;
+            store(process_batch(inputs, works, engine, context.watch)?)?;
         }
-        report.not_reached = report.not_reached_logs.len();
-        report.add_coverage(ledger.accounts(), &inputs.config, &inputs.installations);
-        Ok(Touched { units: ledger.touched, renamed: ledger.renamed })
+        Ok(())
     })
 }
 
-/// One batch of logs: those with a known error are reported here, the others go to the engine.
+/// One batch of logs: those with a known error have it as their outcome, the others go to the engine. Logs that the engine
+/// lost have none.
 fn process_batch(
-    (worker, context): (&WorkerContext<'_>, &Context<'_>),
+    inputs: &RunInputs,
     works: &[WorkItem],
     engine: &mut Engine<'_>,
-    (writer, ledger, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
-) -> Result<(), Error> {
+    watch: &dyn Fn(Event),
+) -> Result<Vec<ProcessedLog>, Error> {
     let sound = works.iter().filter(|work| work.fault.is_none());
-    let tasks: Vec<Task> = sound.map(|work| task(work, &worker.inputs.run_id)).collect();
+    let tasks: Vec<Task> = sound.map(|work| task(work, &inputs.run_id)).collect();
     let mut answers =
         if tasks.is_empty() { HashMap::new() } else { read(&engine(&tasks).map_err(Error::Engine)?)? };
-    let mut results: Vec<LogResult> = Vec::new();
-    for work in works {
-        let done = match answers.remove(&work.log_path) {
-            Some(answer) => to_log_result(worker, work, answer),
-            None if work.fault.is_some() => worker.process_log(work),
-            None => {
-                report.not_reached_logs.push(work.log_path.clone());
-                continue;
-            }
+    let outcome = |work: &WorkItem| {
+        let done = match &work.fault {
+            Some(fault) => inputs.failed(work, fault.clone()),
+            None => to_log_result(inputs, work, answers.remove(&work.log_path)?),
         };
-        (context.watch)(done.event(work));
-        results.extend(ledger.resolve(done, writer, report)?);
-    }
-    if !results.is_empty() {
-        writer.commit(&results)?;
-        (context.watch)(Event::Stored { logs: results.len() });
-    }
-    Ok(())
+        watch(done.event(work));
+        Some(done)
+    };
+    Ok(works.iter().filter_map(outcome).collect())
 }
 
 fn task(work: &WorkItem, run_id: &str) -> Task {
@@ -180,13 +163,13 @@ fn task(work: &WorkItem, run_id: &str) -> Task {
 }
 
 /// Outcome of a log, as if it had been processed by this process.
-fn to_log_result(worker: &WorkerContext<'_>, work: &WorkItem, answer: ProcessedLog) -> ProcessedLog {
+fn to_log_result(inputs: &RunInputs, work: &WorkItem, answer: ProcessedLog) -> ProcessedLog {
     // The engine has seen the log, and this process its file.
     let LogRecord { size_bytes, modified_utc_ns, file_id, log_path, .. } =
-        summary::of_log(work, &worker.inputs.run_id);
+        summary::of_log(work, &inputs.run_id);
     let ProcessedLog { account, records, diagnostics } = answer;
     let mut account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..account };
-    if let Some((estimated, refused)) = worker.already_recorded(work, &account) {
+    if let Some((estimated, refused)) = inputs.already_recorded(work, &account) {
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return ProcessedLog::without_records(already_recorded, Vec::new());
     }

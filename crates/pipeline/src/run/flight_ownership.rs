@@ -106,6 +106,13 @@ impl<'a> OwnershipLedger<'a> {
         self.accounts.values().chain(unchanged.into_iter().flatten())
     }
 
+    /// Planned logs that a run has no outcome of, by name.
+    pub(crate) fn not_reached(&self, run_id: &str) -> Vec<String> {
+        let is_reached =
+            |log: &String| self.accounts.get(log).is_some_and(|account| account.run_id == run_id);
+        self.plan.work.iter().map(|work| &work.log_path).filter(|log| !is_reached(log)).cloned().collect()
+    }
+
     fn insert(&mut self, account: LogRecord) {
         if self.config.document.logs.pieces.is_none()
             && let Some(id) = hash_of_id(&account)

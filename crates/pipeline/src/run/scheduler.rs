@@ -5,7 +5,7 @@
 //! whole flights at a time, so an interrupted run keeps what it finished. Workers without a log left
 //! take actuators of the logs that are still in work.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_iden
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, PartNumber, Status};
-use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
+use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
 
 use crate::assess::changes::RunFacts;
 use crate::assess::trends;
@@ -26,7 +26,6 @@ use crate::fleet::bookkeeping::inspections;
 use crate::fleet::bookkeeping::installation_index::dates_ahead;
 use crate::fleet::bookkeeping::join::Bookkeeping;
 use crate::fleet::bookkeeping::maintenance_log::unknown_units;
-use crate::fleet::histories::UnitKey;
 use crate::logs::discover;
 use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
@@ -91,8 +90,8 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<RunSummary, Error> {
     let workers = workers(request);
-    execute_run(config, request, context, workers, |inputs, writer, report| {
-        process_all(inputs, context, workers, writer, report)
+    execute_run(config, request, context, workers, |inputs, store| {
+        process_all(inputs, context, workers, store)
     })
 }
 
@@ -108,22 +107,16 @@ fn refuse_placeholders(config: &Config, installations: &Installations) -> Result
     Err(Error::refused(config.at(number.as_str(), Diagnostic::new("placeholder", what).hint(hint))))
 }
 
-/// What the logs of a run changed.
-#[derive(Debug, Default)]
-pub(crate) struct Touched {
-    /// Units with new records.
-    pub(crate) units: BTreeSet<UnitKey>,
-    /// New paths of renamed logs, by their old ones.
-    pub(crate) renamed: BTreeMap<String, String>,
-}
+/// Writes the outcomes of some logs in one commit.
+pub(crate) type StoreLogs<'a> = dyn FnMut(Vec<ProcessedLog>) -> Result<(), Error> + 'a;
 
-/// A run from plan to summary; `work` processes the logs.
+/// A run from plan to summary; `work` processes the logs and hands their outcomes over to be stored.
 pub(crate) fn execute_run(
     config: &Config,
     request: &Request,
     context: &Context<'_>,
     workers: usize,
-    work: impl FnOnce(&Arc<RunInputs>, &mut Writer, &mut RunSummary) -> Result<Touched, Error>,
+    work: impl FnOnce(&Arc<RunInputs>, &mut StoreLogs<'_>) -> Result<(), Error>,
 ) -> Result<RunSummary, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
@@ -145,16 +138,32 @@ pub(crate) fn execute_run(
         plan.work.iter().map(|work| summary::not_reached(work, &report.run_id)).collect();
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
+    // Before any other commit: a run that is killed leaves its logs as not reached.
+    writer.begin_run(&report.row(context.program_version, &config_path, None), &to_do)?;
 
     let inputs = Arc::new(RunInputs {
         config: config.clone(),
         installations,
         plan,
-        planned: (report.row(context.program_version, &config_path, None), to_do),
         run_id: report.run_id.clone(),
         program_version: context.program_version.to_owned(),
     });
-    let Touched { mut units, renamed } = work(&inputs, &mut writer, &mut report)?;
+    let mut ledger = OwnershipLedger::of(&inputs.plan, config);
+    work(&inputs, &mut |done| {
+        let mut results: Vec<LogResult> = Vec::new();
+        for done in done {
+            results.extend(ledger.resolve(done, &writer, &mut report)?);
+        }
+        if !results.is_empty() {
+            writer.commit(&results)?;
+            (context.watch)(Event::Stored { logs: results.len() });
+        }
+        Ok(())
+    })?;
+    report.not_reached_logs = ledger.not_reached(&inputs.run_id);
+    report.not_reached = report.not_reached_logs.len();
+    report.add_coverage(ledger.accounts(), config, &inputs.installations);
+    let OwnershipLedger { touched: mut units, renamed, .. } = ledger;
     report.absent = report.absent.saturating_sub(renamed.len());
     let tables = Bookkeeping::new(config, &inputs.installations);
     report.moved = tables.write(&mut writer, &renamed)?.moved;
@@ -217,36 +226,52 @@ pub(crate) struct RunInputs {
     pub(crate) config: Config,
     pub(crate) installations: Installations,
     pub(crate) plan: Plan,
-    /// The row of the run and those of its logs, which are stored before its first result.
-    pub(crate) planned: (RunRecord, Vec<LogRecord>),
     pub(crate) run_id: String,
     pub(crate) program_version: String,
 }
 
 impl RunInputs {
-    /// Writes the planned status, before any other commit.
-    pub(crate) fn begin(&self, writer: &mut Writer) -> Result<(), Error> {
-        Ok(writer.begin_run(&self.planned.0, &self.planned.1)?)
+    /// Outcome of a log with an error.
+    pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> ProcessedLog {
+        let mut account = summary::of_log(work, &self.run_id);
+        let digest = match self.plan.unidentified.as_str() {
+            "" => digest_without_identity(&self.config, &self.installations),
+            known => known.to_owned(),
+        };
+        account.config_digest = Some(digest);
+        summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
+        ProcessedLog::without_records(account, vec![diagnostic])
     }
 
-    /// Outcome of a log that exceeded its time limit.
-    pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> ProcessedLog {
-        let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
-        let worker = WorkerContext { inputs: self, budget: &budget, steps: &steps };
-        let mut failed = worker.failed(work, diagnostic);
-        failed.account.duration_s = after_s;
-        failed
+    /// The records that are known of this flight's content under these settings: its own, those of a log that
+    /// is gone, whose place it takes, or none, when another existing log owns them.
+    pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
+        let digests = plan::digests(account)?;
+        if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
+            return None;
+        }
+        let is_known = |before: &&LogRecord| {
+            plan::digests(before).as_ref() == Some(&digests)
+                && plan::is_same_flight(before, account)
+                && before.flight_id == account.flight_id
+        };
+        if let Some(own) = work.before.as_ref().filter(is_known) {
+            return Some((own.estimated, own.refused));
+        }
+        let here = self.plan.here.get(&digests).and_then(|path| self.plan.accounts.get(path));
+        let is_copy = here.filter(is_known).map(|_| (0, 0));
+        let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
+        is_copy.or_else(|| gone.filter(is_known).map(|gone| (gone.estimated, gone.refused)).next())
     }
 }
 
-/// Starts the workers and writes their results; returns the units whose records changed.
+/// Processes all logs by workers of this machine.
 fn process_all(
     inputs: &Arc<RunInputs>,
     context: &Context<'_>,
     workers: usize,
-    writer: &mut Writer,
-    report: &mut RunSummary,
-) -> Result<Touched, Error> {
+    store: &mut StoreLogs<'_>,
+) -> Result<(), Error> {
     raise_mmap_threshold();
     let shared = Arc::clone(inputs);
     let process_log = move |log: usize, budget: &MemoryBudget, steps: &StepCount| {
@@ -260,38 +285,13 @@ fn process_all(
         memory_mib: run.memory_mib,
         stop: context.stop,
         watch: context.watch,
-        fail: &|work, diagnostic, after_s| inputs.failed(work, diagnostic, after_s),
+        fail: &|work, diagnostic| inputs.failed(work, diagnostic),
     };
     let mut pool = WorkerPool::start(settings, Box::new(process_log))?;
-    // The workers read meanwhile; what they bring waits.
-    let written = inputs.begin(writer).and_then(|()| write(inputs, context, &mut pool, writer, report));
-    report.not_reached_logs = pool.not_reached();
-    report.not_reached = report.not_reached_logs.len();
-    written
-}
-
-/// The writer: collects results, resolves flight ownership, commits.
-fn write(
-    inputs: &RunInputs,
-    context: &Context<'_>,
-    pool: &mut WorkerPool<'_>,
-    writer: &mut Writer,
-    report: &mut RunSummary,
-) -> Result<Touched, Error> {
-    let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config);
     while let Next::Log(first) = pool.next(None)? {
-        let gathered = collect_batch(*first, pool)?.into_iter();
-        let mut results: Vec<LogResult> = Vec::new();
-        for done in gathered {
-            results.extend(ledger.resolve(done, writer, report)?);
-        }
-        if !results.is_empty() {
-            writer.commit(&results)?;
-            (context.watch)(Event::Stored { logs: results.len() });
-        }
+        store(collect_batch(*first, &mut pool)?)?;
     }
-    report.add_coverage(ledger.accounts(), &inputs.config, &inputs.installations);
-    Ok(Touched { units: ledger.touched, renamed: ledger.renamed })
+    Ok(())
 }
 
 /// Input of a worker, shared by all.
@@ -319,27 +319,16 @@ impl WorkerContext<'_> {
     fn process_once(&self, work: &WorkItem) -> ProcessedLog {
         let clock = Instant::now();
         let done = catch_panic(&work.log_path, || Ok(self.open(work)));
-        let mut done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
+        let mut done = done.unwrap_or_else(|diagnostic| self.inputs.failed(work, diagnostic));
         if !done.is_known() {
             done.account.duration_s = clock.elapsed().as_secs_f64();
         }
         done
     }
 
-    fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> ProcessedLog {
-        let mut account = summary::of_log(work, &self.inputs.run_id);
-        let digest = match self.inputs.plan.unidentified.as_str() {
-            "" => digest_without_identity(&self.inputs.config, &self.inputs.installations),
-            known => known.to_owned(),
-        };
-        account.config_digest = Some(digest);
-        summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
-        ProcessedLog::without_records(account, vec![diagnostic])
-    }
-
     fn open(&self, work: &WorkItem) -> ProcessedLog {
         if let Some(fault) = &work.fault {
-            return self.failed(work, fault.clone());
+            return self.inputs.failed(work, fault.clone());
         }
         let step = self.steps.begin();
         let opened = match FlightLog::open(
@@ -349,7 +338,7 @@ impl WorkerContext<'_> {
             &self.inputs.installations,
         ) {
             Ok(opened) => opened,
-            Err(diagnostic) => return self.failed(work, diagnostic),
+            Err(diagnostic) => return self.inputs.failed(work, diagnostic),
         };
         let flight = opened.flight();
         let names = opened.position_names();
@@ -361,34 +350,13 @@ impl WorkerContext<'_> {
         account.flight_id = Some(flight.flight_id.to_string());
         account.departure_utc = Some(flight.departure_utc);
         account.positions = names.iter().map(ToString::to_string).collect();
-        if let Some(already_recorded) = self.already_recorded(work, &account) {
+        if let Some(already_recorded) = self.inputs.already_recorded(work, &account) {
             (account.estimated, account.refused) = already_recorded;
             account.outcome = LogOutcome::Known;
             return ProcessedLog::without_records(account, Vec::new());
         }
         drop(step);
         self.read(&opened, account)
-    }
-
-    /// The records that are known of this flight's content under these settings: its own, those of a log that
-    /// is gone, whose place it takes, or none, when another existing log owns them.
-    pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
-        let digests = plan::digests(account)?;
-        if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
-            return None;
-        }
-        let is_known = |before: &&LogRecord| {
-            plan::digests(before).as_ref() == Some(&digests)
-                && plan::is_same_flight(before, account)
-                && before.flight_id == account.flight_id
-        };
-        if let Some(own) = work.before.as_ref().filter(is_known) {
-            return Some((own.estimated, own.refused));
-        }
-        let here = self.inputs.plan.here.get(&digests).and_then(|path| self.inputs.plan.accounts.get(path));
-        let is_copy = here.filter(is_known).map(|_| (0, 0));
-        let gone = self.inputs.plan.gone.get(&digests.0).into_iter().flatten();
-        is_copy.or_else(|| gone.filter(is_known).map(|gone| (gone.estimated, gone.refused)).next())
     }
 
     fn read(&self, opened: &FlightLog, mut account: LogRecord) -> ProcessedLog {

@@ -158,8 +158,8 @@ pub(crate) struct PoolSettings<'a> {
     pub(crate) memory_mib: Option<u64>,
     pub(crate) stop: &'a AtomicBool,
     pub(crate) watch: &'a (dyn Fn(Event) + Sync),
-    /// The outcome of a log that was given up after some seconds.
-    pub(crate) fail: &'a dyn Fn(&WorkItem, Diagnostic, f64) -> ProcessedLog,
+    /// The outcome of a log that was given up.
+    pub(crate) fail: &'a dyn Fn(&WorkItem, Diagnostic) -> ProcessedLog,
 }
 
 /// The workers of a run, seen from the thread that writes.
@@ -171,7 +171,6 @@ pub(crate) struct WorkerPool<'a> {
     in_progress: BTreeMap<usize, Instant>,
     /// Logs that passed their limit and are not reported yet.
     late: Vec<usize>,
-    is_finished: Vec<bool>,
     late_logs: usize,
     abandoned_in_a_row: usize,
     stop_seen: Option<Instant>,
@@ -189,7 +188,6 @@ impl<'a> WorkerPool<'a> {
             workers,
             in_progress: BTreeMap::new(),
             late: Vec::new(),
-            is_finished: vec![false; logs],
             late_logs: 0,
             abandoned_in_a_row: 0,
             stop_seen: None,
@@ -205,7 +203,8 @@ impl<'a> WorkerPool<'a> {
             if let Some(log) = self.late.pop() {
                 let work = &self.settings.plan.work[log];
                 let limit_s = self.settings.limit.as_secs_f64();
-                let outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s), limit_s);
+                let mut outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s));
+                outcome.account.duration_s = limit_s;
                 return Ok(self.finished(log, Box::new(outcome)));
             }
             let now = Instant::now();
@@ -245,8 +244,7 @@ impl<'a> WorkerPool<'a> {
         self.workers.shared.stop();
     }
 
-    fn finished(&mut self, log: usize, outcome: Box<ProcessedLog>) -> Next {
-        self.is_finished[log] = true;
+    fn finished(&self, log: usize, outcome: Box<ProcessedLog>) -> Next {
         (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
         Next::Log(outcome)
     }
@@ -287,12 +285,6 @@ impl<'a> WorkerPool<'a> {
         self.in_progress.clear();
         self.workers = Workers::start(&self.settings, &self.process_log, rest.into())?;
         Ok(())
-    }
-
-    /// Logs without an outcome, by name.
-    pub(crate) fn not_reached(&self) -> Vec<String> {
-        let logs = self.settings.plan.work.iter().zip(&self.is_finished);
-        logs.filter(|(_, is_finished)| !**is_finished).map(|(work, _)| work.log_path.clone()).collect()
     }
 }
 
@@ -339,7 +331,7 @@ mod tests {
             memory_mib: None,
             stop: &AtomicBool::new(false),
             watch: &|_| {},
-            fail: &|work, _, _| {
+            fail: &|work, _| {
                 late.set(late.get() + 1);
                 outcome(work)
             },
