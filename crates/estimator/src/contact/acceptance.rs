@@ -6,8 +6,6 @@ use super::types::{ContactEstimate, DETECTION_SHARE};
 
 /// Standard errors a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
-/// Three spreads of 15 %: how far 1/K may lie from the part's.
-const IMPLAUSIBLE: f64 = 0.45;
 /// Largest relative standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
 
@@ -29,7 +27,8 @@ pub(crate) fn flags(
         (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees && !is_preloaded),
         (QualityFlag::EstimatorsDisagree, !agrees && !is_preloaded),
         (QualityFlag::GapVaries, !found.gap_profile.is_empty()),
-        (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
+        // Three spreads of 15 %.
+        (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > 0.45),
         (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
         (QualityFlag::SoftContact, is_soft && !is_preloaded),
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),

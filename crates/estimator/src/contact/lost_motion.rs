@@ -7,24 +7,6 @@ use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::flank::Flank;
 use crate::contact::stats::{MAD, median};
 
-/// Rows this near to the reference load count, as a share of it.
-const NEAR: f64 = 0.25;
-/// The branches of the loop at zero load: loads this near to zero, as a share of the 95 % load, where the load changes by
-/// more than another share of it within this time on either side, s.
-const NEAR_ZERO: f64 = 0.05;
-const LEAST_TURN: f64 = 0.1;
-const TURN_S: f64 = 0.1;
-/// A median of a normal sample scatters so much more than its mean: √(π/2).
-const MEDIAN: f64 = 1.253_314_137_315_5;
-/// Rows on each flank below which a median carries no information.
-const FEWEST_ROWS: usize = 5;
-
-/// Standard errors, and metres, by which the flanks of a preloaded nut overlap.
-const PRELOAD_SIGMA: f64 = 3.0;
-const LEAST_OVERLAP_M: f64 = 2e-6;
-/// The loop at zero load of a preloaded nut overlaps by a smaller share than its extrapolated flanks do.
-const CLOSED: f64 = 0.5;
-
 /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap of
 /// the flanks times their stiffness.
 ///
@@ -34,16 +16,19 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
     let (gap_m, gap_se_m) = contact.gap_m;
     let overlap_m = -gap_m;
     let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n.0;
-    let is_overlap = overlap_m > PRELOAD_SIGMA * gap_se_m && overlap_m > LEAST_OVERLAP_M;
-    let closes = || lightly_loaded_m(contact).is_some_and(|loop_m| loop_m > -CLOSED * overlap_m);
+    let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
+    // A closed loop overlaps by less than half of what the extrapolated flanks do.
+    let closes = || lightly_loaded_m(contact).is_some_and(|loop_m| loop_m > -0.5 * overlap_m);
     (is_overlap && closes()).then(|| (force_n(overlap_m), force_n(gap_se_m)))
 }
 
 /// Width of the loop of δX against the load at zero load and its standard error, m: what lies between the branch on which a
 /// load from above falls to zero and the one on which a load from below rises to it. Gap and friction wind-up together.
+///
+/// Loads within 5 % of the 95 % load count, where the load changes by more than 10 % of it from 0.1 s before to 0.1 s after.
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
-    let reach = ((TURN_S / blocks.period_s).round() as usize).max(1);
-    let (near_n, turn_n) = (NEAR_ZERO * scaling.load_n, LEAST_TURN * scaling.load_n);
+    let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
+    let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
     let position = |side: f64, k: usize| {
         let load_n = blocks.load_n[k] - contact.line.at.load_zero_n;
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
@@ -69,11 +54,11 @@ fn lightly_loaded_m(contact: &FlankFit) -> Option<f64> {
     Some(contact.line.fit.beta[GAP] + beyond_m(Flank::Upper)?.0 + beyond_m(Flank::Lower)?.0)
 }
 
-/// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either
+/// Relative travel between + and − a load in the coupling and its standard error, m: rows within 25 % of it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
 pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
-    let near = |row: &&DesignRow<COLUMNS>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
+    let near = |row: &&DesignRow<COLUMNS>| (row.x[FORCE].abs() - load).abs() < 0.25 * load;
     let rows = &contact.line.design;
     let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
     let beta = &contact.line.fit.beta;
@@ -93,15 +78,16 @@ fn beyond_m<'a>(
     median_and_error_m(of_flank.map(|row| (flank.sign() * contact.line.fit.residual_m(row), row.stretch)))
 }
 
-/// The median of lengths, m, and its standard error with those of one stretch taken as one; none of too few.
+/// The median of lengths, m, and its standard error with those of one stretch taken as one; none of fewer than five.
 fn median_and_error_m(lengths: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
     let (mut lengths_m, mut stretches): (Vec<f64>, Vec<u32>) = lengths.unzip();
-    if lengths_m.len() < FEWEST_ROWS {
+    if lengths_m.len() < 5 {
         return None;
     }
     stretches.sort_unstable();
     stretches.dedup();
     let median_m = median(&mut lengths_m);
     lengths_m.iter_mut().for_each(|m| *m = (*m - median_m).abs());
-    Some((median_m, MEDIAN * MAD * median(&mut lengths_m) / (stretches.len() as f64).sqrt()))
+    // A median of a normal sample scatters so much more than its mean: √(π/2).
+    Some((median_m, 1.253_314_137_315_5 * MAD * median(&mut lengths_m) / (stretches.len() as f64).sqrt()))
 }

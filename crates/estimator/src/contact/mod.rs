@@ -72,7 +72,7 @@ pub fn estimate_with(
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
     Ok(look(samples, prior, room).map(|(frame, contact)| {
-        let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
+        let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact);
         let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
         Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m))
     }))
@@ -201,7 +201,7 @@ fn report(
         midrange_at_fit_m,
         flags: Vec::new(),
     };
-    let agrees = found.agrees_with_midrange(flank_fit::unknown_force_n(prior.unknown_force_n, frame));
+    let agrees = found.agrees_with_midrange(frame.unknown_force_n);
     found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft, agrees);
     found
 }

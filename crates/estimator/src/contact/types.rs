@@ -13,8 +13,6 @@ pub(crate) const REQUIRED_CONTACT_S: f64 = 1.0;
 pub(crate) const MIN_CONTACT_S: f64 = 0.1;
 /// Standard normal 95 % quantile.
 pub(crate) const NORMAL_95: f64 = 1.644_853_626_951_472_2;
-/// The published statistic may differ by this share of the larger of the two gaps.
-pub(crate) const MIDRANGE_SHARE: f64 = 0.35;
 /// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
 pub(crate) const DETECTION_SHARE: f64 = 0.01;
 
@@ -146,8 +144,7 @@ impl ContactEstimate {
         let Some(midrange_m) = self.midrange_at_fit_m else { return true };
         let larger_m = midrange_m.abs().max(self.gap_m.abs());
         let force_n = self.friction_n() + 2.0 * unknown_force_n;
-        let allowed_m =
-            MIDRANGE_SHARE * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
+        let allowed_m = 0.35 * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
         (midrange_m - self.gap_m).abs() <= allowed_m
     }
 }

@@ -13,41 +13,10 @@ use crate::gap::load_band::{quantiles, reversals};
 const PERIOD_S: f64 = 0.004;
 /// Length of a block, s, where the load hardly vibrates.
 const CALM_PERIOD_S: f64 = 0.012;
-/// Length of a block in the search, s, there.
-const SEARCH_PERIOD_S: f64 = 0.024;
-/// The load hardly vibrates where the rms of its second difference is a smaller share of its rms.
-const CALM_SHARE: f64 = 0.05;
 /// Half of the time over which the speed of the motor is taken, s.
 const SPEED_S: f64 = 0.03;
-/// v_s: speed at which most of the excess of friction at rest is gone, m/s.
-const STRIBECK_M_PER_S: f64 = 3e-3;
-
-/// A screw that moves by less than this share of the motor's travel does not move: what is left is rounding.
-const STILL: f64 = 1e-9;
-
-/// The first second is left out: offsets settle and logs start in motion, s.
-const START_S: f64 = 1.0;
-/// Residuals are taken as dependent within this time, s.
-const STRETCH_S: f64 = 2.0;
-
-/// The end of a clipped load cell's range is near this quantile of the loads of one side.
-const PILE_QUANTILE: f64 = 0.998;
-/// Width of the band of loads at that end, as a share of it.
-const PILE_WIDTH: f64 = 0.03;
-/// Ratio of the loads in that band to those in the two bands below it from which the cell counts as clipped: 0.5 for evenly
-/// spread loads, 1.35 for a sine.
-const PILE_RATIO: f64 = 2.0;
-/// Shortest time in that band of a clipped cell, s.
-const SHORTEST_PILE_S: f64 = 1.0;
-
-/// A sample is a spike beyond this many times the 90 % quantile of the steps.
-const SPIKE: f64 = 8.0;
-
 /// Blocks of a window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
-/// Share of the 95 % load that a reversal passes on either side.
-const REVERSAL_SHARE: f64 = 0.15;
-
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
 pub(crate) struct BlockMeans {
@@ -131,23 +100,25 @@ impl BlockMeans {
 
     /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
     ///
-    /// Loads thin out towards the largest. At the end of a cell's range they pile up instead.
+    /// Loads thin out towards the largest. At the end of a cell's range they pile up instead: near the 99.8 % quantile, in a
+    /// band of 3 % of it.
     fn clipped_above_n(&self, side: f64) -> f64 {
         // Noise of single samples would spread a pile.
         let count = (CALM_PERIOD_S / self.period_s).ceil() as usize;
         let sided_n: Vec<f64> =
             self.load_n.chunks(count).map(|loads_n| side * mean_of_sound(loads_n)).collect();
         let all = 0..sided_n.len();
-        let Some([top_n]) = quantiles(&sided_n, std::slice::from_ref(&all), [PILE_QUANTILE]) else {
+        let Some([top_n]) = quantiles(&sided_n, std::slice::from_ref(&all), [0.998]) else {
             return f64::INFINITY;
         };
-        let width_n = PILE_WIDTH * top_n;
+        let width_n = 0.03 * top_n;
         let between = |low_n: f64, high_n: f64| {
             sided_n.iter().filter(|load_n| (low_n..high_n).contains(*load_n)).count() as f64
         };
         let pile = between(top_n - width_n, f64::INFINITY);
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
-        let is_pile = pile > PILE_RATIO * below && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
+        // The ratio of both is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second.
+        let is_pile = pile > 2.0 * below && pile * count as f64 * self.period_s > 1.0;
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 
@@ -169,7 +140,8 @@ impl BlockMeans {
     /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
     fn is_still(&self) -> bool {
         let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
-        (0.0..=STILL * motor_m).contains(&screw_m)
+        // A billionth of the motor's travel is rounding.
+        (0.0..=1e-9 * motor_m).contains(&screw_m)
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -182,18 +154,19 @@ impl BlockMeans {
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
 
-    /// The number of the segment that contains a block.
+    /// The number of the stretch of 2 s that contains a block: residuals within it are taken as dependent.
     pub(crate) fn stretch(&self, k: usize) -> u32 {
-        (self.time_s[k] / STRETCH_S) as u32
+        (self.time_s[k] / 2.0) as u32
     }
 
-    /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
+    /// Whether nothing of a block or its neighbours is missing. The first second is left out: offsets settle, and logs start
+    /// in motion.
     #[inline]
     pub(crate) fn is_complete(&self, k: usize) -> bool {
         let change = |values: &[f64]| Some(values.get(k + 1)? - values.get(k.wrapping_sub(1))?);
         let changes = change(&self.motor_m).zip(change(&self.load_n));
         changes.is_some_and(|(motor_m, load_n)| (self.dx_m[k] + motor_m + load_n).is_finite())
-            && self.time_s[k] > START_S
+            && self.time_s[k] > 1.0
             && self.in_range_n.contains(&self.load_n[k])
     }
 
@@ -212,7 +185,7 @@ impl BlockMeans {
     /// and the load are there once [delays are applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
         let count =
-            if whole.is_calm { ((SEARCH_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
+            if whole.is_calm { ((2.0 * CALM_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
         self.clear(most.min(whole.len()), whole.period_s * count as f64);
         self.in_range_n = whole.in_range_n.clone();
         let windows = if whole.is_longer(most) {
@@ -236,8 +209,8 @@ impl BlockMeans {
         self.load_n.resize(self.len(), f64::NAN);
     }
 
-    /// The windows of an excerpt in order of time: one half by the number of load reversals in them, the other evenly
-    /// among the rest. The load alone selects, so that what is estimated does not select its own data.
+    /// The windows of an excerpt in order of time: one half by the number of load reversals in them, which pass 15 % of the
+    /// 95 % load on either side, the other evenly among the rest. The load alone selects, so that what is estimated does not select its own data.
     fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
         let of_segment = |segment: Range<usize>| {
             let starts = segment.clone().step_by(WINDOW_BLOCKS).take(segment.len() / WINDOW_BLOCKS);
@@ -245,7 +218,7 @@ impl BlockMeans {
         };
         let mut chosen: Vec<Range<usize>> = self.segments().flat_map(of_segment).collect();
         chosen.sort_by_cached_key(|window| {
-            std::cmp::Reverse(reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))
+            std::cmp::Reverse(reversals(&self.logged_n[window.clone()], 0.15 * load_n))
         });
         let mut rest = chosen.split_off(chosen.len().min(count / 2));
         rest.sort_unstable_by_key(|window| window.start);
@@ -285,10 +258,11 @@ impl BlockMeans {
         self.phases.extend(self.screw_m.iter().map(phase));
     }
 
-    /// e^−(v/v_s)² of every block; 0 where the speed is not known.
+    /// e^−(v/v_s)² of every block with v_s = 3 mm/s, the speed at which most of the excess of friction at rest is gone; 0 where
+    /// the speed is not known.
     fn find_slowness(&mut self) {
         let slowness = |k| {
-            let square = (self.speed_m_per_s(k) / STRIBECK_M_PER_S).powi(2);
+            let square = (self.speed_m_per_s(k) / 3e-3).powi(2);
             // The exponential's own series up to the fourth power, below: no more than 0.02 off, and no call.
             let series = 1.0 + square * (1.0 + square * (0.5 + square * (1.0 / 6.0 + square / 24.0)));
             if square.is_finite() { series.recip() } else { 0.0 }
@@ -297,7 +271,7 @@ impl BlockMeans {
     }
 }
 
-/// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is a small share of
+/// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is less than 5 % of
 /// their rms.
 fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
     let (mut differences, mut loads) = (0.0, 0.0);
@@ -313,7 +287,7 @@ fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
             (before, here) = (here, after);
         }
     }
-    differences < CALM_SHARE * CALM_SHARE * loads
+    differences < 0.05 * 0.05 * loads
 }
 
 /// A channel read so many blocks later; NaN where that lies outside the flight.
@@ -380,8 +354,8 @@ fn is_spike(channel: &[f64], i: usize, longest: f64) -> bool {
     from.abs() > longest && back() * from.signum() > longest
 }
 
-/// The longest step between neighbours of a channel that is no spike, in the channel's unit: by the 90 % quantile of the
-/// steps within segments that are not zero.
+/// The longest step between neighbours of a channel that is no spike, in the channel's unit: eight times the 90 % quantile of
+/// the steps within segments that are not zero.
 ///
 /// # Errors
 /// [`Rejection::ChannelConstant`] for a channel that never moves.
@@ -398,7 +372,7 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
         return Err(Rejection::ChannelConstant);
     }
     let at = steps.len() * 9 / 10;
-    Ok(SPIKE * *steps.select_nth_unstable_by(at, f64::total_cmp).1)
+    Ok(8.0 * *steps.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 #[cfg(test)]

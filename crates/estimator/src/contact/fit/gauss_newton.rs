@@ -12,38 +12,12 @@ use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
 use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
-/// Relative spread of 1/K about the part's.
-const COMPLIANCE: f64 = 0.15;
 /// Dry friction over the 95 % load, and the share of load lost: most likely value and spread.
 const FRICTION_DRY: (f64, f64) = (0.02, 0.06);
 /// See [`FRICTION_DRY`].
 const FRICTION_SHARE: (f64, f64) = (0.03, 0.06);
-/// Spread of the excess of friction at rest.
-const STRIBECK_EXCESS: f64 = 0.3;
 /// Spread of the delays between channels, s.
 const SKEW_S: f64 = 5e-3;
-/// The same where the output is locked: what is left to viscous friction, s.
-const LOCKED_SKEW_S: f64 = 1e-4;
-/// Spread of the drift within a flight, linear and quadratic, m.
-const DRIFT_M: [f64; 2] = [50e-6, 20e-6];
-/// Spread of the transducer's error at the ends of the stroke, m.
-const PLACE_M: f64 = 60e-6;
-/// Spread of errors periodic in position, m.
-const PERIODIC_M: f64 = 20e-6;
-/// Spread of the change of 1/K from the middle of a flight to its end, relative.
-const COMPLIANCE_DRIFT: f64 = 0.03;
-/// Spread of half the difference of the compliances of both flanks, relative.
-const COMPLIANCE_SIDE: f64 = 0.05;
-/// Stiffness moves by this factor at most in an iteration.
-const MAX_STIFFNESS_STEP: f64 = 3.0;
-/// Greatest friction over the load.
-const MAX_FRICTION_SHARE: f64 = 0.5;
-/// Greatest excess of friction at rest.
-const MAX_STRIBECK: f64 = 1.2;
-/// Longest delay of the load, s.
-const MAX_LOAD_DELAY_S: f64 = 0.04;
-/// Widest gap in wind-ups that the iteration assumes.
-const MAX_GAP_WINDUPS: f64 = 20.0;
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
@@ -101,6 +75,7 @@ pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     }
 }
 
+/// What each coefficient is believed to be before its flight is seen, m.
 pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
     let windup_m = scaling.windup_m();
     let here_m = scaling.load_n / state.stiffness_n_per_m;
@@ -111,42 +86,50 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
     let zero = |sd: f64| GaussianPrior { mean: 0.0, sd };
     std::array::from_fn(|column| match column {
         ORIGIN | GAP => GaussianPrior::NONE,
-        FORCE => GaussianPrior { mean: windup_m, sd: COMPLIANCE * windup_m },
+        // 1/K is the part's to 15 %; the flanks differ by twice 5 %, and it drifts by 3 % from the middle to the end.
+        FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
+        SIDE_FORCE => zero(0.05 * windup_m),
+        FORCE_DRIFT => zero(0.03 * windup_m),
         DRY => lack(FRICTION_DRY, state.friction.dry_n / scaling.load_n),
         SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
-        STRIBECK => lack((0.0, STRIBECK_EXCESS), state.stribeck),
+        // Friction at rest exceeds that in motion by 30 %, or by nothing.
+        STRIBECK => lack((0.0, 0.3), state.stribeck),
+        // A screw that is locked has no delay: viscous friction is left, 0.1 ms.
+        SPEED if scaling.is_locked() => zero(1e-4 * SPEED_M_PER_S),
         // The delays that remain once the channels are realigned.
-        // A screw that is locked has no delay.
-        SPEED if scaling.is_locked() => zero(LOCKED_SKEW_S * SPEED_M_PER_S),
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
         LOAD_RATE => {
             GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: SKEW_S / LATE_S * here_m }
         }
-        SIDE_FORCE => zero(COMPLIANCE_SIDE * windup_m),
-        FORCE_DRIFT => zero(COMPLIANCE_DRIFT * windup_m),
-        _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),
-        _ if column >= PERIODIC => zero(PERIODIC_M),
-        _ => zero(PLACE_M),
+        // The drift within a flight, linear and quadratic.
+        DRIFT => zero(50e-6),
+        _ if column < PLACE => zero(20e-6),
+        // The transducer's error at the ends of the stroke, and errors that repeat with the position.
+        PLACE..PERIODIC => zero(60e-6),
+        _ => zero(20e-6),
     })
 }
 
+/// The state that a fit asks for, within the bounds of a sensible iteration.
 fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> FrictionState {
     let beta = &fit.beta;
     let windup_m = scaling.windup_m();
-    let stiffness =
-        scaling.load_n / beta[FORCE].clamp(windup_m / MAX_STIFFNESS_STEP, windup_m * MAX_STIFFNESS_STEP);
+    // A factor of three from the scale's stiffness at most.
+    let stiffness = scaling.load_n / beta[FORCE].clamp(windup_m / 3.0, windup_m * 3.0);
     let lacking = |column: usize| beta[column] * stiffness / scaling.load_n;
-    let late_s = lacking(LOAD_RATE) * LATE_S;
+    // Friction takes half of the load at most.
+    let share = |value: f64| value.clamp(0.0, 0.5);
     FrictionState {
         stiffness_n_per_m: stiffness,
-        gap_m: beta[GAP].clamp(0.0, MAX_GAP_WINDUPS * windup_m),
+        // Twenty wind-ups at most.
+        gap_m: beta[GAP].clamp(0.0, 20.0 * windup_m),
         friction: Friction {
-            dry_n: scaling.load_n
-                * (state.friction.dry_n / scaling.load_n + lacking(DRY)).clamp(0.0, MAX_FRICTION_SHARE),
-            lost_share: (state.friction.lost_share + lacking(SHARE)).clamp(0.0, MAX_FRICTION_SHARE),
+            dry_n: scaling.load_n * share(state.friction.dry_n / scaling.load_n + lacking(DRY)),
+            lost_share: share(state.friction.lost_share + lacking(SHARE)),
         },
-        stribeck: (state.stribeck + lacking(STRIBECK)).clamp(0.0, MAX_STRIBECK),
-        load_delay_s: (state.load_delay_s + late_s).clamp(-MAX_LOAD_DELAY_S, MAX_LOAD_DELAY_S),
+        stribeck: (state.stribeck + lacking(STRIBECK)).clamp(0.0, 1.2),
+        // 40 ms at most.
+        load_delay_s: (state.load_delay_s + lacking(LOAD_RATE) * LATE_S).clamp(-0.04, 0.04),
         skew_s: state.skew_s - beta[SPEED] / SPEED_M_PER_S,
         ..*state
     }

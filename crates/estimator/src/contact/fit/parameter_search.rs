@@ -13,29 +13,8 @@ use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
 use crate::contact::stats::{MAD, median};
 
-/// The least scale of residuals, m.
-const LEAST_SCALE_M: f64 = 1e-9;
-/// Starts of the friction: dry over the 95 % load, and lost share.
-const STARTS: [(f64, f64); 2] = [(0.02, 0.03), (0.10, 0.12)];
-/// Iterations from a start, and from a candidate near the best.
-const ITERATIONS: (usize, usize) = (3, 1);
-/// Reweightings of the rows in each iteration.
-const REWEIGHTINGS: usize = 1;
-/// Compliances of the bristles over that of the coupling that are tried first.
-const BRISTLES: [f64; 3] = [0.3, 1.0, 3.0];
-/// Factors by which the best of them is refined.
-const REFINEMENTS: [f64; 2] = [0.6, 1.6];
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
-/// Most steps of that search; first steps alone reach four times the 95 % load.
-const MAX_ZERO_MOVES: usize = 100;
-/// Step over the 95 % load for the curvature of the misfit by the load zero.
-const ZERO_ERROR_STEP: f64 = 0.02;
-/// Misfits of blocks are taken as independent after this time, s.
-const INDEPENDENT_S: f64 = 0.1;
-/// Candidates this much above the least mean misfit count e⁻¹ in the spread of gaps.
-const COST_SCALE: f64 = 0.01;
-
 /// The best candidate.
 pub(crate) struct SearchResult {
     pub(crate) found: GaussNewtonResult,
@@ -81,15 +60,17 @@ impl<'a> ParameterSearch<'a> {
     pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
         let mut best = self.best_start()?;
         self.improve_zero(&mut best);
+        // Bristles about as compliant as the coupling, then about as the best of these.
         let compliance_m_per_n = best.found.state.stiffness_n_per_m.recip();
-        if self.try_bristles(&mut best, &BRISTLES, compliance_m_per_n) {
+        if self.try_bristles(&mut best, &[0.3, 1.0, 3.0], compliance_m_per_n) {
             let found_m_per_n = best.found.at.bristle_m_per_n;
-            self.try_bristles(&mut best, &REFINEMENTS, found_m_per_n);
+            self.try_bristles(&mut best, &[0.6, 1.6], found_m_per_n);
         }
         let gap_m = best.found.fit.beta[GAP];
         let (mut total, mut squares) = (0.0, 0.0);
+        // A mean misfit that is larger by 0.01 counts e⁻¹.
         for (misfit, other_m) in &self.tried {
-            let weight = (-(misfit - best.misfit).max(0.0) / COST_SCALE).exp();
+            let weight = (-(misfit - best.misfit).max(0.0) / 0.01).exp();
             total += weight;
             squares += weight * (other_m - gap_m).powi(2);
         }
@@ -105,13 +86,14 @@ impl<'a> ParameterSearch<'a> {
     fn best_start(&mut self) -> Result<Candidate, Rejection> {
         let mut found = Vec::new();
         let mut rejection = Rejection::TooShort;
-        for (dry, lost_share) in STARTS {
+        // Dry friction over the 95 % load, and lost share: usual ones, and heavy ones.
+        for (dry, lost_share) in [(0.02, 0.03), (0.10, 0.12)] {
             let friction = Friction { dry_n: dry * self.scaling.load_n, lost_share };
-            match self.search(FrictionState { friction, ..start(self.scaling) }, ITERATIONS.0) {
+            match self.search(FrictionState { friction, ..start(self.scaling) }, 3) {
                 Ok(result) => {
                     let mut sizes_m: Vec<f64> = Vec::new();
                     self.each_residual(&result, result.at.load_zero_n, |e_m| sizes_m.push(e_m.abs()));
-                    self.scale_m = self.scale_m.min((MAD * median(&mut sizes_m)).max(LEAST_SCALE_M));
+                    self.scale_m = self.scale_m.min((MAD * median(&mut sizes_m)).max(1e-9));
                     found.push(result);
                 }
                 Err(why) => rejection = why,
@@ -127,7 +109,7 @@ impl<'a> ParameterSearch<'a> {
 
     /// Iterates from a state; blocks, couplings and linear parts are those of the result.
     fn search(&mut self, state: FrictionState, iterations: usize) -> Result<GaussNewtonResult, Rejection> {
-        let found = search((self.blocks, self.couplings), self.scaling, state, (iterations, REWEIGHTINGS))?;
+        let found = search((self.blocks, self.couplings), self.scaling, state, (iterations, 1))?;
         self.take_linear_parts(&found);
         Ok(found)
     }
@@ -142,7 +124,7 @@ impl<'a> ParameterSearch<'a> {
 
     /// Takes a state's fit when it fits better.
     fn improve(&mut self, best: &mut Candidate, state: FrictionState) -> bool {
-        let Ok(found) = self.search(state, ITERATIONS.1) else { return false };
+        let Ok(found) = self.search(state, 1) else { return false };
         let misfit = self.misfit(&found, found.at.load_zero_n);
         let new = self.candidate(found, misfit);
         let is_better = new.misfit < best.misfit;
@@ -162,8 +144,8 @@ impl<'a> ParameterSearch<'a> {
         self.prepare(&best.found);
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
         let mut step_n = ZERO_STEPS.0 * self.scaling.load_n;
-        // A misfit that falls on and on, as without any load, has no minimum.
-        for _ in 0..MAX_ZERO_MOVES {
+        // A misfit that falls on and on, as without any load, has no minimum: a hundred first steps reach four times the load.
+        for _ in 0..100 {
             if step_n <= ZERO_STEPS.1 * self.scaling.load_n {
                 break;
             }
@@ -184,14 +166,14 @@ impl<'a> ParameterSearch<'a> {
     }
 
     /// Standard error of the load zero from the curvature of the misfit, N, with blocks taken as independent after
-    /// [`INDEPENDENT_S`]; the 95 % load where the misfit has no minimum.
+    /// 0.1 s; the 95 % load where the misfit has no minimum.
     fn zero_error_n(&mut self, found: &GaussNewtonResult) -> f64 {
         self.prepare(found);
-        let step_n = ZERO_ERROR_STEP * self.scaling.load_n;
+        let step_n = 0.02 * self.scaling.load_n;
         let [low, middle, high] =
             [-step_n, 0.0, step_n].map(|by_n| self.misfit_at(found, found.at.load_zero_n + by_n));
         let curvature = (low - 2.0 * middle + high) / (step_n * step_n);
-        let independent = self.blocks.len() as f64 * (self.blocks.period_s / INDEPENDENT_S).min(1.0);
+        let independent = self.blocks.len() as f64 * (self.blocks.period_s / 0.1).min(1.0);
         let error_n = (curvature * independent).recip().sqrt();
         let least_n = ZERO_STEPS.1 * self.scaling.load_n;
         if curvature > 0.0 { error_n.clamp(least_n, self.scaling.load_n) } else { self.scaling.load_n }

@@ -17,9 +17,6 @@ pub(crate) const REWEIGHTINGS: usize = 3;
 /// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
 const LEAST_SPREAD_M: f64 = 1e-12;
 
-/// Precision of a belief in the first round, in units of the rows' weights.
-const DEPENDENT: f64 = 1e-9;
-
 /// What a coefficient is believed to be, m.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GaussianPrior {
@@ -58,7 +55,7 @@ pub(crate) fn fit<const N: usize>(
     let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
     let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
     // Before the noise is known, beliefs only tell dependent columns apart.
-    let hint = beliefs.map(|b| if b.sd.is_finite() { DEPENDENT } else { 0.0 });
+    let hint = beliefs.map(|b| if b.sd.is_finite() { 1e-9 } else { 0.0 });
     let mut found = solve(rows, beliefs, even.clone(), hint)?;
     for round in 1..=rounds {
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();

@@ -12,16 +12,8 @@ use crate::gap::load_band::quantiles;
 pub(crate) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(crate) const LATE_S: f64 = 0.01;
-/// Length of a row, s, at least; and at most, as in the search, which needs no fine rows.
-const ROW_S: f64 = 0.1;
+/// Longest row, s: that of the search, which needs no fine rows.
 pub(crate) const SEARCH_ROW_S: f64 = 0.4;
-/// Blocks of a row, at least.
-const LEAST_BLOCKS: usize = 6;
-/// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
-/// screw within the gap for the whole flight.
-const LEAST_LOAD: f64 = 1.5;
-/// Rows of a flight without a break, so that long flights have no more than they need.
-const MOST_ROWS: f64 = 10_000.0;
 
 /// Wind-ups that the motor must travel: at rest, friction and a gap are not distinguishable.
 const LEAST_TRAVEL: f64 = 3.0;
@@ -33,6 +25,8 @@ const PERIODS: f64 = 3.0;
 pub(crate) struct Scaling {
     /// 95 % quantile of the load's magnitude, N.
     pub(crate) load_n: f64,
+    /// Rms of the force that the model does not know, N: the part's, or 2 % of the 95 % load.
+    pub(crate) unknown_force_n: f64,
     /// Stiffness that scales the compliance, N/m: the part's, or that of the data where they differ widely.
     pub(crate) stiffness_n_per_m: f64,
     /// Middle and half length of the flight, s.
@@ -62,7 +56,8 @@ impl Scaling {
         let whole = 0..sizes_n.len();
         let [load_n] =
             quantiles(&sizes_n, std::slice::from_ref(&whole), [0.95]).ok_or(Rejection::TooShort)?;
-        if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| LEAST_LOAD * force_n) {
+        // Under a smaller load friction alone may hold the screw within the gap for the whole flight.
+        if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| 1.5 * force_n) {
             return Err(Rejection::LoadTooSmall);
         }
         let place_m = middle_and_half(&blocks.motor_m);
@@ -72,6 +67,7 @@ impl Scaling {
         let time_s = middle_and_half(&blocks.time_s);
         Ok(Self {
             load_n,
+            unknown_force_n: prior.unknown_force_n.unwrap_or(0.02 * load_n),
             stiffness_n_per_m: prior.stiffness_n_per_m,
             time_s,
             place_m,
@@ -81,7 +77,8 @@ impl Scaling {
             per_time: time_s.1.recip(),
             per_speed: SPEED_M_PER_S.recip(),
             per_load_rate: LATE_S / load_n,
-            row_s: (2.0 * time_s.1 / MOST_ROWS).clamp(ROW_S, SEARCH_ROW_S),
+            // A flight without a break has 10,000 rows at most.
+            row_s: (2.0 * time_s.1 / 10_000.0).clamp(0.1, SEARCH_ROW_S),
             motor_sense: if prior.output_locked { -1.0 } else { 1.0 },
             per_period: prior.period_m.filter(|m| 2.0 * place_m.1 > PERIODS * m).map_or(0.0, |m| TAU / m),
         })
@@ -97,9 +94,9 @@ impl Scaling {
         self.load_n / self.stiffness_n_per_m
     }
 
-    /// Most blocks of a row, for blocks of some length, s.
+    /// Most blocks of a row, for blocks of some length, s; six at least.
     pub(crate) fn row_blocks(&self, period_s: f64) -> usize {
-        ((self.row_s / period_s).round() as usize).max(LEAST_BLOCKS)
+        ((self.row_s / period_s).round() as usize).max(6)
     }
 
     /// A time from −1 at the start of the flight to 1 at its end.

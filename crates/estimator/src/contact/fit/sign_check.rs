@@ -8,33 +8,8 @@ use crate::contact::fit::robust_regression::{GaussianPrior, fit};
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 use crate::contact::stats::LOOKS;
 
-/// Every fourth block is used, and at most [`LOOKS`] on long flights.
-const STRIDE: usize = 4;
-/// Slower than this the screw may stick, m/s.
-const SLIP_M_PER_S: f64 = 1e-3;
-/// The wind-up may be no less than this share of the part's against its sign before it counts as flipped.
-const FLIPPED: f64 = 0.3;
-/// Two positions of one screw have a slope of one; a lead or a unit that is off by more is a mapping error.
-const RATIO: f64 = 0.01;
-/// Less than this at the ends of the travel may be the transducer's own error, m.
-const TRANSDUCER_M: f64 = 60e-6;
-
 /// A fault of the mapping is stated beyond this many standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// A gap is seen beyond this many.
-const SEEN: f64 = 3.0;
-/// Rounds of reweighting.
-const ROUNDS: usize = 4;
-
-/// A stiffness of the part that is off by more than this factor is no start for the fit: it ends at a soft contact.
-const STIFFNESS_FACTOR: f64 = 3.0;
-
-const SIDE: usize = 1;
-const LOAD: usize = 2;
-const SLIP: usize = 3;
-const SPEED: usize = 4;
-const PLACE: usize = 5;
-const COLUMNS: usize = 6;
 
 /// What the check finds in channels that are mapped correctly.
 #[derive(Debug, Clone, Copy)]
@@ -60,42 +35,43 @@ impl SignCheck {
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
 pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<SignCheck, Rejection> {
-    let stride = STRIDE.max(blocks.len() / LOOKS);
-    let rows: Vec<DesignRow<COLUMNS>> =
-        (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
-    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else {
-        return Ok(SignCheck::NONE);
-    };
-    let beta = &found.beta;
-    let error_m = |column: usize| found.standard_error_m(column, &rows);
-    let least_m = (RATIO * frame.place_m.1).max(TRANSDUCER_M);
-    if beta[PLACE].abs() - SIGNIFICANT * error_m(PLACE) > least_m {
+    // Every fourth block is used, and fewer of long flights.
+    let stride = (blocks.len() / LOOKS).max(4);
+    let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
+    let Some(found) = fit(&rows, &[GaussianPrior::NONE; 6], 4) else { return Ok(SignCheck::NONE) };
+    let [_, side_m, load_m, slip_m, speed_m, place_m] = found.beta;
+    let [side_se_m, load_se_m, place_se_m] = [1, 2, 5].map(|column| found.standard_error_m(column, &rows));
+    // Two positions of one screw have a slope of one. Slopes that differ by 1 % are another lead or unit, and less than 60 µm
+    // at the ends of the travel may be the transducer's own error.
+    if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * frame.place_m.1).max(60e-6) {
         return Err(Rejection::PositionRatio);
     }
-    let windup_m = beta[SIDE] + beta[LOAD];
-    let doubt_m = SIGNIFICANT * error_m(SIDE).hypot(error_m(LOAD));
-    if windup_m + doubt_m > -FLIPPED * frame.windup_m() {
+    let windup_m = side_m + load_m;
+    let doubt_m = SIGNIFICANT * side_se_m.hypot(load_se_m);
+    // A wind-up of 30 % of the part's against its sign counts as flipped.
+    if windup_m + doubt_m > -0.3 * frame.windup_m() {
         return Ok(SignCheck {
-            stiffness_n_per_m: other_stiffness(beta[LOAD], SIGNIFICANT * error_m(LOAD), frame),
+            stiffness_n_per_m: other_stiffness(load_m, SIGNIFICANT * load_se_m, frame),
             follows_load: windup_m > doubt_m,
-            shows_gap: beta[SIDE] > (UNSEEN_GAP * frame.windup_m()).max(SEEN * error_m(SIDE)),
+            shows_gap: side_m > (UNSEEN_GAP * frame.windup_m()).max(3.0 * side_se_m),
         });
     }
-    let drag_m = beta[SLIP] + beta[SPEED];
-    Err(if drag_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
+    Err(if slip_m + speed_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
 }
 
-/// The stiffness of a wind-up at the 95 % load, m, that is known to `doubt_m`, where the part's is another.
+/// The stiffness of a wind-up at the 95 % load, m, that is known to `doubt_m`, where the part's differs by more than a factor
+/// of three: that would be no start for the fit, which would end at a soft contact.
 fn other_stiffness(windup_m: f64, doubt_m: f64, frame: &Scaling) -> Option<f64> {
-    let is_softer = windup_m - doubt_m > STIFFNESS_FACTOR * frame.windup_m();
-    let is_stiffer = windup_m > doubt_m && windup_m + doubt_m < frame.windup_m() / STIFFNESS_FACTOR;
+    let is_softer = windup_m - doubt_m > 3.0 * frame.windup_m();
+    let is_stiffer = windup_m > doubt_m && windup_m + doubt_m < frame.windup_m() / 3.0;
     (is_softer || is_stiffer).then(|| frame.load_n / windup_m)
 }
 
-fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<COLUMNS>> {
+fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<6>> {
     let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.speed_m_per_s(k));
     let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
-    let slip = if speed.abs() > SLIP_M_PER_S { speed.signum() } else { 0.0 };
+    // Slower than 1 mm/s the screw may stick.
+    let slip = if speed.abs() > 1e-3 { speed.signum() } else { 0.0 };
     let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];
     let row = DesignRow { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: blocks.stretch(k) };
     (row.y_m + speed + load + place).is_finite().then_some(row)

@@ -14,15 +14,8 @@ use crate::contact::types::GapAtPlace;
 const KNOTS: usize = 9;
 /// Columns with a gap and an error at each knot.
 const ALL: usize = COLUMNS + 2 * KNOTS;
-/// Spread of the gap and of the transducer's error at a knot about what the whole stroke has, m.
-const KNOT_GAP_M: f64 = 60e-6;
-const KNOT_ERROR_M: f64 = 10e-6;
-/// Mean residual at a knot, outwards or inwards of both flanks, that asks for a second look: m, and a share of the gap.
-const SUSPECT_M: f64 = 1e-6;
-const SUSPECT_SHARE: f64 = 0.02;
-/// Standard errors, and share of the mean gap, by which the largest gap must exceed the mean.
+/// Standard errors by which the largest gap must exceed the mean.
 const CERTAIN: f64 = 4.0;
-const LEAST_SHARE: f64 = 0.1;
 /// Least share of the time near a knot that counts.
 const VISITED: f64 = 0.05;
 
@@ -47,10 +40,11 @@ pub(crate) fn stroke_profile(
     let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
     let known = priors(scaling, &line.at);
     let at_knot = |sd| GaussianPrior { mean: 0.0, sd };
+    // The gap, and the transducer's error, at a knot spread by so much about what the whole stroke has.
     let beliefs: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
         0..COLUMNS => known[column],
-        _ if column < COLUMNS + KNOTS => at_knot(KNOT_GAP_M),
-        _ => at_knot(KNOT_ERROR_M),
+        _ if column < COLUMNS + KNOTS => at_knot(60e-6),
+        _ => at_knot(10e-6),
     });
     let found = fit(&rows, &beliefs, REWEIGHTINGS)?;
     let shares = time_shares(blocks, scaling);
@@ -66,7 +60,7 @@ pub(crate) fn stroke_profile(
     let at = visited().map(only).max_by(|a, b| value_m(a).total_cmp(&value_m(b)))?;
     let excess: [f64; KNOTS] = std::array::from_fn(|k| at[k] - shares[k]);
     let excess_m = value_m(&at) - mean_m;
-    let is_certain = excess_m > CERTAIN * error_m(0.0, &excess) && excess_m > LEAST_SHARE * mean_m.abs();
+    let is_certain = excess_m > CERTAIN * error_m(0.0, &excess) && excess_m > 0.1 * mean_m.abs();
     let place = |knot: usize| GapAtPlace {
         at_m: scaling.place_m.0 + scaling.place_m.1 * place_of(knot),
         gap_m: value_m(&only(knot)),
@@ -78,7 +72,7 @@ pub(crate) fn stroke_profile(
     })
 }
 
-/// Whether the rows near some knot lie outwards, or inwards, of both flanks by more than matters.
+/// Whether the rows near some knot lie outwards, or inwards, of both flanks by more than 1 µm and 2 % of the gap.
 fn is_suspect(line: &GaussNewtonResult) -> bool {
     let (mut sums_m, mut blocks) = ([0.0; KNOTS], [0.0; KNOTS]);
     for row in &line.design.firm {
@@ -89,7 +83,7 @@ fn is_suspect(line: &GaussNewtonResult) -> bool {
         }
     }
     let (all, gap_m) = (blocks.iter().sum::<f64>(), line.fit.beta[GAP].abs());
-    let is_off = |k: &usize| sums_m[*k].abs() > (SUSPECT_M + SUSPECT_SHARE * gap_m) * blocks[*k];
+    let is_off = |k: &usize| sums_m[*k].abs() > (1e-6 + 0.02 * gap_m) * blocks[*k];
     (0..KNOTS).filter(|&k| blocks[k] > VISITED * all).any(|k| is_off(&k))
 }
 
