@@ -4,21 +4,6 @@ use std::collections::BTreeMap;
 
 use estimator::contact::Rejection;
 
-/// Rejections by the estimator.
-const BY_ESTIMATOR: [Rejection; 11] = [
-    Rejection::NoLoadReversal,
-    Rejection::OneSideBrief,
-    Rejection::LoadTooSmall,
-    Rejection::TravelTooSmall,
-    Rejection::RateTooLow,
-    Rejection::MotionUnexplained,
-    Rejection::TooShort,
-    Rejection::ChannelConstant,
-    Rejection::LoadSignFlipped,
-    Rejection::PositionsSwapped,
-    Rejection::PositionRatio,
-];
-
 /// Rejections before the estimator, with their remedies.
 const BEFORE_ESTIMATOR: [(&str, &str); 3] = [
     ("nothing_selected", "check column and values of each `[[channel.when]]`: no sample meets all of them"),
@@ -86,9 +71,8 @@ pub fn is_stiffness_unlike(fitted_n_per_m: f64, configured_n_per_m: f64) -> bool
 
 /// Remedy of a rejection; `None` for an unknown code.
 pub fn remedy(code: &str) -> Option<&'static str> {
-    let by_estimator = BY_ESTIMATOR.iter().find(|rejection| rejection.code() == code);
-    let before = || BEFORE_ESTIMATOR.iter().find(|(known, _)| *known == code);
-    by_estimator.map(|rejection| rejection.remedy()).or_else(|| before().map(|(_, remedy)| *remedy))
+    let before = || BEFORE_ESTIMATOR.iter().find(|(known, _)| *known == code).map(|(_, remedy)| *remedy);
+    code.parse().ok().map(Rejection::remedy).or_else(before)
 }
 
 /// Whether a rejection of most flights of an actuator points to a fault of its mapping.
