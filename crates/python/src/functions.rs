@@ -151,12 +151,8 @@ fn assess(
 ) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (estimate_batches, queries_table) {
         (None, None) => {
-            return trends::assess_store(
-                config,
-                installations,
-                &pipeline::open_store(config, installations)?,
-                ask,
-            );
+            let store = pipeline::open_store(config, installations)?;
+            return Ok(trends::assess_store(config, installations, &store, ask)?.now);
         }
         (Some(batches), _) => external_estimates::from_batches(&chunks(batches))?,
         (None, Some(_)) => trends::load_histories(&pipeline::open_store(config, installations)?)?,

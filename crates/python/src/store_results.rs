@@ -51,12 +51,7 @@ fn followed(
     let (installations, ask) = (config.installations(py)?, selection(py, units, as_of)?);
     let config = &config.inner;
     let found = py.detach(|| {
-        trends::assess_store_with_quantities(
-            config,
-            installations,
-            &pipeline::open_store(config, installations)?,
-            &ask,
-        )
+        trends::assess_store(config, installations, &pipeline::open_store(config, installations)?, &ask)
     });
     let StoreAssessment { followed, .. } = found.map_err(|error| to_run_exception(py, error))?;
     match what {

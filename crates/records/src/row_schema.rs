@@ -381,6 +381,8 @@ pub(crate) use text_cell;
 cell!(&'static str, DataType::Utf8, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<StringArray>());
 cell!(Option<&'static str>, DataType::Utf8, nullable: true, |cells| cells.iter().map(|c| **c).collect::<StringArray>());
 cell!(String, DataType::Utf8, nullable: false, |cells| cells.iter().map(Some).collect::<StringArray>());
+cell!(Arc<str>, DataType::Utf8, nullable: false, |cells| cells.iter().map(|c| Some(&***c)).collect::<StringArray>());
+cell!(Box<str>, DataType::Utf8, nullable: false, |cells| cells.iter().map(|c| Some(&***c)).collect::<StringArray>());
 cell!(Option<String>, DataType::Utf8, nullable: true, |cells| cells
     .iter()
     .map(|c| c.as_deref())

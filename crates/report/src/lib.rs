@@ -16,8 +16,7 @@ mod stats;
 pub use assets::assets;
 pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
 pub use model::{
-    Event, FleetPriorView, FlightRow, GapProfile, Installation, Quality, QuantityView, Report, TimedInterval,
-    UnitView,
+    Event, FleetPriorView, Installation, Quality, QuantityView, Report, TimedInterval, UnitView,
 };
 pub use page::{Error, Page, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;

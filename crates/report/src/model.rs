@@ -1,10 +1,11 @@
 //! View model of a report: plain values in SI, composed by `pipeline`.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use jiff::Timestamp;
-use records::report_rows::{ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow};
+use records::report_rows::{
+    ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
+};
 use records::{QuantityChange, QuantityRow, TrendRow, WorkRequest};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -96,7 +97,7 @@ pub struct UnitView {
     pub forecast: Vec<TimedInterval>,
     /// Shown on the page and in the store, not part of `report.json`.
     #[serde(skip)]
-    pub flights: Vec<FlightRow>,
+    pub flights: Vec<ReportFlight>,
 }
 
 /// Writes an assessment as `statement`, and the names and the place of its unit.
@@ -179,36 +180,6 @@ pub struct Installation {
     pub position: String,
     pub installed_utc: Timestamp,
     pub removed_utc: Option<Timestamp>,
-}
-
-/// The gap along the stroke: screw position, gap and standard error of each place, m.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GapProfile(pub Vec<[f64; 3]>);
-
-/// One flight of a unit; a report holds those of the whole fleet.
-#[derive(Debug, Clone)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct FlightRow {
-    pub departure_utc: Timestamp,
-    pub flight_id: Box<str>,
-    pub tail_number: Arc<str>,
-    pub position: Arc<str>,
-    pub unit_hours: Option<f64>,
-    pub gap_m: Option<f64>,
-    pub gap_p05_m: Option<f64>,
-    pub gap_p95_m: Option<f64>,
-    pub gap_midrange_m: Option<f64>,
-    /// Largest gap along the stroke, where the gap varies.
-    pub gap_largest_m: Option<f64>,
-    /// The gap by place there.
-    pub profile: Option<Box<GapProfile>>,
-    pub load_reversals: Option<u64>,
-    pub load_p05_n: Option<f64>,
-    pub load_p95_n: Option<f64>,
-    /// Rejection reason or quality flags.
-    pub remarks: Box<str>,
-    /// Page of its diagnostic plot, relative to the report folder, where one is drawn.
-    pub plot_path: Option<Box<str>>,
 }
 
 impl Report {

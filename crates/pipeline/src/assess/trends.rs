@@ -78,19 +78,6 @@ pub(crate) fn as_of_date(
     }))
 }
 
-/// Assesses the selected units.
-///
-/// # Errors
-/// When the store cannot be read, or a part's limits are invalid.
-pub fn assess_store(
-    config: &Config,
-    installations: &Installations,
-    store: &Store,
-    ask: &UnitSelection,
-) -> Result<Vec<TrendRow>, Error> {
-    Ok(assess_store_with_quantities(config, installations, store, ask)?.now)
-}
-
 /// Assessments of selected units with what was found about them in addition to gaps.
 #[derive(Debug, Default)]
 pub struct StoreAssessment {
@@ -104,11 +91,11 @@ pub struct StoreAssessment {
     pub notes: Vec<String>,
 }
 
-/// As [`assess_store`], with the followed quantities and the mapping faults of the selected units.
+/// Assesses the selected units.
 ///
 /// # Errors
-/// As [`assess_store`].
-pub fn assess_store_with_quantities(
+/// When the store cannot be read, or a part's limits are invalid.
+pub fn assess_store(
     config: &Config,
     installations: &Installations,
     store: &Store,

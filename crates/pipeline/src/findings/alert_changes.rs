@@ -148,7 +148,6 @@ fn row(
 ) -> AlertRecord {
     AlertRecord {
         alert_id: id.to_owned(),
-        channel: String::new(),
         kind: kind.to_owned(),
         part_number: to.unit.0.clone(),
         serial_number: to.serial_number().map(str::to_owned),
@@ -160,12 +159,10 @@ fn row(
         to_state: to.state.map(str::to_owned),
         since_utc: to.since_utc,
         as_of_utc: to.as_of_utc,
-        message: None,
         status: AlertStatus::Recorded,
-        attempts: 0,
-        error: None,
         run_id: run_id.to_owned(),
         recorded_utc: now,
+        ..AlertRecord::default()
     }
 }
 

@@ -14,7 +14,7 @@ use crate::findings::channel;
 use crate::findings::delivery::{self, Attempt, Courier, Delivery};
 use crate::findings::finding::Finding;
 use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
-use crate::findings::work_requests::{requests, unit};
+use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
 use crate::fleet::bookkeeping::maintenance_log::{self, MaintenanceLog};
 
@@ -91,7 +91,7 @@ impl FollowUp<'_> {
         let open: BTreeMap<_, _> = requests
             .iter()
             .filter(|request| request.is_open())
-            .map(|request| ((unit(request), request.quantity.as_str()), &request.request_id))
+            .map(|request| ((request.unit(), request.quantity.as_str()), &request.request_id))
             .collect();
         for finding in findings {
             finding.work_request =

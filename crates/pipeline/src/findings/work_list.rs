@@ -10,7 +10,7 @@ use store::Store;
 use crate::assess::trends::{UnitSelection, assess_store};
 use crate::error::Error;
 use crate::findings::finding::GAP;
-use crate::findings::work_requests::{requests, unit};
+use crate::findings::work_requests::requests;
 use crate::fleet::histories::UnitKey;
 
 /// Which requests to list; those without a status are all but closed ones.
@@ -30,7 +30,7 @@ impl WorkSelection {
             Some(status) => request.status == status,
         };
         let tail = &self.units.tail_number;
-        is_wanted && self.units.names(&unit(request)) && (tail.is_none() || *tail == request.tail_number)
+        is_wanted && self.units.names(&request.unit()) && (tail.is_none() || *tail == request.tail_number)
     }
 }
 
@@ -49,11 +49,11 @@ pub fn work_list(
     if found.iter().any(WorkRequest::is_open) {
         let installations = crate::run::scheduler::installations(config)?;
         let store = crate::open_store(config, &installations)?;
-        let rows = assess_store(config, &installations, &store, &UnitSelection::default())?;
+        let rows = assess_store(config, &installations, &store, &UnitSelection::default())?.now;
         units.extend(rows.into_iter().map(|row| (row.unit(), row)));
     }
     for request in found.iter_mut().filter(|request| request.is_open() && request.quantity == GAP) {
-        if let Some(row) = units.get(&unit(request)) {
+        if let Some(row) = units.get(&request.unit()) {
             request.state = row.state.map(str::to_owned);
             (request.finding, request.due_utc) = (row.reason.clone(), row.due_utc);
         }

@@ -5,8 +5,6 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use records::{Diagnostic, WorkEvent, WorkEventKind, WorkRequest};
 
-use crate::fleet::histories::UnitKey;
-
 /// Every request, earliest first. A deferred request whose date is reached is open again.
 pub fn requests(events: &[WorkEvent], now: Timestamp) -> Vec<WorkRequest> {
     let mut order = Vec::new();
@@ -25,11 +23,6 @@ pub fn requests(events: &[WorkEvent], now: Timestamp) -> Vec<WorkRequest> {
     requests
 }
 
-/// Unit of a request.
-pub(crate) fn unit(request: &WorkRequest) -> UnitKey {
-    (request.part_number.clone(), request.serial_number.clone())
-}
-
 fn opened(event: &WorkEvent) -> WorkRequest {
     WorkRequest {
         request_id: event.request_id.clone(),
@@ -41,14 +34,9 @@ fn opened(event: &WorkEvent) -> WorkRequest {
         position: event.position.clone(),
         quantity: event.quantity.clone(),
         finding: event.reason.clone(),
-        due_utc: None,
         opened_utc: event.as_of_utc,
-        by: None,
-        reason: None,
-        until_utc: None,
         changed_utc: event.recorded_utc,
-        closed_by: None,
-        closed_utc: None,
+        ..WorkRequest::default()
     }
 }
 
@@ -141,7 +129,6 @@ pub(crate) fn next_number(events: &[WorkEvent]) -> i64 {
 /// An event of a request, with all that it does not change.
 pub(crate) fn event_of(request: &WorkRequest, now: Timestamp) -> WorkEvent {
     WorkEvent {
-        number: 0,
         request_id: request.request_id.clone(),
         event: WorkEventKind::StateChanged,
         part_number: request.part_number.clone(),
@@ -150,11 +137,9 @@ pub(crate) fn event_of(request: &WorkRequest, now: Timestamp) -> WorkEvent {
         position: request.position.clone(),
         quantity: request.quantity.clone(),
         state: request.state.clone(),
-        reason: None,
         by: "freeplay".to_owned(),
-        until_utc: None,
         as_of_utc: now,
         recorded_utc: now,
-        run_id: None,
+        ..WorkEvent::default()
     }
 }

@@ -7,7 +7,7 @@ use records::{Installation, Installations, WorkEvent, WorkEventKind, WorkRequest
 use trend::State;
 
 use crate::findings::finding::Finding;
-use crate::findings::work_requests::{event_of, next_number, requests, unit};
+use crate::findings::work_requests::{event_of, next_number, requests};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
 use crate::fleet::histories::UnitKey;
@@ -34,7 +34,7 @@ pub fn update(
     let requests = requests(events, now);
     let mut latest = BTreeMap::<(UnitKey, &str), &WorkRequest>::new();
     for request in &requests {
-        latest.insert((unit(request), &request.quantity), request);
+        latest.insert((request.unit(), &request.quantity), request);
     }
     let by_unit: BTreeMap<(UnitKey, &str), &Finding> =
         findings.iter().map(|finding| ((finding.unit.clone(), finding.quantity), finding)).collect();
@@ -74,7 +74,7 @@ fn of_open(
     tables: &Tables<'_>,
     now: Timestamp,
 ) -> Vec<WorkEvent> {
-    let name = unit(request);
+    let name = request.unit();
     let event = |event: WorkEventKind| WorkEvent { event, ..event_of(request, now) };
     let state = finding.and_then(|finding| finding.state);
     let close = |kind: WorkEventKind| {
@@ -165,8 +165,6 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
     let tail = place.map(|place| place.tail_number.to_string()).or_else(|| finding.tail_number.clone());
     let position = place.map(|place| place.position.to_string()).or_else(|| finding.position.clone());
     Some(WorkEvent {
-        number: 0,
-        request_id: String::new(),
         event: WorkEventKind::Opened,
         part_number: finding.unit.0.clone(),
         serial_number: finding.unit.1.clone(),
@@ -176,10 +174,9 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
         state: finding.state.map(str::to_owned),
         reason: finding.reason.clone(),
         by: "freeplay".to_owned(),
-        until_utc: None,
         as_of_utc: finding.as_of_utc,
         recorded_utc: now,
-        run_id: None,
+        ..WorkEvent::default()
     })
 }
 

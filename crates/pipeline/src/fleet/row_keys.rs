@@ -4,21 +4,12 @@ use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;
 use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
 
-/// Unit and position of a row.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RowKey<'a> {
-    pub(crate) part_number: Option<&'a str>,
-    pub(crate) serial_number: &'a str,
-    pub(crate) tail_number: Option<&'a str>,
-    pub(crate) position: Option<&'a str>,
-}
-
 /// Key columns of some rows.
 pub(crate) struct KeyColumns {
-    serials: TextColumn,
-    parts: TextColumn,
-    tails: TextColumn,
-    positions: TextColumn,
+    pub(crate) serials: TextColumn,
+    pub(crate) parts: TextColumn,
+    pub(crate) tails: TextColumn,
+    pub(crate) positions: TextColumn,
 }
 
 impl KeyColumns {
@@ -32,16 +23,6 @@ impl KeyColumns {
             [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
         let [serials, parts, tails, positions] = names.map(|names| TextColumn::of(chunk, names));
         Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
-    }
-
-    /// Key of a row; none where the cell of the serial number is empty.
-    pub(crate) fn key_at(&self, row: usize) -> Option<RowKey<'_>> {
-        Some(RowKey {
-            part_number: self.parts.get(row),
-            serial_number: self.serials.get(row)?,
-            tail_number: self.tails.get(row),
-            position: self.positions.get(row),
-        })
     }
 
     /// Whether two rows are of one unit in one place.

@@ -10,7 +10,7 @@ use store::ColumnScan;
 
 use crate::error::Error;
 use crate::fleet::places::{Positions, UnitKey};
-use crate::fleet::row_keys::{KeyCache, KeyColumns, RowKey};
+use crate::fleet::row_keys::{KeyCache, KeyColumns};
 use crate::fleet::settings_counts::SettingsCounts;
 
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
@@ -60,16 +60,6 @@ pub(crate) struct RowsByUnit<R> {
     /// Units by serial number; a serial number is unique only with its part number.
     by_serial: HashMap<String, Vec<usize>>,
     units: Vec<(UnitKey, UnitRows<R>)>,
-    last: usize,
-    /// The unit that came after each the last time.
-    follows: Vec<usize>,
-}
-
-/// A unit, and one of its places.
-#[derive(Debug, Clone, Copy)]
-struct Seat {
-    unit: usize,
-    place: u32,
 }
 
 /// The parts of each unit's rows, in the order of the parts of the table.
@@ -77,7 +67,7 @@ pub(crate) type PartsByUnit<R> = BTreeMap<UnitKey, Vec<UnitRows<R>>>;
 
 impl<R> Default for RowsByUnit<R> {
     fn default() -> Self {
-        Self { by_serial: HashMap::new(), units: Vec::new(), last: 0, follows: Vec::new() }
+        Self { by_serial: HashMap::new(), units: Vec::new() }
     }
 }
 
@@ -93,51 +83,34 @@ impl<R> RowsByUnit<R> {
         mut read: impl FnMut(usize, &mut UnitRows<R>, u32) -> Result<(), ingest::Error>,
     ) -> Result<(), ingest::Error> {
         let keys = KeyColumns::of(chunk)?;
-        let serial = chunk.find(&["serial_number", "serial"]);
         let mut seen = KeyCache::default();
         for row in chunk.rows() {
-            let seat = match seen.get(&keys, row) {
-                Some(seat) => seat,
+            let (unit, place) = match seen.get(&keys, row) {
+                Some(known) => known,
                 None => {
-                    let empty = || chunk.error(row, serial, "it is empty".into());
-                    let seat = self.seat(keys.key_at(row).ok_or_else(empty)?);
-                    seen.put(&keys, row, seat);
-                    seat
+                    let column = chunk.find(&["serial_number", "serial"]);
+                    let empty = || chunk.error(row, column, "it is empty".into());
+                    let unit = self.unit(keys.parts.get(row), keys.serials.get(row).ok_or_else(empty)?);
+                    let places = &mut self.units[unit].1.places;
+                    let found = (unit, places.number(keys.tails.get(row), keys.positions.get(row)));
+                    seen.put(&keys, row, found);
+                    found
                 }
             };
-            read(row, &mut self.units[seat.unit].1, seat.place)?;
+            read(row, &mut self.units[unit].1, place)?;
         }
         Ok(())
     }
 
-    fn seat(&mut self, who: RowKey<'_>) -> Seat {
-        let unit = self.unit(who.part_number, who.serial_number);
-        Seat { unit, place: self.units[unit].1.places.number(who.tail_number, who.position) }
-    }
-
-    /// Index of a unit. Most tables have one unit's rows together, or the units in one order in every run.
+    /// Index of a unit.
     fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
-        let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
-        let units = &self.units;
-        let follows = self.follows.get(self.last).copied();
-        let expected = [Some(self.last), follows].into_iter().flatten();
-        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|u| is(&u.0))) {
-            self.last = unit;
-            return unit;
+        let is_it = |unit: &&usize| self.units[**unit].0.0.as_deref() == part_number;
+        if let Some(unit) = self.by_serial.get(serial_number).and_then(|all| all.iter().find(is_it)) {
+            return *unit;
         }
-        let known = self.by_serial.get(serial_number);
-        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].0)));
-        let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
-        self.follows[self.last] = unit;
-        self.last = unit;
-        unit
-    }
-
-    fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
         self.by_serial.entry(name.1.clone()).or_default().push(unit);
         self.units.push((name, UnitRows::default()));
-        self.follows.push(0);
         unit
     }
 }

@@ -3,9 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use ::report::{
-    Event, FleetPriorView, FlightRow, Installation, Quality, QuantityView, Report, TimedInterval, UnitView,
-};
+use ::report::{Event, FleetPriorView, Installation, Quality, QuantityView, Report, TimedInterval, UnitView};
 use jiff::Timestamp;
 use job::Config;
 use records::{Installations, PartNumber, Quantity, QuantityRow};
@@ -20,9 +18,11 @@ use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::flight_row::FlightRow as FlownRow;
 use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::report::flight_columns::{FlightExtras, StoreContents};
-use records::report_rows::{ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow};
+use records::report_rows::{
+    ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
+};
 use records::time::{days_after, days_between};
-use records::{ChangePoint, TrendRow};
+use records::{ChangePoint, TrendRow, WorkRequest};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -55,7 +55,7 @@ pub fn compose(
     checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
-    let mut requests = by_unit(work_requests::requests(&store.work_events()?, made_utc), work_requests::unit);
+    let mut requests = by_unit(work_requests::requests(&store.work_events()?, made_utc), WorkRequest::unit);
     let mut tails = tails(&histories, config, as_of_utc);
     // An aircraft whose units flew on others alone has a page too: theirs lead to it.
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
@@ -72,7 +72,7 @@ pub fn compose(
         let extras = extras.remove(&name).unwrap_or_default();
         let work_requests = requests.remove(&name).unwrap_or_default();
         let history = histories.get(&name);
-        let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), &extras);
+        let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), extras);
         UnitView { work_requests, ..view }
     };
     let units: Vec<UnitView> = now.into_iter().zip(&drawn).map(unit).collect();
@@ -166,7 +166,13 @@ struct ReportComposer<'a> {
 }
 
 impl ReportComposer<'_> {
-    fn unit(&self, row: TrendRow, drawn: &Forecast, history: &History, extras: &[FlightExtras]) -> UnitView {
+    fn unit(
+        &self,
+        row: TrendRow,
+        drawn: &Forecast,
+        history: &History,
+        extras: Vec<FlightExtras>,
+    ) -> UnitView {
         let name = row.unit();
         let installations: Vec<Installation> =
             self.installations.of(&name).into_iter().map(installation).collect();
@@ -184,12 +190,12 @@ impl ReportComposer<'_> {
             state_day_before: before
                 .filter(|row| row.gap_m.is_some())
                 .map(|row| row.state.map(str::to_owned)),
-            quality: quality(history, extras, &row),
+            quality: quality(history, &extras, &row),
             events: events(&row, &installations),
             past_forecasts: self.past(&row, &name),
             inspections: checks.map(|check| compared(check, &row, history.flights())).collect(),
+            quantities: self.quantities(&name, history, &extras),
             flights: flights(history, extras),
-            quantities: self.quantities(&name, history, extras),
             installations,
             work_requests: Vec::new(),
             row,
@@ -326,67 +332,36 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
     counts
 }
 
-/// Tail and position.
-type PlaceNames = (Arc<str>, Arc<str>);
-
 /// The flights of a unit, which share the names of its places.
-fn flights(history: &History, extras: &[FlightExtras]) -> Vec<FlightRow> {
+fn flights(history: &History, extras: Vec<FlightExtras>) -> Vec<ReportFlight> {
     let shared = |name: &Option<String>| Arc::from(name.as_deref().unwrap_or_default());
-    let mut names: Option<(&TailPosition, PlaceNames)> = None;
-    let row = |flown: &FlownRow| {
+    let mut names: Option<(&TailPosition, [Arc<str>; 2])> = None;
+    let row = |(flown, extras): (&FlownRow, FlightExtras)| {
         let place = history.place(flown);
         let known = names.take().filter(|(of, _)| *of == place);
-        let (_, of_place) = names
-            .insert(known.unwrap_or_else(|| (place, (shared(&place.tail_number), shared(&place.position)))));
-        flight(history, flown, &extras[flown.row as usize], of_place.clone())
+        let shared = || (place, [&place.tail_number, &place.position].map(shared));
+        let (_, [tail_number, position]) = names.insert(known.unwrap_or_else(shared));
+        ReportFlight {
+            departure_utc: flown.departure_utc(),
+            flight_id: history.flight_id(flown).unwrap_or_default().into(),
+            tail_number: Arc::clone(tail_number),
+            position: Arc::clone(position),
+            gap_m: flown.gap_m(),
+            remarks: remarks(flown, &extras),
+            ..extras.shown
+        }
     };
-    history.flights().iter().map(row).collect()
+    history.flights().iter().zip(extras).map(row).collect()
 }
 
-fn flight(
-    history: &History,
-    flown: &FlownRow,
-    extras: &FlightExtras,
-    (tail_number, position): PlaceNames,
-) -> FlightRow {
-    let others = extras.flags.iter().filter(|flag| Some(*flag) != extras.reason.as_ref());
+/// Rejection reason, or quality flags with the most severe first.
+fn remarks(flown: &FlownRow, extras: &FlightExtras) -> Box<str> {
     let reason = extras.reason.as_deref().map(|reason| match flown.gap_m() {
         None => format!("refused: {reason}"),
         Some(_) => reason.to_owned(),
     });
-    let [
-        unit_hours,
-        gap_p05_m,
-        gap_p95_m,
-        gap_midrange_m,
-        gap_largest_m,
-        load_p05_n,
-        load_p95_n,
-        load_reversals,
-    ] = extras.numbers();
-    FlightRow {
-        departure_utc: flown.departure_utc(),
-        flight_id: history.flight_id(flown).unwrap_or_default().into(),
-        tail_number,
-        position,
-        unit_hours,
-        gap_m: flown.gap_m(),
-        gap_p05_m,
-        gap_p95_m,
-        gap_midrange_m,
-        gap_largest_m,
-        profile: extras.profile.clone(),
-        load_reversals: load_reversals.map(|n| n as u64),
-        load_p05_n,
-        load_p95_n,
-        remarks: reason
-            .into_iter()
-            .chain(others.map(ToString::to_string))
-            .collect::<Vec<_>>()
-            .join(", ")
-            .into(),
-        plot_path: None,
-    }
+    let others = extras.flags.iter().filter(|flag| Some(*flag) != extras.reason.as_ref());
+    reason.into_iter().chain(others.map(ToString::to_string)).collect::<Vec<_>>().join(", ").into()
 }
 
 fn tails(

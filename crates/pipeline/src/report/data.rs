@@ -49,19 +49,7 @@ fn flights(unit: &UnitView) -> impl Iterator<Item = ReportFlightRow> {
     unit.flights.iter().map(|flight| ReportFlightRow {
         part_number: unit.row.part_number.clone(),
         serial_number: unit.row.serial_number.clone(),
-        tail_number: flight.tail_number.to_string(),
-        position: flight.position.to_string(),
-        flight_id: flight.flight_id.to_string(),
-        departure_utc: flight.departure_utc,
-        unit_hours: flight.unit_hours,
-        gap_m: flight.gap_m,
-        gap_p05_m: flight.gap_p05_m,
-        gap_p95_m: flight.gap_p95_m,
-        gap_midrange_m: flight.gap_midrange_m,
-        load_reversals: flight.load_reversals.map(|n| n as i64),
-        load_p05_n: flight.load_p05_n,
-        load_p95_n: flight.load_p95_n,
-        remarks: flight.remarks.to_string(),
+        flight: flight.clone(),
     })
 }
 

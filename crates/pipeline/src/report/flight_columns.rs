@@ -7,7 +7,8 @@ use arrow::datatypes::Float64Type;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
-use report::GapProfile;
+use records::report_rows::ReportFlight;
+use records::row_schema::NoColumn;
 use store::{Query, Store};
 
 use crate::error::Error;
@@ -15,7 +16,7 @@ use crate::fleet::builder::{self, FlightColumns};
 use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::TextColumn;
-use crate::fleet::unit_rows::{RowsByUnit, number, of_store};
+use crate::fleet::unit_rows::{RowsByUnit, at, number, of_store};
 
 /// Columns of numbers that a page shows; an assessment needs load reversals alone of them.
 const NUMBERS: [&str; 8] = [
@@ -40,24 +41,16 @@ pub(super) struct StoreContents {
     pub(super) store_version: u64,
 }
 
-/// Columns of a flight that a page shows in addition to those used by the assessment.
+/// What a page shows of a flight in addition to the columns of its history.
 #[derive(Debug, Clone)]
 pub(super) struct FlightExtras {
-    /// In the order of [`NUMBERS`]; NaN for none.
-    numbers: [f64; NUMBERS.len()],
+    /// The flight, without departure, names, gap and remarks.
+    pub(super) shown: ReportFlight,
     /// Rejection code, or the most severe flag.
     pub(super) reason: Option<Box<str>>,
     pub(super) flags: Box<[Box<str>]>,
-    pub(super) profile: Option<Box<GapProfile>>,
     /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
     pub(super) quantities: [f32; Quantity::ALL.len()],
-}
-
-impl FlightExtras {
-    /// The numbers, in the order of [`NUMBERS`].
-    pub(super) fn numbers(&self) -> [Option<f64>; NUMBERS.len()] {
-        self.numbers.map(|value| Some(value).filter(|value| !value.is_nan()))
-    }
 }
 
 impl StoreContents {
@@ -89,22 +82,44 @@ fn add(
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
     let profiles =
         PROFILE.map(|name| batch.column_by_name(name).and_then(|column| column.as_list_opt::<i32>()));
-    flights.add_to(rows, |row| FlightExtras {
-        numbers: std::array::from_fn(|k| number(&numbers[k], row)),
-        reason: reasons.get(row).map(Into::into),
-        flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
-        profile: profile_of(&profiles, row),
-        quantities: std::array::from_fn(|k| number(&quantities[k], row) as f32),
+    flights.add_to(rows, |row| {
+        let [
+            unit_hours,
+            gap_p05_m,
+            gap_p95_m,
+            gap_midrange_m,
+            gap_largest_m,
+            load_p05_n,
+            load_p95_n,
+            load_reversals,
+        ] = std::array::from_fn(|k| at(&numbers[k], row));
+        FlightExtras {
+            shown: ReportFlight {
+                unit_hours,
+                gap_p05_m,
+                gap_p95_m,
+                gap_midrange_m,
+                gap_largest_m: NoColumn(gap_largest_m),
+                profile: NoColumn(profile_of(&profiles, row).unwrap_or_default()),
+                load_reversals: load_reversals.map(|n| n as i64),
+                load_p05_n,
+                load_p95_n,
+                ..ReportFlight::default()
+            },
+            reason: reasons.get(row).map(Into::into),
+            flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
+            quantities: std::array::from_fn(|k| number(&quantities[k], row) as f32),
+        }
     })
 }
 
 /// The gap along the stroke of a row, where it varies.
-fn profile_of(columns: &[Option<&ListArray>; 3], row: usize) -> Option<Box<GapProfile>> {
+fn profile_of(columns: &[Option<&ListArray>; 3], row: usize) -> Option<Box<[[f64; 3]]>> {
     let lists = columns.map(|column| Some(column.filter(|column| column.is_valid(row))?.value(row)));
     let [at_m, gap_m, gap_se_m] =
         lists.each_ref().map(|list| list.as_ref()?.as_primitive_opt::<Float64Type>());
     let gaps = at_m?.values().iter().zip(gap_m?.values()).zip(gap_se_m?.values());
-    Some(Box::new(GapProfile(gaps.map(|((at_m, m), se_m)| [*at_m, *m, *se_m]).collect())))
+    Some(gaps.map(|((at_m, m), se_m)| [*at_m, *m, *se_m]).collect())
 }
 
 /// The flags of a row.

@@ -83,7 +83,7 @@ pub fn draw(
         match pages {
             Ok(pages) => {
                 for (wanted, page) in pages {
-                    report.units[wanted.unit].flights[wanted.flight].plot_path =
+                    report.units[wanted.unit].flights[wanted.flight].plot_path.0 =
                         Some(page.path.as_str().into());
                     plots.pages.push(page);
                 }

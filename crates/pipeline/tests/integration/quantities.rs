@@ -137,8 +137,7 @@ fn assessed(config: &Config, plant: Plant, swaps: bool) -> (Vec<TrendRow>, Follo
         .collect();
     let store = fleet::store(folder.path(), &results);
     let ask = UnitSelection::default();
-    let found =
-        trends::assess_store_with_quantities(config, &Installations::default(), &store, &ask).unwrap();
+    let found = trends::assess_store(config, &Installations::default(), &store, &ask).unwrap();
     (found.now, found.followed)
 }
 

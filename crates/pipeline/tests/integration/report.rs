@@ -41,7 +41,7 @@ fn record(unit: i32, at: i32) -> GapRecord {
 
 fn assessed(store: &Store, as_of: Timestamp) -> BTreeMap<String, TrendRow> {
     let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
-    let rows = trends::assess_store(&config(), &Installations::default(), store, &ask).unwrap();
+    let rows = trends::assess_store(&config(), &Installations::default(), store, &ask).unwrap().now;
     rows.into_iter().map(|row| (row.serial_number.clone(), row)).collect()
 }
 

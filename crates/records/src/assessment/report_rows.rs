@@ -1,9 +1,12 @@
 //! Rows of the tables that `report --data` writes in addition to trends, quantities, changes, intervals and work requests.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use serde::Serialize;
 
 use crate::row;
+use crate::row_schema::NoColumn;
 
 row! {
     /// One flight of one unit, as on the unit's page.
@@ -13,12 +16,21 @@ row! {
         pub part_number: Option<String>,
         /// Serial number of the unit.
         pub serial_number: String,
+        /// The flight.
+        pub flight: ReportFlight,
+    }
+}
+
+row! {
+    /// A flight. A report holds those of the whole fleet, so the flights of a unit share the names of its places.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportFlight {
         /// Tail number.
-        pub tail_number: String,
+        pub tail_number: Arc<str>,
         /// Position on the aircraft.
-        pub position: String,
+        pub position: Arc<str>,
         /// Flight identifier.
-        pub flight_id: String,
+        pub flight_id: Box<str>,
         /// Departure.
         pub departure_utc: Timestamp,
         /// The unit's hours after this flight.
@@ -38,7 +50,13 @@ row! {
         /// 5 % and 95 % quantile of the load, N.
         pub load_p95_n: Option<f64>,
         /// Rejection reason or quality flags.
-        pub remarks: String,
+        pub remarks: Box<str>,
+        /// Largest gap along the stroke, m, where the gap varies.
+        pub gap_largest_m: NoColumn<Option<f64>>,
+        /// The gap along the stroke there: screw position, gap and standard error of each place, m.
+        pub profile: NoColumn<Box<[[f64; 3]]>>,
+        /// Page of its diagnostic plot, relative to the report folder, where one is drawn.
+        pub plot_path: NoColumn<Option<Box<str>>>,
     }
 }
 

@@ -7,10 +7,11 @@ use crate::row_schema::{self, text_cell};
 use crate::stored_row;
 
 /// What became of an alert.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, EnumString)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, IntoStaticStr, EnumString)]
 #[strum(serialize_all = "snake_case")]
 pub enum AlertStatus {
     /// The change itself: it needs no message, or its messages have rows of their own.
+    #[default]
     Recorded,
     /// The message was not sent; the next run sends it.
     Pending,
@@ -40,7 +41,7 @@ text_cell!(AlertStatus, row_schema::word);
 
 stored_row! {
     /// One change of state, or its message in one channel.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, Default, PartialEq)]
     pub struct AlertRecord {
         /// Identifier of the change. Of the rows with one `alert_id` and `channel`, the newest counts.
         pub alert_id: String,

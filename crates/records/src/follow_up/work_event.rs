@@ -7,10 +7,11 @@ use crate::row_schema::{self, text_cell};
 use crate::stored_row;
 
 /// Kind of a work event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, EnumString)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, IntoStaticStr, EnumString)]
 #[strum(serialize_all = "snake_case")]
 pub enum WorkEventKind {
     /// A run found the unit in state `plan` or `act`.
+    #[default]
     Opened,
     /// A person has seen the request.
     Acknowledged,
@@ -48,7 +49,7 @@ text_cell!(WorkEventKind, row_schema::word);
 
 stored_row! {
     /// One step in the life of a work request.
-    #[derive(Debug, Clone, PartialEq)]
+    #[derive(Debug, Clone, Default, PartialEq)]
     pub struct WorkEvent {
         /// Number of the event in the store, from 1.
         pub number: i64,

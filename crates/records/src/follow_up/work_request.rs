@@ -6,7 +6,7 @@ use crate::row;
 
 row! {
     /// A finding that wants work, from the run that found it until it is closed.
-    #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
     pub struct WorkRequest {
         /// Identifier, such as `W12`.
         pub request_id: String,
@@ -46,6 +46,11 @@ row! {
 }
 
 impl WorkRequest {
+    /// Part number, if known, and serial number.
+    pub fn unit(&self) -> (Option<String>, String) {
+        (self.part_number.clone(), self.serial_number.clone())
+    }
+
     /// Whether work is left to do, now or later.
     pub fn is_open(&self) -> bool {
         self.status != "closed"

@@ -1,11 +1,12 @@
 //! Chart of a unit: flights, smoothed gap, forecast, limits, inspections, maintenance and peers.
 
 use jiff::{SignedDuration, Timestamp};
+use records::report_rows::ReportFlight;
 use records::time::DAY_S;
 
 use crate::charts::frame::{BAR, DATA, Frame, GRID, INK, LIMIT, PEER, PLAN, THIN, WATCH, day, thinned};
 use crate::format::{date, micrometres};
-use crate::model::{FlightRow, TimedInterval, UnitView};
+use crate::model::{TimedInterval, UnitView};
 use crate::stats::peers::Peers;
 
 /// Maximum number of points in the chart; above it, each point is the mean of neighbouring flights.
@@ -166,7 +167,7 @@ fn draw_inspections(frame: &mut Frame, unit: &UnitView) {
 }
 
 /// Day, and 5 %, middle and 95 % of the gap of a flight with an estimate, µm.
-fn point(flight: &FlightRow) -> Option<[f64; 4]> {
+fn point(flight: &ReportFlight) -> Option<[f64; 4]> {
     let gap_m = flight.gap_m?;
     let (low_m, high_m) = (flight.gap_p05_m.unwrap_or(gap_m), flight.gap_p95_m.unwrap_or(gap_m));
     Some([day(flight.departure_utc), low_m * 1e6, gap_m * 1e6, high_m * 1e6])

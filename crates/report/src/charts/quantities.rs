@@ -2,11 +2,11 @@
 
 use jiff::Timestamp;
 use records::Quantity;
+use records::report_rows::ReportFlight;
 use records::uncertainty::NORMAL_95;
 
 use crate::charts::frame::{DATA, Frame, INK, LIMIT, PLAN, day, thinned};
 use crate::format::date;
-use crate::model::FlightRow;
 
 /// Most points; above it, each is the mean of neighbouring flights.
 const MAX_POINTS: usize = 90;
@@ -42,9 +42,9 @@ pub(crate) fn small_chart(
 
 /// The largest gap along the stroke of a flight whose gap varies, in words; and its picture: gap, µm, with its 90 % interval
 /// against the screw position, mm, the largest as a disc, and the limit, m, where it applies to the largest.
-pub(crate) fn stroke_profile(flight: &FlightRow, limit_m: Option<f64>) -> Option<(String, String)> {
-    let profile = flight.profile.as_ref()?;
-    let points: Vec<[f64; 4]> = profile
+pub(crate) fn stroke_profile(flight: &ReportFlight, limit_m: Option<f64>) -> Option<(String, String)> {
+    let points: Vec<[f64; 4]> = flight
+        .profile
         .0
         .iter()
         .map(|[at_m, m, se_m]| (1e3 * at_m, 1e6 * m, 1e6 * NORMAL_95 * se_m))

@@ -49,7 +49,9 @@ impl Axes {
 
     fn draw(self, unit: &UnitView) -> String {
         let Some((from, to)) = self.span else { return String::new() };
-        let gap = |flight: &crate::FlightRow| Some([day(flight.departure_utc), flight.gap_m? * 1e6]);
+        let gap = |flight: &records::report_rows::ReportFlight| {
+            Some([day(flight.departure_utc), flight.gap_m? * 1e6])
+        };
         let gaps: Vec<[f64; 2]> = unit.flights.iter().filter_map(gap).collect();
         let x = [day(from), day(to).max(day(from) + 1.0)];
         let limit = unit.row.limit_m.map(|limit_m| limit_m * 1e6);

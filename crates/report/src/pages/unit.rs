@@ -98,7 +98,7 @@ fn facts(peers: &Peers<'_>, unit: &UnitView) -> Vec<(&'static str, String)> {
         (Some(low), Some(high)) => format!("{} ({} to {})", rate(middle), rate(low), rate(high)),
         _ => rate(middle),
     });
-    let largest = unit.flights.iter().rev().find_map(|f| Some((f.departure_utc, f.gap_largest_m?)));
+    let largest = unit.flights.iter().rev().find_map(|f| Some((f.departure_utc, f.gap_largest_m.0?)));
     let largest = largest.filter(|_| !row.is_by_largest());
     let known = [
         (if row.is_by_largest() { "Gap, largest along the stroke" } else { "Gap" }, Some(unit.gap_text())),

@@ -68,7 +68,7 @@ fn verdict(
         part_number: query.part_number.clone(),
         as_of_utc: None,
     };
-    let found = trends::assess_store_with_quantities(config, installations, store, &ask)?;
+    let found = trends::assess_store(config, installations, store, &ask)?;
     let is_one_unit = query.serial_number.is_some();
     Ok(if found.now.is_empty() { String::new() } else { trend::page(&found, is_one_unit, MAX_RANK) + "\n" })
 }

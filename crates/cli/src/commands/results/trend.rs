@@ -32,7 +32,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => {
             let store = pipeline::open_store(&config, &installations)?;
-            trends::assess_store_with_quantities(&config, &installations, &store, &ask)?
+            trends::assess_store(&config, &installations, &store, &ask)?
         }
         (estimates, queries) => {
             let histories = match estimates {
@@ -84,7 +84,7 @@ fn quantities(
 ) -> Result<Code, Failure> {
     let store = pipeline::open_store(config, installations)?;
     let StoreAssessment { now: units, followed, .. } =
-        trends::assess_store_with_quantities(config, installations, &store, ask)?;
+        trends::assess_store(config, installations, &store, ask)?;
     if units.is_empty() {
         let known = KnownNames::of(config);
         known.check_units(&args.units)?;

@@ -7,11 +7,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{
-    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
-};
+use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, Int32Type, TimestampMicrosecondType};
+use arrow::datatypes::{DataType, Float64Type, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use ingest::Flights;
 use jiff::Timestamp;
@@ -135,7 +133,7 @@ impl Bookkeeping {
             return Ok(store);
         }
         let own = self.clone();
-        Ok(store.joined(Join::new(move |batch| own.join(batch))))
+        Ok(store.joined(Join::new(move |batch| own.join(batch, |_, _| {}))))
     }
 
     /// Whether the latest run wrote these tables into all records, and ended.
@@ -153,9 +151,8 @@ impl Bookkeeping {
         }
         let moved = Mutex::new(MovedByPlace::new());
         let change = |batch: &RecordBatch| {
-            let joined = with_new_paths(&self.join(batch)?, renamed)?;
-            add_moved(batch, &joined, &mut moved.lock().unwrap_or_else(PoisonError::into_inner))?;
-            Ok(joined)
+            let mut moved = moved.lock().unwrap_or_else(PoisonError::into_inner);
+            with_new_paths(&self.join(batch, |names, at| add_moved(&mut moved, names, at))?, renamed)
         };
         let rows = writer.rewrite(&COLUMNS, &change)?;
         let moved = moved.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -163,44 +160,50 @@ impl Bookkeeping {
     }
 
     /// A batch of records with the columns that the tables supply. A record that they do not know keeps what is stored.
-    fn join(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    /// `moved` is given tail, position, former unit and present unit of each record that another unit has now, and its
+    /// departure.
+    fn join(
+        &self,
+        batch: &RecordBatch,
+        mut moved: impl FnMut([&str; 6], Timestamp),
+    ) -> Result<RecordBatch, ArrowError> {
         let schema = batch.schema();
-        let text =
-            |name: &str| -> Result<Coded, ArrowError> { Coded::of(batch.column(schema.index_of(name)?)) };
-        let (tails, positions) = (text("tail_number")?, text("position")?);
-        let (mut parts, mut serials) = (text("part_number")?, text("serial_number")?);
-        let flights = if self.flights.is_empty() { None } else { Some(text("flight_id")?) };
+        let texts = |name: &str| cast(batch.column(schema.index_of(name)?), &DataType::Utf8);
+        let (tails, positions) = (texts("tail_number")?, texts("position")?);
+        let (tails, positions) = (tails.as_string::<i32>(), positions.as_string::<i32>());
+        let (parts, serials) = (texts("part_number")?, texts("serial_number")?);
+        let [mut parts, mut serials] = [&parts, &serials]
+            .map(|names| names.as_string::<i32>().iter().map(Option::unwrap_or_default).collect::<Vec<_>>());
+        let flights = if self.flights.is_empty() { None } else { Some(texts("flight_id")?) };
+        let flights = flights.as_ref().map(AsArray::as_string::<i32>);
         let departures = batch.column(schema.index_of("departure_utc")?).clone();
         let departures = departures.as_primitive::<TimestampMicrosecondType>();
         let numbers = |name: &str| batch.column_by_name(name).map(numbers);
         let [mut hours, mut flown, mut meters] =
             ["unit_hours", "flight_hours", "tail_hours_end"].map(numbers);
-        let mut places: HashMap<(i32, i32), &[Installation]> = HashMap::new();
-        let mut names: HashMap<*const Installation, (i32, i32)> = HashMap::new();
+        let mut places: HashMap<(&str, &str), &[Installation]> = HashMap::new();
         for row in 0..batch.num_rows() {
             let Ok(at) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-            let tail = tails.text(row);
-            if let Some(flight) =
-                flights.as_ref().and_then(|flights| self.flights.of(tail, flights.text(row), at))
-            {
+            let (tail, position) = (tails.value(row), positions.value(row));
+            if let Some(flight) = flights.and_then(|flights| self.flights.of(tail, flights.value(row), at)) {
                 set(flown.as_mut(), row, flight.flight_hours);
                 set(meters.as_mut(), row, flight.tail_hours_end);
             }
-            let place = (tails.keys[row], positions.keys[row]);
             let installations = places
-                .entry(place)
-                .or_insert_with(|| self.installations.of_position(tail, positions.text(row)));
+                .entry((tail, position))
+                .or_insert_with(|| self.installations.of_position(tail, position));
             let Some(installation) = installations.iter().find(|installation| installation.covers(at)) else {
                 continue;
             };
             if !self.parts.contains(installation.part_number.as_str()) {
                 continue;
             }
-            let (part, serial) = *names.entry(std::ptr::from_ref(installation)).or_insert_with(|| {
-                let (part, serial) = installation.unit();
-                (parts.code(part.as_str()), serials.code(serial.as_str()))
-            });
-            (parts.keys[row], serials.keys[row]) = (part, serial);
+            let (part, serial) = installation.unit();
+            let (part, serial) = (part.as_str(), serial.as_str());
+            if (parts[row], serials[row]) != (part, serial) {
+                moved([tail, position, parts[row], serials[row], part, serial], at);
+                (parts[row], serials[row]) = (part, serial);
+            }
             if let Some(hours) = &mut hours {
                 hours[row] = installation.unit_hours(meters.as_ref().and_then(|meters| meters[row]));
             }
@@ -212,8 +215,8 @@ impl Bookkeeping {
             }
             Ok(())
         };
-        put("part_number", parts.array()?)?;
-        put("serial_number", serials.array()?)?;
+        put("part_number", Arc::new(StringArray::from(parts)))?;
+        put("serial_number", Arc::new(StringArray::from(serials)))?;
         for (name, values) in [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)] {
             if let Some(values) = values {
                 put(name, Arc::new(Float64Array::from(values)))?;
@@ -230,50 +233,6 @@ fn numbers(column: &ArrayRef) -> Vec<Option<f64>> {
 fn set(values: Option<&mut Vec<Option<f64>>>, row: usize, value: Option<f64>) {
     if let (Some(values), Some(_)) = (values, value) {
         values[row] = value;
-    }
-}
-
-/// A column of texts as codes, to which texts can be added.
-struct Coded {
-    keys: Vec<i32>,
-    texts: StringArray,
-    /// Texts that were added, and the codes of all; filled by the first one that is asked for.
-    added: Vec<String>,
-    codes: HashMap<String, i32>,
-}
-
-impl Coded {
-    fn of(column: &ArrayRef) -> Result<Self, ArrowError> {
-        let coded = cast(column, &DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)))?;
-        let coded = coded.as_dictionary::<Int32Type>();
-        let (keys, texts) = (coded.keys().values().to_vec(), coded.values().as_string::<i32>().clone());
-        Ok(Self { keys, texts, added: Vec::new(), codes: HashMap::new() })
-    }
-
-    /// The stored text of a row.
-    fn text(&self, row: usize) -> &str {
-        self.texts.value(self.keys[row] as usize)
-    }
-
-    /// The code of a text.
-    fn code(&mut self, text: &str) -> i32 {
-        if self.codes.is_empty() {
-            let stored = self.texts.iter().map(|text| text.unwrap_or_default().to_owned());
-            self.codes = stored.zip(0..).collect();
-        }
-        if let Some(code) = self.codes.get(text) {
-            return *code;
-        }
-        let code = (self.texts.len() + self.added.len()) as i32;
-        self.added.push(text.to_owned());
-        self.codes.insert(text.to_owned(), code);
-        code
-    }
-
-    fn array(self) -> Result<ArrayRef, ArrowError> {
-        let added = self.added.iter().map(|text| Some(text.as_str()));
-        let texts: StringArray = self.texts.iter().chain(added).collect();
-        Ok(Arc::new(DictionaryArray::<Int32Type>::try_new(Int32Array::from(self.keys), Arc::new(texts))?))
     }
 }
 
@@ -297,44 +256,26 @@ fn with_new_paths(
 /// Moved flights by place and units.
 type MovedByPlace = BTreeMap<[String; 6], MovedFlights>;
 
-/// Counts the rows that have another unit in `after` than in `before`.
-fn add_moved(before: &RecordBatch, after: &RecordBatch, moved: &mut MovedByPlace) -> Result<(), ArrowError> {
-    let text = |batch: &RecordBatch, name: &str| {
-        Ok::<_, ArrowError>(batch.column(batch.schema_ref().index_of(name)?).as_string::<i32>().clone())
-    };
-    let [tails, positions, from_parts, from_serials] =
-        ["tail_number", "position", "part_number", "serial_number"].map(|name| text(before, name));
-    let (tails, positions, from_parts, from_serials) = (tails?, positions?, from_parts?, from_serials?);
-    let (parts, serials) = (text(after, "part_number")?, text(after, "serial_number")?);
-    let departures = before.column(before.schema_ref().index_of("departure_utc")?);
-    let departures = departures.as_primitive::<TimestampMicrosecondType>();
-    for row in 0..before.num_rows() {
-        if (from_parts.value(row), from_serials.value(row)) == (parts.value(row), serials.value(row)) {
-            continue;
+/// Counts a record that another unit has now, by tail, position, former unit and present unit.
+fn add_moved(moved: &mut MovedByPlace, names: [&str; 6], at: Timestamp) {
+    let entry = moved.entry(names.map(str::to_owned)).or_insert_with_key(|names| {
+        let [tail_number, position, from_part_number, from_serial_number, part_number, serial_number] =
+            names.clone();
+        MovedFlights {
+            tail_number,
+            position,
+            from_part_number,
+            from_serial_number,
+            part_number,
+            serial_number,
+            flights: 0,
+            first_departure_utc: at,
+            last_departure_utc: at,
         }
-        let texts = [&tails, &positions, &from_parts, &from_serials, &parts, &serials];
-        let key = texts.map(|texts| texts.value(row).to_owned());
-        let at = Timestamp::from_microsecond(departures.value(row)).unwrap_or_default();
-        let entry = moved.entry(key).or_insert_with_key(|key| {
-            let [tail_number, position, from_part_number, from_serial_number, part_number, serial_number] =
-                key.clone();
-            MovedFlights {
-                tail_number,
-                position,
-                from_part_number,
-                from_serial_number,
-                part_number,
-                serial_number,
-                flights: 0,
-                first_departure_utc: at,
-                last_departure_utc: at,
-            }
-        });
-        entry.flights += 1;
-        entry.first_departure_utc = entry.first_departure_utc.min(at);
-        entry.last_departure_utc = entry.last_departure_utc.max(at);
-    }
-    Ok(())
+    });
+    entry.flights += 1;
+    entry.first_departure_utc = entry.first_departure_utc.min(at);
+    entry.last_departure_utc = entry.last_departure_utc.max(at);
 }
 
 /// Opens the store of a configuration for reading, with the operator's tables joined to its records.
