@@ -50,13 +50,13 @@ fn over<T>(bencher: Bencher, count: usize, mut run: impl FnMut(&Samples<'_>) -> 
 #[divan::bench(args = COUNTS, sample_count = 30)]
 fn batch(bencher: Bencher, count: usize) {
     let filter = filter();
-    over(bencher, count, |samples| filter.track(samples, None).unwrap());
+    over(bencher, count, |samples| GainSchedule::new(&filter).track(samples, &mut Vec::new()).unwrap());
 }
 
 #[divan::bench(args = COUNTS, sample_count = 30)]
 fn batch_in_a_room(bencher: Bencher, count: usize) {
     let (schedule, mut room) = (GainSchedule::new(&filter()), Vec::new());
-    over(bencher, count, |samples| schedule.filter_with(samples, None, &mut room).unwrap());
+    over(bencher, count, |samples| schedule.track(samples, &mut room).unwrap());
 }
 
 #[divan::bench(args = COUNTS, sample_count = 30)]

@@ -40,7 +40,7 @@ fn run(part: &str, count: usize) -> Result<(), Error> {
     let filter = filter()?;
     match part {
         "schedule" => drop(black_box(GainSchedule::new(&filter))),
-        "filter" => drop(black_box(filter.track(&samples, None)?)),
+        "filter" => drop(black_box(GainSchedule::new(&filter).track(&samples, &mut Vec::new())?)),
         "statistic" => drop(black_box(gap::mid_range(&dx_m)).is_ok()),
         "load" => drop(black_box(gap::load_band(&load_n, segments)).is_some()),
         "published" => {

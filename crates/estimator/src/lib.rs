@@ -30,6 +30,6 @@ pub use gap::midrange::{self, MidRangeEstimate};
 pub use gap::{BoundedGap, GapStatistic, StreamingGap};
 pub use kalman::{Filter, FilterStep, InitialVariances, KalmanState, Stream, StreamStep};
 #[cfg(feature = "std")]
-pub use kalman::{FilterOutput, GainSchedule, InnovationBuffers, Nis};
+pub use kalman::{GainSchedule, Nis};
 pub use model::{ActuatorModel, DiscreteModel, NoiseCovariances, NoiseModel, SensorNoise};
 pub use samples::Samples;

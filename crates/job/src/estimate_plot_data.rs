@@ -1,7 +1,7 @@
 //! Everything one would draw of an estimate: channels, S(t), and the flanks as they were found.
 
 use estimator::contact::ContactPlot;
-use estimator::{GapStatistic, gap};
+use estimator::{GainSchedule, GapStatistic, gap};
 use ingest::{ActuatorChannels, LogFiles};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 
@@ -35,8 +35,9 @@ pub struct EstimatePlot {
 
 impl EstimatePlot {
     fn of(channels: &ActuatorChannels, part: &Part, config: &Config) -> Result<Self, Diagnostic> {
-        let track = estimate::filter(channels, part)?
-            .track(&estimate::samples(channels), None)
+        let mut s_m = Vec::new();
+        GainSchedule::new(&estimate::filter(channels, part)?)
+            .track(&estimate::samples(channels), &mut s_m)
             .map_err(|e| Diagnostic::new("estimate_failed", e))?;
         Ok(Self {
             position: channels.position.clone(),
@@ -45,8 +46,8 @@ impl EstimatePlot {
             breaks: channels.breaks.clone(),
             dx_m: channels.dx_m.clone(),
             load_n: channels.load_n.clone(),
-            midrange: gap::mid_range(&track.s_m).ok(),
-            s_m: track.s_m,
+            midrange: gap::mid_range(&s_m).ok(),
+            s_m,
             picture: estimate::plot_data(channels, part)?,
         })
     }

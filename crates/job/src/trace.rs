@@ -1,6 +1,6 @@
 //! Trace: inputs and outputs of the filter, sample by sample.
 
-use estimator::{InnovationBuffers, Stream};
+use estimator::{GainSchedule, StreamStep};
 use ingest::LogFiles;
 use ingest::parquet::writer::Column;
 use records::{Diagnostic, Installations, PartNumber};
@@ -65,13 +65,21 @@ impl Trace {
     }
 
     fn of(log: &str, channels: &ingest::ActuatorChannels, part: &Part) -> Result<Self, Diagnostic> {
-        let filter = estimate::filter(channels, part)?;
-        let mut seen = InnovationBuffers::default();
-        let track = filter
-            .track(&estimate::samples(channels), Some(&mut seen))
-            .map_err(|e| Diagnostic::new("estimate_failed", e))?;
-        let count = track.s_m.len();
-        let [position_m, speed_m_per_s] = relative_motion(&filter, channels)?;
+        let (samples, count) = (estimate::samples(channels), channels.dx_m.len());
+        let mut steps: [Vec<f64>; 5] = std::array::from_fn(|_| vec![f64::NAN; count]);
+        let schedule = GainSchedule::new(&estimate::filter(channels, part)?);
+        let put = |k: usize, step: &StreamStep| {
+            let numbers = [step.s_m(), step.innovation_m, step.innovation_variance_m2, step.x[0], step.x[1]];
+            steps.iter_mut().zip(numbers).for_each(|(column, number)| column[k] = number);
+        };
+        schedule.for_each_step(&samples, put).map_err(|e| Diagnostic::new("estimate_failed", e))?;
+        let [s_m, innovation_m, variance_m2, mut position_m, mut speed_m_per_s] = steps;
+        for segment in samples.segments {
+            let missing = channels.dx_m[segment.clone()].iter().take_while(|y| y.is_nan()).count();
+            for column in [&mut position_m, &mut speed_m_per_s] {
+                column[segment.start..][..missing].fill(f64::NAN);
+            }
+        }
         let time_s = (0..count).map(|k| channels.time_s(k)).collect();
         Ok(Self {
             log: vec![log.to_owned(); count],
@@ -81,9 +89,9 @@ impl Trace {
                 channels.motor_m.clone(),
                 channels.dx_m.clone(),
                 channels.load_n.clone(),
-                track.s_m,
-                seen.innovation_m,
-                seen.variance_m2,
+                s_m,
+                innovation_m,
+                variance_m2,
                 flanks(channels, part, count)?,
                 position_m,
                 speed_m_per_s,
@@ -91,25 +99,6 @@ impl Trace {
             ],
         })
     }
-}
-
-/// Estimated δX, m, and δẊ, m/s, of each sample; NaN outside the segments and before the first measured position of
-/// one. The stream is bitwise the batch that estimates S.
-fn relative_motion(
-    filter: &estimator::Filter,
-    channels: &ingest::ActuatorChannels,
-) -> Result<[Vec<f64>; 2], Diagnostic> {
-    let mut motion = [vec![f64::NAN; channels.dx_m.len()], vec![f64::NAN; channels.dx_m.len()]];
-    let mut stream = Stream::steady_state(filter);
-    for segment in estimate::samples(channels).segments {
-        stream.restart();
-        for k in segment.clone() {
-            let pushed = stream.push(channels.dx_m[k], channels.load_n[k]);
-            let step = pushed.map_err(|e| Diagnostic::new("estimate_failed", e))?;
-            (motion[0][k], motion[1][k]) = (step.x[0], step.x[1]);
-        }
-    }
-    Ok(motion)
 }
 
 /// Speed of the motor at the screw axis, m/s: central difference over two steps; NaN at the ends of a segment and

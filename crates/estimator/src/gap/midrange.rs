@@ -67,7 +67,7 @@ pub fn estimate_with(
     s_m: &mut Vec<f64>,
 ) -> Result<MidRangeEstimate, Error> {
     let load = load_band::load_band(samples.load_n, samples.segments);
-    let nis = schedule.filter_with(samples, None, s_m)?;
+    let nis = schedule.track(samples, s_m)?;
     let gap = statistic::mid_range(s_m)?;
     let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRangeEstimate { gap, load, nis, samples: gap.upper + gap.lower })

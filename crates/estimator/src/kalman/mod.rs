@@ -8,7 +8,7 @@ pub(crate) mod nis;
 pub(crate) mod stream;
 
 #[cfg(feature = "std")]
-pub use batch::{FilterOutput, GainSchedule, InnovationBuffers};
+pub use batch::GainSchedule;
 pub use filter::{Filter, FilterStep, InitialVariances, KalmanState};
 #[cfg(feature = "std")]
 pub use nis::Nis;

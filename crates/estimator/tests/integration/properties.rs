@@ -1,23 +1,10 @@
 //! Properties for any input: offset, scale, sign, restarts, missing samples, the configured bandwidth.
 
-use estimator::{ActuatorModel, Error, Filter, FilterStep, InnovationBuffers, Samples, gap};
+use estimator::{ActuatorModel, Error, Filter, FilterStep, GainSchedule, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use crate::sensor_noise;
-
-fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
-    filter_of(&ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap(), step_s, bandwidth_hz)
-}
-
-fn filter_of(actuator: &ActuatorModel, step_s: f64, bandwidth_hz: f64) -> Filter {
-    Filter::new(actuator, step_s, &sensor_noise(bandwidth_hz)).unwrap()
-}
-
-fn track(filter: &Filter, dx_m: &[f64], load_n: &[f64], segments: &[std::ops::Range<usize>]) -> Vec<f64> {
-    let samples = Samples { step_s: 0.004, motor_m: dx_m, dx_m, load_n, segments };
-    filter.track(&samples, None).unwrap().s_m
-}
+use crate::{batch, filter, samples_of, sensor_noise, track};
 
 /// Equations 24 to 28 taken one sample at a time, from the first measured position on.
 fn single_steps<'a>(
@@ -38,7 +25,7 @@ fn single_steps<'a>(
 #[test]
 fn the_configured_bandwidth_is_reached() {
     for rate_hz in [100.0, 250.0, 1000.0] {
-        let got = filter(f64::recip(rate_hz), 10.0).bandwidth_hz().unwrap();
+        let got = filter(rate_hz, 10.0).bandwidth_hz().unwrap();
         assert!((got / 10.0 - 1.0).abs() < 0.1, "{got} Hz at {rate_hz} Hz");
     }
 }
@@ -91,7 +78,7 @@ fn no_settings_keep_a_filter_from_ending() {
                 let Ok(actuator) = ActuatorModel::linear(stiffness, 2000.0, mass) else { continue };
                 let noise = sensor_noise(10.0);
                 if let Ok(filter) = Filter::new(&actuator, step_s, &noise) {
-                    let _ = estimator::GainSchedule::new(&filter).bandwidth_hz();
+                    let _ = GainSchedule::new(&filter).bandwidth_hz();
                 }
             }
         }
@@ -142,22 +129,24 @@ proptest! {
         dx in vec(-1e-4..1e-4, 4000), load in vec(-8e3..8e3, 4000),
         (cut, missing) in (1500..2500_usize, vec(0..4000_usize, 0..4)),
     ) {
-        let f = filter(0.004, 10.0);
+        let f = filter(250.0, 10.0);
         let mut dx = dx;
         missing.iter().filter(|&&k| k != 0 && k != cut).for_each(|&k| dx[k] = f64::NAN);
         let segments = [0..cut, cut..dx.len()];
-        let samples = Samples { step_s: 0.004, motor_m: &dx, dx_m: &dx, load_n: &load, segments: &segments };
-        let mut found = InnovationBuffers::default();
-        let tracked = f.track(&samples, Some(&mut found)).unwrap();
-        prop_assert_eq!(&tracked.s_m, &f.track(&samples, None).unwrap().s_m);
+        let mut found = Vec::new();
+        let samples = samples_of(&dx, &load, &segments);
+        GainSchedule::new(&f).for_each_step(&samples, |k, step| found.push((k, *step))).unwrap();
+        let mut found = found.into_iter();
         for segment in segments {
             let steps = single_steps(&f, &dx[segment.clone()], &load[segment.clone()]);
             for (k, step) in segment.zip(steps) {
-                prop_assert!((tracked.s_m[k] - step.posterior.x[2]).abs() < 1e-11, "S in row {}", k);
-                prop_assert_eq!(found.innovation_m[k].is_nan(), dx[k].is_nan(), "row {}", k);
-                let off_m = (found.innovation_m[k] - step.innovation_m).abs();
+                let (at, found) = found.next().unwrap();
+                prop_assert_eq!(at, k);
+                prop_assert!((found.s_m() - step.posterior.x[2]).abs() < 1e-11, "S in row {}", k);
+                prop_assert_eq!(found.innovation_m.is_nan(), dx[k].is_nan(), "row {}", k);
+                let off_m = (found.innovation_m - step.innovation_m).abs();
                 prop_assert!(dx[k].is_nan() || off_m < 1e-11, "innovation in row {}: {:e}", k, off_m);
-                let ratio = found.variance_m2[k] / step.innovation_variance_m2;
+                let ratio = found.innovation_variance_m2 / step.innovation_variance_m2;
                 prop_assert!((ratio - 1.0).abs() < 1e-6, "variance in row {}: {}", k, ratio);
             }
         }
@@ -168,11 +157,10 @@ proptest! {
     fn the_track_is_linear_in_position_and_load_together(
         one in vec((-1e-4..1e-4, -8e3..8e3), 200), other in vec((-1e-4..1e-4, -8e3..8e3), 200), scale in -3.0..3.0,
     ) {
-        let f = filter(0.004, 10.0);
-        let whole = 0..one.len();
+        let f = filter(250.0, 10.0);
         let track_of = |pairs: &[(f64, f64)]| {
             let (dx, load): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
-            track(&f, &dx, &load, std::slice::from_ref(&whole))
+            batch(&f, &dx, &load)
         };
         let sum: Vec<(f64, f64)> =
             one.iter().zip(&other).map(|(a, b): (&(f64, f64), &(f64, f64))| (a.0 + scale * b.0, a.1 + scale * b.1)).collect();
@@ -188,11 +176,11 @@ proptest! {
     fn the_track_is_invariant_to_shifts_of_position_and_time(
         dx in vec(-1e-4..1e-4, 50..200), load in vec(-8e3..8e3, 200), offset_m in -1e-3..1e-3, later in 1..500_usize,
     ) {
-        let f = filter(0.004, 10.0);
-        let (load, whole) = (&load[..dx.len()], 0..dx.len());
-        let plain = track(&f, &dx, load, std::slice::from_ref(&whole));
+        let f = filter(250.0, 10.0);
+        let load = &load[..dx.len()];
+        let plain = batch(&f, &dx, load);
         let moved: Vec<f64> = dx.iter().map(|x| x + offset_m).collect();
-        for (moved, plain) in track(&f, &moved, load, std::slice::from_ref(&whole)).iter().zip(&plain) {
+        for (moved, plain) in batch(&f, &moved, load).iter().zip(&plain) {
             prop_assert!(f64::abs(moved - plain - offset_m) < 1e-12);
         }
         let padded = [vec![1e-5; later], dx.clone()].concat();
@@ -264,9 +252,8 @@ proptest! {
     fn missing_samples_never_poison_the_track(dx in vec(prop_oneof![5 => (-1e-4..1e-4).boxed(), 1 => Just(f64::NAN).boxed()], 300..900)) {
         prop_assume!(dx.iter().any(|y| !y.is_nan()));
         let load = vec![500.0; dx.len()];
-        let f = filter(0.004, 20.0);
-        let whole = 0..dx.len();
-        let fast = track(&f, &dx, &load, std::slice::from_ref(&whole));
+        let f = filter(250.0, 20.0);
+        let fast = batch(&f, &dx, &load);
         for (k, (step, fast_m)) in single_steps(&f, &dx, &load).zip(&fast).enumerate() {
             let s_m = step.posterior.x[2];
             prop_assert!((s_m - fast_m).abs() < 1e-12 * 1e-4, "row {k}: {s_m} and {fast_m}");
@@ -291,12 +278,11 @@ proptest! {
         let hides = turns > 0.5 && (turns - turns.round()).abs() < 0.01 && ringing_samples > 100.0;
         prop_assume!(!hides);
         let actuator = ActuatorModel::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
-        let f = filter_of(&actuator, ten(-rate_hz), ten(bandwidth_hz));
+        let f = Filter::new(&actuator, ten(-rate_hz), &sensor_noise(ten(bandwidth_hz))).unwrap();
         let load: Vec<f64> = (0..jumps.len()).map(|k| 5e3 * (0.01 * k as f64).sin()).collect();
         let dx: Vec<f64> =
             load.iter().zip(&jumps).map(|(u, jump)| u / ten(stiffness) + 50e-6 * u.signum() + jump).collect();
-        let whole = 0..dx.len();
-        let fast = track(&f, &dx, &load, std::slice::from_ref(&whole));
+        let fast = batch(&f, &dx, &load);
         let peak_m = dx.iter().chain(&fast).fold(0.0, |peak: f64, v| peak.max(v.abs()));
         for (k, (step, fast_m)) in single_steps(&f, &dx, &load).zip(&fast).enumerate() {
             let off_m = (step.posterior.x[2] - fast_m).abs();
@@ -309,10 +295,8 @@ proptest! {
     fn missing_loads_never_poison_the_track(load in vec(prop_oneof![5 => (-8e3..8e3).boxed(), 1 => Just(f64::NAN).boxed()], 300..900)) {
         let dx: Vec<f64> = load.iter().scan(0.0, |last, f| { *last = if f.is_nan() { *last } else { *f }; Some(*last / 5e7) }).collect();
         let held: Vec<f64> = dx.iter().map(|y| y * 5e7).collect();
-        let f = filter(0.004, 20.0);
-        let whole = 0..dx.len();
-        let found = track(&f, &dx, &load, std::slice::from_ref(&whole));
-        let wanted = track(&f, &dx, &held, std::slice::from_ref(&whole));
+        let f = filter(250.0, 20.0);
+        let (found, wanted) = (batch(&f, &dx, &load), batch(&f, &dx, &held));
         for (a, b) in found.iter().zip(&wanted) {
             prop_assert!((a - b).abs() < 1e-15, "{a} is not {b}");
         }
@@ -322,8 +306,7 @@ proptest! {
 /// P₀ moves the first seconds and nothing later: after 1 s two filters of different P₀ agree to 10⁻⁹ of the gap.
 #[test]
 fn the_initial_variances_are_forgotten() {
-    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
-    let filter = Filter::new(&actuator, 1e-3, &sensor_noise(10.0)).unwrap();
+    let filter = filter(1000.0, 10.0);
     let start =
         estimator::InitialVariances { position_m2: Some(1e-6), speed_m2_per_s2: 1.0, backlash_m2: 1e-14 };
     let other = filter.with_initial_variances(start).unwrap();

@@ -1,29 +1,16 @@
 //! The filter and the statistic as the samples come, against the batch that has them all.
 
-use estimator::{ActuatorModel, BoundedGap, Error, Filter, Samples, Stream, StreamingGap, gap};
+use estimator::{BoundedGap, Error, Stream, StreamingGap, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
 
-use crate::sensor_noise;
 use crate::vectors::{SETS, Set};
+use crate::{batch, filter};
 
 /// 256 bins of 2 µm: 4 KiB, for gaps from 30 to 300 µm.
 type Histogram = StreamingGap<256>;
 const BIN_M: f64 = 2e-6;
-
-fn filter(rate_hz: f64, bandwidth_hz: f64) -> Filter {
-    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
-    let noise = sensor_noise(bandwidth_hz);
-    Filter::new(&actuator, rate_hz.recip(), &noise).unwrap()
-}
-
-fn batch(filter: &Filter, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
-    let whole = 0..dx_m.len();
-    let segments = std::slice::from_ref(&whole);
-    let samples = Samples { step_s: 0.004, motor_m: dx_m, dx_m, load_n, segments };
-    filter.track(&samples, None).unwrap().s_m
-}
 
 fn streamed(mut stream: Stream, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
     dx_m.iter().zip(load_n).map(|(y, u)| stream.push(*y, *u).unwrap().s_m()).collect()

@@ -4,11 +4,11 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use estimator::SensorNoise;
-use estimator::{ActuatorModel, Filter, NoiseModel, Samples, gap};
+use estimator::{ActuatorModel, Filter, NoiseModel, SensorNoise, gap};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
+use crate::batch;
 use crate::parquet_fixture::columns;
 
 pub(crate) const SETS: [&str; 4] =
@@ -205,19 +205,11 @@ fn the_batch_and_the_gap_agree() {
             continue; // In radians, with a P₀ of its own: covered step by step above.
         }
         let (y, u) = (&set.columns["y"], &set.columns["u"]);
-        let whole = 0..y.len();
-        let samples = Samples {
-            step_s: set.step_s(),
-            motor_m: y,
-            dx_m: y,
-            load_n: u,
-            segments: std::slice::from_ref(&whole),
-        };
-        let track = set.filter(&set.as_given()).track(&samples, None).unwrap();
+        let s_m = batch(&set.filter(&set.as_given()), y, u);
         let mut worst = Worst::default();
-        (0..y.len()).for_each(|k| worst.state(&set, "x_filt_2", k, track.s_m[k]));
+        (0..y.len()).for_each(|k| worst.state(&set, "x_filt_2", k, s_m[k]));
         assert!(worst.state < 1e-10, "{name}: S off by {:e} of the peak", worst.state);
-        let found = gap::mid_range(&track.s_m).unwrap();
+        let found = gap::mid_range(&s_m).unwrap();
         assert!((found.gap_m / set.number("gap") - 1.0).abs() < 1e-10, "{name}: gap {found:?}");
         let count = |key: &str| set.json[key].as_u64().unwrap() as usize;
         assert_eq!((found.upper, found.lower), (count("n_upper"), count("n_lower")), "{name}");
