@@ -20,7 +20,6 @@ pub mod gap;
 mod kalman;
 pub mod model;
 mod samples;
-mod simd;
 
 #[cfg(feature = "std")]
 pub use contact::ContactEstimate;

@@ -1,15 +1,13 @@
 //! Order statistics of a channel or of residuals.
 
-use crate::gap::statistic::extremes;
+use crate::gap::statistic::range;
 
 /// Size of a subsample that shows a range, a sign, or the usual step of a channel.
 pub(crate) const LOOKS: usize = 4000;
 
 /// Middle and half length of what values span; a negative length where there are none.
 pub(crate) fn middle_and_half(values: &[f64]) -> (f64, f64) {
-    let (low, high) = extremes(values);
-    let low = low.into_iter().fold(f64::INFINITY, f64::min);
-    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = range(values);
     (0.5 * (low + high), 0.5 * (high - low))
 }
 

@@ -2,10 +2,6 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
-
-use crate::simd::pad_with_nan;
-
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
 
@@ -44,109 +40,50 @@ pub(crate) fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     changes
 }
 
-/// Loads that are counted together, so that counts of two or more quantiles are vectorized.
-const BLOCK: usize = 64;
 /// Loads that brackets are laid by.
 const SUBSAMPLE_SIZE: usize = 2048;
-/// Fewer loads for each of those are put in order at once.
-const WORTH_LOOKING: usize = 16;
 /// Half width of a bracket in the order of those loads: five standard deviations of a rank, or somewhat more.
 const HALF_BRACKET: usize = 50;
 
 /// Quantiles: elements, no interpolation. `None` without a load; NaN is skipped.
 ///
-/// Only the loads near each quantile are sorted, in brackets from a subsample; where a bracket misses its
-/// quantile, all loads are.
+/// Only the loads near each quantile are put in order, in brackets from a subsample; where a bracket misses its quantile,
+/// and where loads are few, all are.
 pub(crate) fn quantiles<const N: usize>(
     load_n: &[f64],
     segments: &[Range<usize>],
     shares: [f64; N],
 ) -> Option<[f64; N]> {
-    let present = |s: &Range<usize>| load_n[s.clone()].iter().copied().filter(|f| !f.is_nan());
-    let in_order = || {
-        let mut all: Vec<f64> = segments.iter().flat_map(present).collect();
-        let last = all.len().checked_sub(1)?;
-        Some(shares.map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1))
-    };
+    let loads = || segments.iter().flat_map(|segment| load_n[segment.clone()].iter().copied());
+    let present = || loads().filter(|f| !f.is_nan());
+    let last = present().count().checked_sub(1)?;
     let stride = segments.iter().map(Range::len).sum::<usize>() / SUBSAMPLE_SIZE + 1;
-    if stride < WORTH_LOOKING {
-        return in_order();
-    }
-    let every = |s: &Range<usize>| load_n[s.clone()].iter().step_by(stride).copied();
-    let mut subsample: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
-    subsample.sort_unstable_by(f64::total_cmp);
-    let mut brackets = shares.map(|share| QuantileBracket::about(share, &subsample));
-    let count: usize =
-        segments.iter().map(|segment| count_into_brackets(&load_n[segment.clone()], &mut brackets)).sum();
-    let last = count.checked_sub(1)?;
-    let found = brackets.map(|bracket| bracket.quantile(last));
-    if found.iter().all(Option::is_some) { Some(found.map(Option::unwrap_or_default)) } else { in_order() }
-}
-
-/// Shows loads to all brackets, and counts those that are there.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn count_into_brackets<const N: usize>(load_n: &[f64], brackets: &mut [QuantileBracket; N]) -> usize {
-    let (blocks, rest) = load_n.as_chunks::<BLOCK>();
-    let mut there = 0_u64;
-    for block in blocks.iter().chain([&pad_with_nan(rest)]) {
-        for f in block {
-            there += u64::from(!f.is_nan());
-        }
-        for bracket in brackets.iter_mut() {
-            bracket.take(block);
-        }
-    }
-    there as usize
+    let in_brackets = || {
+        let every = segments.iter().flat_map(|s| load_n[s.clone()].iter().step_by(stride).copied());
+        let mut subsample: Vec<f64> = every.filter(|f| !f.is_nan()).collect();
+        subsample.sort_unstable_by(f64::total_cmp);
+        let found = shares.map(|share| {
+            let at = rank(subsample.len().checked_sub(1)?, share);
+            let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| subsample[k]);
+            let greatest = subsample.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
+            let below = loads().filter(|f| *f < least).count();
+            let mut within: Vec<f64> = loads().filter(|f| (least..=greatest).contains(f)).collect();
+            let at = rank(last, share).checked_sub(below)?;
+            (at < within.len()).then(|| *within.select_nth_unstable_by(at, f64::total_cmp).1)
+        });
+        found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
+    };
+    let in_order = || {
+        let mut all: Vec<f64> = present().collect();
+        shares.map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1)
+    };
+    // Brackets of less than sixteen times the subsample save nothing.
+    Some((stride >= 16).then(in_brackets).flatten().unwrap_or_else(in_order))
 }
 
 /// Where a share of the order lies, counted from zero to the last.
 fn rank(last: usize, share: f64) -> usize {
     (last as f64 * share).round() as usize
-}
-
-/// Loads about a quantile, and how many lie below them.
-#[derive(Debug)]
-struct QuantileBracket {
-    share: f64,
-    least: f64,
-    greatest: f64,
-    below: u64,
-    within: Vec<f64>,
-}
-
-impl QuantileBracket {
-    fn about(share: f64, subsample: &[f64]) -> Self {
-        let at = rank(subsample.len().saturating_sub(1), share);
-        let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| subsample[k]);
-        let greatest = subsample.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
-        Self { share, least, greatest, below: 0, within: Vec::new() }
-    }
-
-    #[inline(always)]
-    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
-    fn take(&mut self, block: &[f64; BLOCK]) {
-        let (mut below, mut not_above) = (0_u64, 0_u64);
-        for &f in block {
-            below += u64::from(f < self.least);
-            not_above += u64::from(f <= self.greatest);
-        }
-        self.below += below;
-        if not_above > below {
-            self.keep(block);
-        }
-    }
-
-    /// Few blocks have something to keep.
-    #[inline(never)]
-    fn keep(&mut self, block: &[f64; BLOCK]) {
-        self.within.extend(block.iter().filter(|f| **f >= self.least && **f <= self.greatest));
-    }
-
-    /// `None` where it is outside the bracket.
-    fn quantile(mut self, last: usize) -> Option<f64> {
-        let at = rank(last, self.share).checked_sub(self.below as usize)?;
-        (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
-    }
 }
 
 #[cfg(test)]

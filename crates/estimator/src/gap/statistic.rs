@@ -4,7 +4,6 @@
 use multiversion::multiversion;
 
 use crate::error::Error;
-use crate::simd::pad_with_nan;
 
 /// ΔS and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +62,10 @@ pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
     })
 }
 
+/// `multiversion` compiles the loops below for each kind of vectors and chooses one when the program runs. Vectors change no
+/// result: each lane runs the same operations in the same order as scalar code, and no product is fused with a sum. So
+/// results are bitwise identical on every machine, and records do not hold the instruction set.
+///
 /// Chains side by side: a sum waits for the addition before it, and eight wait at once. The order of additions is
 /// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
 const CHAINS: usize = 8;
@@ -87,14 +90,14 @@ fn halves(s_m: &[f64], level_m: f64) -> ([[f64; CHAINS]; 2], [[u64; CHAINS]; 2])
 }
 
 /// Least and greatest; the wrong way round where there is no sample.
-fn range(s_m: &[f64]) -> (f64, f64) {
+pub(crate) fn range(s_m: &[f64]) -> (f64, f64) {
     let (least, greatest) = extremes(s_m);
     (least.into_iter().fold(f64::INFINITY, f64::min), greatest.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Least and greatest of each chain.
 #[cfg_attr(feature = "std", multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2")))]
-pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
+fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
     let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
     let (eights, rest) = s_m.as_chunks::<CHAINS>();
     for eight in eights.iter().chain([&pad_with_nan(rest)]) {
@@ -104,4 +107,13 @@ pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
         }
     }
     (least, greatest)
+}
+
+/// Up to eight samples, filled up with NaN, which no sum, count or extreme takes in.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
+fn pad_with_nan(s_m: &[f64]) -> [f64; CHAINS] {
+    let mut all = [f64::NAN; CHAINS];
+    all[..s_m.len()].copy_from_slice(s_m);
+    all
 }
