@@ -23,6 +23,11 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// Standard deviation of normal values about zero, from the median of their sizes.
+pub(crate) fn spread(values: impl Iterator<Item = f64>) -> f64 {
+    MAD * median(&mut values.map(f64::abs).collect::<Vec<f64>>())
+}
+
 /// Rms of the second difference of a channel, which slow loads do not show.
 pub(crate) fn second_difference_rms(values: &[f64]) -> f64 {
     let (mut squares, mut count) = (0.0, 0_usize);

@@ -11,7 +11,7 @@ use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
-use crate::contact::stats::{MAD, median};
+use crate::contact::stats::spread;
 
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
@@ -91,9 +91,9 @@ impl<'a> ParameterSearch<'a> {
             let friction = Friction { dry_n: dry * self.scaling.load_n, lost_share };
             match self.search(FrictionState { friction, ..start(self.scaling) }, 3) {
                 Ok(result) => {
-                    let mut sizes_m: Vec<f64> = Vec::new();
-                    self.each_residual(&result, result.at.load_zero_n, |e_m| sizes_m.push(e_m.abs()));
-                    self.scale_m = self.scale_m.min((MAD * median(&mut sizes_m)).max(1e-9));
+                    let mut residuals_m: Vec<f64> = Vec::new();
+                    self.each_residual(&result, result.at.load_zero_n, |e_m| residuals_m.push(e_m));
+                    self.scale_m = self.scale_m.min(spread(residuals_m.into_iter()).max(1e-9));
                     found.push(result);
                 }
                 Err(why) => rejection = why,

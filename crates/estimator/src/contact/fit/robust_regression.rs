@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::contact::fit::design_matrix::{DesignRow, dot};
-use crate::contact::stats::{MAD, median};
+use crate::contact::stats::spread;
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
@@ -59,7 +59,7 @@ pub(crate) fn fit<const N: usize>(
     let mut found = solve(rows, beliefs, even.clone(), hint)?;
     for round in 1..=rounds {
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
-        let spread_m = spread_m(&residuals_m);
+        let spread_m = spread(residuals_m.iter().copied()).max(LEAST_SPREAD_M);
         let weights: Vec<f64> = even
             .iter()
             .zip(&residuals_m)
@@ -84,28 +84,34 @@ fn trust(deviation: f64, last: bool) -> f64 {
     }
 }
 
-fn spread_m(residuals_m: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = residuals_m.iter().map(|e| e.abs()).collect();
-    (MAD * median(&mut sizes)).max(LEAST_SPREAD_M)
-}
-
 /// Residual variance of a row of weight one, inflated by dependence within stretches.
 fn variance_of_a_row<const N: usize>(rows: &[DesignRow<N>], weights: &[f64], residuals_m: &[f64]) -> f64 {
-    let (mut alone, mut together, mut sum, mut total) = (0.0, 0.0, 0.0, 0.0);
-    let mut stretch = None;
-    for ((row, w), e) in rows.iter().zip(weights).zip(residuals_m) {
-        if stretch != Some(row.stretch) {
-            together += sum * sum;
-            (stretch, sum) = (Some(row.stretch), 0.0);
-        }
-        sum += w * e;
+    let (together, _) = squares_of_stretches(rows, weights.iter().zip(residuals_m).map(|(w, e)| w * e));
+    let (mut alone, mut total, mut size) = (0.0, 0.0, 0.0);
+    for (w, e) in weights.iter().zip(residuals_m) {
         alone += w * w * e * e;
         total += w;
+        size += w * e * e;
     }
-    together += sum * sum;
-    let size: f64 = weights.iter().zip(residuals_m).map(|(w, e)| w * e * e).sum();
     let inflation = if alone > 0.0 { (together / alone).max(1.0) } else { 1.0 };
     (size / total).max(LEAST_SPREAD_M * LEAST_SPREAD_M) * inflation
+}
+
+/// Σ over stretches of the square of Σ of the numbers of a stretch's rows, and how many stretches there are.
+fn squares_of_stretches<const N: usize>(
+    rows: &[DesignRow<N>],
+    numbers: impl Iterator<Item = f64>,
+) -> (f64, usize) {
+    let (mut total, mut sum, mut stretches, mut stretch) = (0.0, 0.0, 0, None);
+    for (row, number) in rows.iter().zip(numbers) {
+        if stretch != Some(row.stretch) {
+            total += sum * sum;
+            (stretch, sum) = (Some(row.stretch), 0.0);
+            stretches += 1;
+        }
+        sum += number;
+    }
+    (total + sum * sum, stretches)
 }
 
 /// Rows that stay in the first cache while every column takes them in.
@@ -229,17 +235,8 @@ impl<const N: usize> RobustFit<N> {
         let influence: [f64; N] = std::array::from_fn(|i| {
             terms.iter().map(|&(column, weight)| weight * self.inverse[(column, i)]).sum()
         });
-        let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
-        let mut stretch = None;
-        for (row, w) in rows.iter().zip(&self.weights) {
-            if stretch != Some(row.stretch) {
-                total += sum * sum;
-                (stretch, sum) = (Some(row.stretch), 0.0);
-                stretches += 1;
-            }
-            sum += w * self.residual_m(row) * dot(&influence, &row.x);
-        }
-        total += sum * sum;
+        let moved = |(row, w): (&DesignRow<N>, &f64)| w * self.residual_m(row) * dot(&influence, &row.x);
+        let (total, stretches) = squares_of_stretches(rows, rows.iter().zip(&self.weights).map(moved));
         let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);
         let lent = |i: usize| {
             if self.beliefs[i].sd.is_finite() {

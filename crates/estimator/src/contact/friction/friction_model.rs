@@ -93,14 +93,11 @@ pub(crate) struct Drive {
 /// Constants of an integration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CouplingParams {
+    state: FrictionState,
     compliance_m_per_n: f64,
-    bristle_m_per_n: f64,
     /// 1/(1/K + a).
     held_n_per_m: f64,
     half_gap_m: f64,
-    friction: Friction,
-    stribeck: f64,
-    load_zero_n: f64,
     motor_sense: f64,
 }
 
@@ -122,13 +119,10 @@ impl CouplingParams {
     pub(crate) fn new(state: &FrictionState, motor_sense: f64) -> Self {
         let compliance_m_per_n = state.stiffness_n_per_m.recip();
         Self {
+            state: *state,
             compliance_m_per_n,
-            bristle_m_per_n: state.bristle_m_per_n,
             held_n_per_m: (compliance_m_per_n + state.bristle_m_per_n).recip(),
             half_gap_m: 0.5 * state.gap_m,
-            friction: state.friction,
-            stribeck: state.stribeck,
-            load_zero_n: state.load_zero_n,
             motor_sense,
         }
     }
@@ -137,15 +131,15 @@ impl CouplingParams {
     /// several screws can be integrated in parallel lanes.
     #[inline(always)]
     pub(crate) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
-        let load_n = drive.load_n - self.load_zero_n;
+        let load_n = drive.load_n - self.state.load_zero_n;
         let anchor_m = before.anchor_m - self.motor_sense * (drive.motor_m - before.motor_m);
-        let free_m = anchor_m + self.bristle_m_per_n * load_n;
+        let free_m = anchor_m + self.state.bristle_m_per_n * load_n;
         let above_m = if free_m < -self.half_gap_m { -self.half_gap_m } else { free_m };
         let inside_m = if above_m > self.half_gap_m { self.half_gap_m } else { above_m };
         let held_n = self.held_n_per_m * (free_m - inside_m);
         let size_n = load_n.abs();
-        let level_n = self.friction.dry_n + self.friction.lost_share * size_n;
-        let excess = 1.0 + self.stribeck * drive.slowness;
+        let level_n = self.state.friction.at_n(load_n);
+        let excess = 1.0 + self.state.stribeck * drive.slowness;
         let friction_n = level_n * excess;
         let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
         let (is_low, is_high) = (held_n < low_n, held_n > high_n);
@@ -159,7 +153,7 @@ impl CouplingParams {
         for (kept, now) in memory.iter_mut().zip(slipping) {
             *kept = if has_slipped { now } else { *kept };
         }
-        let bent_m = self.bristle_m_per_n * (load_n - force_n);
+        let bent_m = self.state.bristle_m_per_n * (load_n - force_n);
         let relative_m = if has_slipped { self.relative_m(force_n) } else { anchor_m + bent_m };
         ScrewState {
             motor_m: drive.motor_m,
@@ -190,7 +184,7 @@ impl CouplingParams {
 
     /// The screw at the start of a segment: at rest, its friction unknown.
     fn rest(&self, drive: Drive) -> ScrewState {
-        let force_n = drive.load_n - self.load_zero_n;
+        let force_n = drive.load_n - self.state.load_zero_n;
         let relative_m = self.relative_m(force_n);
         ScrewState {
             motor_m: drive.motor_m,
