@@ -103,7 +103,10 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
         let outcome = contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))?;
         let degrees = |length_m: Option<f64>| length_m.map_or(f64::NAN, |m| (m / RADIUS_M).to_degrees());
         let found = outcome.ok();
-        let lengths_m = [found.as_ref().map(|found| found.gap_m), found.and_then(|found| found.loop_width_m)];
+        let lengths_m = [
+            found.as_ref().map(|found| found.gap_m),
+            found.and_then(|found| found.loop_width_m).map(|width| width.0),
+        ];
         Ok::<[f64; 2], String>(lengths_m.map(degrees))
     };
     let [[small_gap, small_loop], [whole_gap, whole_loop]] = [regression(parts[0])?, regression(parts[1])?];

@@ -15,8 +15,8 @@ pub(crate) fn flags(
     frame: &Scaling,
     part_stiffness_n_per_m: f64,
     is_soft: bool,
-    agrees: bool,
 ) -> Vec<QualityFlag> {
+    let agrees = agrees_with_midrange(found, frame.unknown_force_n);
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
@@ -34,4 +34,16 @@ pub(crate) fn flags(
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()
+}
+
+/// Whether the published statistic at the fitted parameters agrees with the gap as far as its own errors go.
+///
+/// That statistic reads friction as backlash, about twice F_f/K, a gap of zero as the unknown force over K, and under
+/// vibration of the load up to a third too little.
+fn agrees_with_midrange(found: &ContactEstimate, unknown_force_n: f64) -> bool {
+    let Some(midrange_m) = found.midrange_at_fit_m else { return true };
+    let larger_m = midrange_m.abs().max(found.gap_m.abs());
+    let force_n = found.friction_n() + 2.0 * unknown_force_n;
+    let allowed_m = 0.35 * larger_m + 2.0 * force_n / found.stiffness_n_per_m + 3.0 * found.gap_se_m;
+    (midrange_m - found.gap_m).abs() <= allowed_m
 }

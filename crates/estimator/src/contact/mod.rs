@@ -159,7 +159,7 @@ fn report(
     prior: &PartPrior,
     contact: &FlankFit,
     midrange_at_fit_m: Option<f64>,
-    loop_width: Option<(f64, f64)>,
+    loop_width_m: Option<(f64, f64)>,
 ) -> ContactEstimate {
     let preload_n = lost_motion::preload_n(contact);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
@@ -170,8 +170,6 @@ fn report(
     let error_m = |terms: &[(usize, f64)]| fit.standard_error_of_sum_m(terms, &design.firm);
     // A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
     let friction_error_n = |terms: &[(usize, f64)]| error_m(terms) / compliance;
-    let lost_motion =
-        prior.reference_load_n.and_then(|load_n| lost_motion::lost_motion_m(contact, frame, load_n));
     let mut found = ContactEstimate {
         gap_m,
         gap_se_m,
@@ -192,16 +190,13 @@ fn report(
         },
         gap_profile: contact.profile.as_ref().map(|profile| profile.places.clone()).unwrap_or_default(),
         preload_n,
-        loop_width_m: loop_width.map(|(m, _)| m),
-        loop_width_se_m: loop_width.map(|(_, se_m)| se_m),
-        lost_motion_m: lost_motion.map(|(m, _)| m),
-        lost_motion_se_m: lost_motion.map(|(_, se_m)| se_m),
+        loop_width_m,
+        lost_motion_m: prior.reference_load_n.and_then(|n| lost_motion::lost_motion_m(contact, frame, n)),
         touched_s: design.touched_s,
         load_p95_n: frame.load_n,
         midrange_at_fit_m,
         flags: Vec::new(),
     };
-    let agrees = found.agrees_with_midrange(frame.unknown_force_n);
-    found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft, agrees);
+    found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft);
     found
 }

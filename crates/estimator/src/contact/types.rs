@@ -17,7 +17,7 @@ pub(crate) const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 pub(crate) const DETECTION_SHARE: f64 = 0.01;
 
 /// What is known of the part before its flight is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartPrior {
     /// K of the part number, N/m; believed to 15 %.
     pub stiffness_n_per_m: f64,
@@ -35,13 +35,7 @@ pub struct PartPrior {
 impl PartPrior {
     /// A part of which only the stiffness is known, N/m.
     pub fn of_stiffness(stiffness_n_per_m: f64) -> Self {
-        Self {
-            stiffness_n_per_m,
-            reference_load_n: None,
-            unknown_force_n: None,
-            period_m: None,
-            output_locked: false,
-        }
+        Self { stiffness_n_per_m, ..Self::default() }
     }
 }
 
@@ -102,15 +96,11 @@ pub struct ContactEstimate {
     pub gap_profile: Vec<GapAtPlace>,
     /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N.
     pub preload_n: Option<(f64, f64)>,
-    /// Width of the loop of δX against the load at zero load, m: gap and friction wind-up together, measured rather than
-    /// extrapolated. On soft flanks the gap in it is narrower.
-    pub loop_width_m: Option<f64>,
-    /// Its standard error, m.
-    pub loop_width_se_m: Option<f64>,
-    /// Relative travel between + and − the reference load, m, from samples near it.
-    pub lost_motion_m: Option<f64>,
-    /// Its standard error, m.
-    pub lost_motion_se_m: Option<f64>,
+    /// Width of the loop of δX against the load at zero load and its standard error, m: gap and friction wind-up together,
+    /// measured rather than extrapolated. On soft flanks the gap in it is narrower.
+    pub loop_width_m: Option<(f64, f64)>,
+    /// Relative travel between + and − the reference load and its standard error, m, from samples near it.
+    pub lost_motion_m: Option<(f64, f64)>,
     /// Time in contact on the upper and on the lower flank, s.
     pub touched_s: (f64, f64),
     /// Load magnitude that one sample in twenty exceeds, N.
@@ -134,17 +124,5 @@ impl ContactEstimate {
     /// Friction at the 95 % load, N.
     pub fn friction_n(&self) -> f64 {
         self.friction.at_n(self.load_p95_n)
-    }
-
-    /// Whether the published statistic at the fitted parameters agrees with the gap as far as its own errors go.
-    ///
-    /// That statistic reads friction as backlash, about twice F_f/K, a gap of zero as the unknown force over K, and under
-    /// vibration of the load up to a third too little.
-    pub(crate) fn agrees_with_midrange(&self, unknown_force_n: f64) -> bool {
-        let Some(midrange_m) = self.midrange_at_fit_m else { return true };
-        let larger_m = midrange_m.abs().max(self.gap_m.abs());
-        let force_n = self.friction_n() + 2.0 * unknown_force_n;
-        let allowed_m = 0.35 * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
-        (midrange_m - self.gap_m).abs() <= allowed_m
     }
 }

@@ -1,7 +1,7 @@
 //! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
 
 use crate::contact::blocks::block_means::BlockMeans;
-use crate::contact::fit::scaling::Scaling;
+use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::Coupling;
 
@@ -140,7 +140,7 @@ impl RowSource<'_> {
         let place = scaling.place_share(blocks.motor_m[k] + blocks.dx_m[k]);
         let [sine, cosine] = blocks.phases.get(k).copied().unwrap_or_default();
         [
-            rate(&blocks.motor_m) * scaling.per_speed,
+            rate(&blocks.motor_m) * SPEED_M_PER_S.recip(),
             rate(&blocks.load_n) * scaling.per_load_rate,
             time,
             time * time,

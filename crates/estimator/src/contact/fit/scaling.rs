@@ -37,8 +37,7 @@ pub(crate) struct Scaling {
     pub(crate) per_load: f64,
     pub(crate) per_place: f64,
     pub(crate) per_time: f64,
-    /// What brings a speed to its column, s/m, and the load's rate, s/N.
-    pub(crate) per_speed: f64,
+    /// What brings the load's rate to its column, s/N.
     pub(crate) per_load_rate: f64,
     /// Length of a row, s.
     pub(crate) row_s: f64,
@@ -75,7 +74,6 @@ impl Scaling {
             // A locked screw shows nothing of its transducer.
             per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },
             per_time: time_s.1.recip(),
-            per_speed: SPEED_M_PER_S.recip(),
             per_load_rate: LATE_S / load_n,
             // A flight without a break has 10,000 rows at most.
             row_s: (2.0 * time_s.1 / 10_000.0).clamp(0.1, SEARCH_ROW_S),

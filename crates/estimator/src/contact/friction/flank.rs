@@ -7,17 +7,14 @@ pub(crate) const FIRM_SHARE: f64 = 0.12;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flank {
     /// Pressed by a positive force.
-    Upper,
+    Upper = 1,
     /// Pressed by a negative one.
-    Lower,
+    Lower = -1,
 }
 
 impl Flank {
     /// s, +1 for the upper and −1 for the lower.
     pub fn sign(self) -> f64 {
-        match self {
-            Self::Upper => 1.0,
-            Self::Lower => -1.0,
-        }
+        f64::from(self as i8)
     }
 }
