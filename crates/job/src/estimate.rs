@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use estimator::contact::{self, ContactEstimate, ContactPlot, GapAtPlace, PartPrior, Rejection};
-use estimator::{Filter, GainSchedule, MidRangeEstimate, Samples, midrange};
+use estimator::{Filter, GainSchedule, GapStatistic, MidRangeEstimate, Samples, gap, midrange};
 use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
 
@@ -126,6 +126,21 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
     Filter::new(&part.actuator, channels.step_s, &part.noise)
         .and_then(|filter| filter.with_initial_variances(part.initial))
         .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
+}
+
+/// S(t) of a log, m, NaN outside the segments, and the published statistic of it, where it moves.
+///
+/// # Errors
+/// As [`filter`], and when the channels are no input of it.
+pub fn filter_output(
+    channels: &ActuatorChannels,
+    part: &Part,
+) -> Result<(Vec<f64>, Option<GapStatistic>), Diagnostic> {
+    let mut s_m = Vec::new();
+    let schedule = GainSchedule::new(&filter(channels, part)?);
+    schedule.track(&samples(channels), &mut s_m).map_err(|e| Diagnostic::new("estimate_failed", e))?;
+    let midrange = gap::mid_range(&s_m).ok();
+    Ok((s_m, midrange))
 }
 
 /// Plot data of the contact regression; `None` where it rejects the flight.

@@ -262,7 +262,7 @@ pub(crate) fn for_each_unidentified(
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.
-pub(crate) fn for_each_actuator(
+pub fn for_each_actuator(
     files: &LogFiles,
     display_name: &str,
     config: &Config,

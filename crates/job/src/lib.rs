@@ -5,7 +5,6 @@
 
 pub mod config;
 pub mod estimate;
-pub mod estimate_plot_data;
 pub mod filter_cache;
 pub mod flight_log;
 pub mod normalize;

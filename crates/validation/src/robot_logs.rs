@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use ingest::LogFiles;
-use job::Config;
-use job::estimate_plot_data::EstimatePlot;
-use records::{Installations, PartNumber};
+use ingest::{ActuatorChannels, LogFiles};
+use job::flight_log::for_each_actuator;
+use job::{Config, Part, estimate};
+use records::{Diagnostic, Installations, PartNumber};
 
 use crate::methods::{load_lines_m, spread_m};
 
@@ -28,7 +28,7 @@ pub fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
     Ok(rows)
 }
 
-fn join_diagnostics(diagnostics: &[records::Diagnostic]) -> String {
+fn join_diagnostics(diagnostics: &[Diagnostic]) -> String {
     diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
@@ -36,13 +36,18 @@ fn estimate_log(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<Robot
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
-    let looks = job::estimate_plot_data::of_log(&LogFiles::one(path), &name, config, &none, Some(&number))
-        .map_err(|diagnostic| diagnostic.to_string())?;
-    Ok(looks.iter().map(|look| row(&name, look)).collect())
+    let mut rows = Vec::new();
+    for_each_actuator(&LogFiles::one(path), &name, config, &none, Some(&number), |channels, part| {
+        rows.push(row(&name, channels, part, config)?);
+        Ok(())
+    })
+    .map_err(|diagnostic| diagnostic.to_string())?;
+    Ok(rows)
 }
 
-fn row(log: &str, look: &EstimatePlot) -> RobotRow {
-    let e = &look.estimate;
+fn row(log: &str, channels: &ActuatorChannels, part: &Part, config: &Config) -> Result<RobotRow, Diagnostic> {
+    let e = estimate::estimate(channels, part, &config.document.estimate)?;
+    let (_, midrange) = estimate::filter_output(channels, part)?;
     let cell = |value: f64, digits: usize| {
         if value.is_nan() { "–".to_owned() } else { format!("{value:.digits$}") }
     };
@@ -50,14 +55,14 @@ fn row(log: &str, look: &EstimatePlot) -> RobotRow {
     let degrees = |m: Option<f64>| cell((m.unwrap_or(f64::NAN) / radius_m).to_degrees(), 4);
     let remarks: BTreeSet<&str> = e.reason.iter().chain(&e.flags).map(String::as_str).collect();
     let remarks = remarks.into_iter().collect::<Vec<_>>().join(", ");
-    [
+    Ok([
         log.to_owned(),
         degrees(e.gap_m),
         degrees(e.gap_se_m),
         cell(e.skew_s.map_or(f64::NAN, |s| s * 1e3), 2),
-        degrees(e.gap_midrange_m.or(look.midrange.map(|gap| gap.gap_m))),
-        degrees(Some(load_lines_m(&look.dx_m, &look.load_n))),
-        degrees(Some(spread_m(&look.dx_m))),
+        degrees(e.gap_midrange_m.or(midrange.map(|gap| gap.gap_m))),
+        degrees(Some(load_lines_m(&channels.dx_m, &channels.load_n))),
+        degrees(Some(spread_m(&channels.dx_m))),
         if remarks.is_empty() { "–".to_owned() } else { remarks },
-    ]
+    ])
 }

@@ -13,7 +13,7 @@ use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
-use crate::assess::quantities::follow::{FollowedQuantities, UnitFacts, follow, gap_row};
+use crate::assess::quantities::follow::{FollowedQuantities, UnitFacts, Units, follow, gap_row};
 use crate::assess::quantities::peers;
 use crate::assess::quantities::values;
 use crate::assess::tail_wide_steps::TailWide;
@@ -32,7 +32,7 @@ use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
 use crate::fleet::unit_rows;
-use job::config::{AsOf, QuantityLimits};
+use job::config::AsOf;
 use records::TrendRow;
 
 /// Assessments of units, and steps of the gap that whole tails made.
@@ -289,29 +289,10 @@ pub fn assess_histories(
     Ok(fleet.selected(ask, as_of)?.0)
 }
 
-/// What the followed quantities need to know of units.
-struct Facts<'f, 'a>(&'f FleetContext<'a>);
-
-impl UnitFacts for Facts<'_, '_> {
-    fn series(&self, unit: &UnitKey) -> Option<&Series> {
-        self.0.series(unit)
-    }
-
-    fn flight_id(&self, unit: &UnitKey, departure_us: i64) -> Option<String> {
-        let history = self.0.units.get(unit)?.0;
-        let flown = history.at(Timestamp::from_microsecond(departure_us).ok()?)?;
-        history.flight_id(flown).map(str::to_owned)
-    }
-
-    fn limits(&self, part_number: Option<&str>) -> QuantityLimits {
-        self.0.limits.quantities(part_number)
-    }
-}
-
 /// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
     limits: Limits<'a>,
-    units: BTreeMap<&'a UnitKey, (&'a History, Series)>,
+    units: Units<'a>,
     priors: FleetPriors<'a>,
     /// Followed quantities of all units; nothing for external tables.
     followed: FollowedQuantities,
@@ -388,7 +369,8 @@ impl<'a> FleetContext<'a> {
     /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings; and the
     /// diagnostics of the last months, which show them.
     fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<(Self, RecentDiagnostics), Error> {
-        let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
+        let facts = UnitFacts { units: &self.units, limits: self.limits };
+        let followed = follow(&values::read(store, as_of)?, facts, as_of);
         let moved = recorder_changes(&followed.changes, as_of);
         let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
         for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {

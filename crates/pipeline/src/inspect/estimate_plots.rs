@@ -1,10 +1,10 @@
 //! Diagnostic plots of the estimates of a log: for `estimate --plot` and for the flights of a report.
 
-use ingest::LogFiles;
-use job::Config;
-use job::estimate_plot_data::{self, EstimatePlot};
+use ingest::{ActuatorChannels, LogFiles};
+use job::flight_log::for_each_actuator;
+use job::{Config, Part, estimate};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
-use report::ContactInterval;
+use report::{ContactInterval, EstimatePlot};
 
 /// The plot of every actuator of a log, with its position: as installed, or all as one part.
 ///
@@ -16,37 +16,46 @@ pub fn of_log(
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-) -> Result<Vec<(Position, report::EstimatePlot)>, Diagnostic> {
-    let data = estimate_plot_data::of_log(files, log_path, config, installations, part)?;
-    Ok(data.into_iter().map(|data| (data.position.clone(), plot(log_path, data))).collect())
+) -> Result<Vec<(Position, EstimatePlot)>, Diagnostic> {
+    let mut plots = Vec::new();
+    for_each_actuator(files, log_path, config, installations, part, |channels, part| {
+        plots.push((channels.position.clone(), plot(log_path, channels, part, config)?));
+        Ok(())
+    })?;
+    Ok(plots)
 }
 
-fn plot(log: &str, data: EstimatePlot) -> report::EstimatePlot {
-    let (upper, lower, touches) = match data.picture {
-        Some(picture) => (picture.upper.to_vec(), picture.lower.to_vec(), picture.touches),
-        None => Default::default(),
+fn plot(
+    log: &str,
+    channels: &ActuatorChannels,
+    part: &Part,
+    config: &Config,
+) -> Result<EstimatePlot, Diagnostic> {
+    let (s_m, midrange) = estimate::filter_output(channels, part)?;
+    let estimate = estimate::estimate(channels, part, &config.document.estimate)?;
+    let mut plot = EstimatePlot {
+        title: format!("{} in {log}", channels.position),
+        summary: summary(&estimate),
+        step_s: channels.step_s,
+        breaks: channels.breaks.clone(),
+        bounds_m: midrange.map(|gap| (gap.upper_m, gap.lower_m)),
+        dx_m: channels.dx_m.clone(),
+        load_n: channels.load_n.clone(),
+        s_m,
+        ..EstimatePlot::default()
     };
-    let mut plot = report::EstimatePlot {
-        title: format!("{} in {log}", data.position),
-        summary: summary(&data.estimate),
-        step_s: data.step_s,
-        breaks: data.breaks,
-        contacts: Vec::new(),
-        bounds_m: data.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
-        flanks: [upper, lower],
-        dx_m: data.dx_m,
-        load_n: data.load_n,
-        s_m: data.s_m,
-    };
-    let intervals = touches.into_iter().map(|touch| ContactInterval {
-        time_s: plot.time_s(touch.time_s / plot.step_s),
-        is_upper: touch.flank.sign() > 0.0,
-        is_used: touch.trust.is_some_and(|trust| trust > 0.0),
-        force_n: touch.force_n,
-        dx_m: touch.dx_m,
-    });
-    plot.contacts = intervals.collect();
-    plot
+    if let Some(contact) = estimate::plot_data(channels, part)? {
+        plot.flanks = [contact.upper.to_vec(), contact.lower.to_vec()];
+        let intervals = contact.touches.into_iter().map(|touch| ContactInterval {
+            time_s: plot.time_s(touch.time_s / plot.step_s),
+            is_upper: touch.flank.sign() > 0.0,
+            is_used: touch.trust.is_some_and(|trust| trust > 0.0),
+            force_n: touch.force_n,
+            dx_m: touch.dx_m,
+        });
+        plot.contacts = intervals.collect();
+    }
+    Ok(plot)
 }
 
 /// The estimate in one line.

@@ -1,12 +1,12 @@
 //! Simulated fleets on disk: logs, installations, the truth, and a configuration that reads them.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use ingest::parquet::writer::{Column, write_parquet};
 use jiff::Timestamp;
 use rayon::prelude::*;
 use records::Diagnostic;
+use serde_json::{Map, Value, json};
 use simulator::{
     ActuatorLog, ChannelUnit, LogState, MotorLogFormat, Plan, PlannedFlight, ScrewLogUnit, Spec,
 };
@@ -51,7 +51,7 @@ pub fn simulate(
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<usize, Error> {
     let (logs, tables) = write_data(spec, folder, jobs, watch)?;
-    text(&folder.join("pipeline.toml"), &configuration(spec, &tables))?;
+    text(&folder.join("pipeline.toml"), &configuration(spec, &tables)?)?;
     Ok(logs)
 }
 
@@ -257,111 +257,99 @@ fn truth(plan: &Plan) -> Vec<(String, Column)> {
 }
 
 /// A configuration that reads these logs: nominal parts, the sensors' own facts.
-fn configuration(spec: &Spec, tables: &[&str]) -> String {
-    let tables: Vec<String> = tables.iter().map(|name| format!("{name} = \"{name}.csv\"")).collect();
-    let mut text = HEAD.replace("installations = \"installations.csv\"", &tables.join("\n"));
-    let Some(first) = spec.parts.first() else { return text };
-    text += &channel_tables(first, "channel");
-    for part in &spec.parts[1..] {
+fn configuration(spec: &Spec, tables: &[&str]) -> Result<String, Error> {
+    let facts = ["tail_number", "flight_id", "departure_utc", "flight_hours", "tail_hours_end"];
+    let parts = spec.parts.iter().map(|part| (part.part_number.clone(), part_table(part, spec)));
+    let mut document = json!({
+        "logs": { "files": ["logs/**/*.parquet"] },
+        "store": { "path": "results" },
+        "identity": { "metadata": facts.map(|name| (name.to_owned(), json!(name))).into_iter().collect::<Map<_, _>>() },
+        "clock": { "column": "time_s", "unit": "s" },
+        "part": parts.collect::<Map<_, _>>(),
+    });
+    for name in tables {
+        document["logs"][*name] = json!(format!("{name}.csv"));
+    }
+    if let Some(first) = spec.parts.first() {
+        let usual = channel_tables(first);
         // Parts that are logged in other units are read by other columns.
-        let (own, usual) =
-            (channel_tables(part, "override.channel"), channel_tables(first, "override.channel"));
-        if own != usual {
-            let _ = write!(text, "\n[[override]]\nparts = [\"{}\"]\n{own}", part.part_number);
+        let others = spec.parts.iter().map(|part| (part, channel_tables(part)));
+        let others = others.filter(|(_, own)| *own != usual);
+        let others: Vec<Value> = others
+            .map(|(part, channels)| json!({ "parts": [part.part_number], "channel": channels }))
+            .collect();
+        if !others.is_empty() {
+            document["override"] = json!(others);
         }
+        document["channel"] = usual;
     }
-    for part in &spec.parts {
-        part_table(&mut text, part, spec);
-    }
-    text
+    let text = toml::to_string(&document).map_err(|e| Error::refused(Diagnostic::new("output_failed", e)))?;
+    Ok(format!(
+        "# Written with the simulated logs beside it: `freeplay run --config` on this file reads them.\n\n{text}"
+    ))
 }
-
-const HEAD: &str = r#"# Written with the simulated logs beside it: `freeplay run --config` on this file reads them.
-
-[logs]
-files = ["logs/**/*.parquet"]
-installations = "installations.csv"
-
-[store]
-path = "results"
-
-[identity]
-metadata = { tail_number = "tail_number", flight_id = "flight_id", departure_utc = "departure_utc", flight_hours = "flight_hours", tail_hours_end = "tail_hours_end" }
-
-[clock]
-column = "time_s"
-unit = "s"
-"#;
 
 /// How the logs of a part name and measure its channels.
-fn channel_tables(part: &simulator::Part, above: &str) -> String {
+fn channel_tables(part: &simulator::Part) -> Value {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
-    let motor = unit(rotary || part.motor_log != MotorLogFormat::Position);
-    let screw =
-        if !rotary && part.screw_log == ScrewLogUnit::Micrometre { ("um", "um") } else { unit(rotary) };
-    let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
-    let mut text = String::new();
-    for (channel, column, (suffix, unit)) in
-        [("motor_position", "motor", motor), ("screw_position", "screw", screw), ("load", "load", load)]
-    {
-        let _ = writeln!(
-            text,
-            "\n[{above}.{channel}]\ncolumn = \"{{position}}_{column}_{suffix}\"\nunit = \"{unit}\""
-        );
-        if column == "motor" && part.motor_log == MotorLogFormat::WrappedAngle {
-            let _ = writeln!(text, "wraps_at = 360.0");
-        }
-        if let (Some(radius_m), "motor") = (part.reference_radius_m, column) {
-            // A motor turns so often for one turn of the part.
-            let _ = writeln!(text, "gear_ratio = {}", std::f64::consts::TAU * radius_m / part.lead_m);
-        }
+    let is_micrometre = !rotary && part.screw_log == ScrewLogUnit::Micrometre;
+    let column = |name: &str, (suffix, unit): (&str, &str)| json!({ "column": format!("{{position}}_{name}_{suffix}"), "unit": unit });
+    let mut motor = column("motor", unit(rotary || part.motor_log != MotorLogFormat::Position));
+    if part.motor_log == MotorLogFormat::WrappedAngle {
+        motor["wraps_at"] = json!(360.0);
     }
-    text
+    if let Some(radius_m) = part.reference_radius_m {
+        // A motor turns so often for one turn of the part.
+        motor["gear_ratio"] = json!(std::f64::consts::TAU * radius_m / part.lead_m);
+    }
+    json!({
+        "motor_position": motor,
+        "screw_position": column("screw", if is_micrometre { ("um", "um") } else { unit(rotary) }),
+        "load": column("load", if rotary { ("nm", "N.m") } else { ("n", "N") }),
+    })
 }
 
-fn part_table(text: &mut String, part: &simulator::Part, spec: &Spec) {
-    let (plant, name) = (&part.plant, &part.part_number);
+fn part_table(part: &simulator::Part, spec: &Spec) -> Value {
+    let (plant, contact) = (&part.plant, &part.plant.contact);
     let (screw, motor) = (&spec.sensors.screw, &spec.sensors.motor);
     // Friction that the filter does not know is of the order of a fortieth of the load.
     let unknown_n = spec.profile.load_n / 40.0;
-    let _ = write!(text, "\n[part.\"{name}\"]\n");
-    if let Some(r) = part.reference_radius_m {
-        let square = r * r;
-        let _ = writeln!(
-            text,
-            "kind = \"rotary\"\nreference_radius_m = {r}\nstiffness_nm_per_rad = {}\ndamping_nm_s_per_rad = {}\ninertia_kg_m2 = {}\nlimit_m = {}",
-            plant.contact.stiffness_n_per_m * square,
-            plant.contact.damping_n_s_per_m * square,
-            plant.screw_mass_kg * square,
-            part.limit_m
-        );
-        let _ = writeln!(
-            text,
-            "\n[part.\"{name}\".noise]\nscrew_rms_rad = {:e}\nscrew_resolution_rad = {:e}\nmotor_rms_rad = {:e}\nmotor_resolution_rad = {:e}\nunknown_torque_nm = {}\nbandwidth_hz = 10.0",
-            screw.noise_rms / r,
-            screw.resolution / r,
-            motor.noise_rms / r,
-            motor.resolution / r,
-            unknown_n * r
-        );
-        return;
-    }
-    let _ = writeln!(
-        text,
-        "stiffness_n_per_m = {:e}\ndamping_n_s_per_m = {}\nscrew_mass_kg = {}\nlead_m_per_rev = {}\nlimit_m = {:e}\nwatch_m = {:e}",
-        plant.contact.stiffness_n_per_m,
-        plant.contact.damping_n_s_per_m,
-        plant.screw_mass_kg,
-        part.lead_m,
-        part.limit_m,
-        part.limit_m * 0.75
-    );
-    let _ = writeln!(
-        text,
-        "\n[part.\"{name}\".noise]\nscrew_rms_m = {:e}\nscrew_resolution_m = {:e}\nmotor_rms_m = {:e}\nmotor_resolution_m = {:e}\nunknown_force_n = {unknown_n}\nbandwidth_hz = 10.0",
-        screw.noise_rms, screw.resolution, motor.noise_rms, motor.resolution
-    );
+    let Some(r) = part.reference_radius_m else {
+        return json!({
+            "stiffness_n_per_m": contact.stiffness_n_per_m,
+            "damping_n_s_per_m": contact.damping_n_s_per_m,
+            "screw_mass_kg": plant.screw_mass_kg,
+            "lead_m_per_rev": part.lead_m,
+            "limit_m": part.limit_m,
+            "watch_m": part.limit_m * 0.75,
+            "noise": {
+                "screw_rms_m": screw.noise_rms,
+                "screw_resolution_m": screw.resolution,
+                "motor_rms_m": motor.noise_rms,
+                "motor_resolution_m": motor.resolution,
+                "unknown_force_n": unknown_n,
+                "bandwidth_hz": 10.0,
+            },
+        });
+    };
+    let square = r * r;
+    json!({
+        "kind": "rotary",
+        "reference_radius_m": r,
+        "stiffness_nm_per_rad": contact.stiffness_n_per_m * square,
+        "damping_nm_s_per_rad": contact.damping_n_s_per_m * square,
+        "inertia_kg_m2": plant.screw_mass_kg * square,
+        "limit_m": part.limit_m,
+        "noise": {
+            "screw_rms_rad": screw.noise_rms / r,
+            "screw_resolution_rad": screw.resolution / r,
+            "motor_rms_rad": motor.noise_rms / r,
+            "motor_resolution_rad": motor.resolution / r,
+            "unknown_torque_nm": unknown_n * r,
+            "bandwidth_hz": 10.0,
+        },
+    })
 }
 
 /// A planned instant always lies within the calendar.

@@ -68,9 +68,7 @@ fn refuse_foreign(dir: &Path, named: &Path) -> Result<(), Error> {
     let found = entries(dir);
     let list = fs::read_to_string(dir.join(MANIFEST)).ok();
     let ours: BTreeSet<&str> = list.iter().flat_map(|list| list.lines()).chain([MANIFEST]).collect();
-    let is_older = list.is_none() && dir.join("report.json").is_file();
-    let is_ours = |entry: &str| ours.contains(entry) || (is_older && is_of_older_report(entry));
-    let foreign: Vec<&String> = found.iter().filter(|entry| !is_ours(entry)).collect();
+    let foreign: Vec<&String> = found.iter().filter(|entry| !ours.contains(entry.as_str())).collect();
     let Some(first) = foreign.first() else { return Ok(()) };
     let more = match foreign.len() {
         1 => String::new(),
@@ -80,18 +78,6 @@ fn refuse_foreign(dir: &Path, named: &Path) -> Result<(), Error> {
     let diagnostic = Diagnostic::new("would_overwrite", what)
         .hint("move these files away, or name an empty folder or one that only a report was written to");
     Err(Error::refused(diagnostic))
-}
-
-/// Whether a report without a list of its files may have written an entry.
-fn is_of_older_report(entry: &str) -> bool {
-    let mut names = entry.split('/');
-    let (first, rest) = (names.next().unwrap_or_default(), names.next());
-    let is_page = |name: &str| [".html", ".json", ".svg"].iter().any(|end| name.ends_with(end));
-    match (first, rest) {
-        ("assets" | "data", _) | ("tail" | "serial" | "part" | "flight", None) => true,
-        ("tail" | "serial" | "part" | "flight", Some(name)) | (name, None) => is_page(name),
-        _ => false,
-    }
 }
 
 /// Everything in a folder, folders included, as paths from it with `/`, in order. Links are entries.
@@ -209,7 +195,6 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// With and without the list of its files, which reports of older releases lack.
     #[test]
     fn notes_beside_a_report_are_named_and_stay() {
         let dir = tempfile::tempdir().unwrap();
@@ -224,7 +209,6 @@ mod tests {
             assert_eq!(fs::read_to_string(&note).unwrap(), "years");
             fs::remove_file(&note).unwrap();
             let _ = fs::remove_dir(out.join("mine"));
-            let _ = fs::remove_file(out.join(MANIFEST));
         }
         write(&Report::default(), Vec::new(), &out, &|_| ()).unwrap();
         assert!(out.join(MANIFEST).exists());

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use jiff::Timestamp;
-use job::config::QuantityLimits;
 use rayon::prelude::*;
 use records::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep, TrendRow};
 use trend::Series;
@@ -12,12 +11,13 @@ use trend::quantity::common_curve::CommonCurve;
 use trend::quantity::covariates::Slopes;
 use trend::quantity::{MIN_FLIGHTS, QuantityValue};
 
+use crate::assess::limits::Limits;
 use crate::assess::quantities::attribution::{self, CommonStep};
 use crate::assess::quantities::limits::{Scale, Treatment};
 use crate::assess::quantities::subject::Subject;
 use crate::assess::quantities::values::{FleetValues, FlightValues, READ, UnitValues, by_position};
 use crate::findings::monitoring::median;
-use crate::fleet::histories::UnitKey;
+use crate::fleet::histories::{History, UnitKey};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -32,14 +32,26 @@ const DEPARTS_SE: f64 = 3.0;
 /// Share of a tail's units that make a drift the tail's.
 const SHARE: f64 = 0.75;
 
-/// Facts about units in addition to the values.
-pub(crate) trait UnitFacts: Sync {
-    /// Flights of a unit by usage, and its maintenance.
-    fn series(&self, unit: &UnitKey) -> Option<&Series>;
+/// Units by name: their flights, and the same by usage with their maintenance.
+pub(crate) type Units<'a> = BTreeMap<&'a UnitKey, (&'a History, Series)>;
+
+/// What is known of units in addition to the values.
+#[derive(Clone, Copy)]
+pub(crate) struct UnitFacts<'a> {
+    pub(crate) units: &'a Units<'a>,
+    pub(crate) limits: Limits<'a>,
+}
+
+impl<'a> UnitFacts<'a> {
+    fn series(self, unit: &UnitKey) -> Option<&'a Series> {
+        self.units.get(unit).map(|(_, series)| series)
+    }
+
     /// Name of a unit's flight.
-    fn flight_id(&self, unit: &UnitKey, departure_us: i64) -> Option<String>;
-    /// Limits of a part.
-    fn limits(&self, part_number: Option<&str>) -> QuantityLimits;
+    fn flight_id(self, unit: &UnitKey, departure_us: i64) -> Option<String> {
+        let history = self.units.get(unit)?.0;
+        history.flight_id(history.at(utc(departure_us)?)?).map(str::to_owned)
+    }
 }
 
 /// Followed quantities, and their changes.
@@ -52,7 +64,7 @@ pub struct FollowedQuantities {
 }
 
 /// Follows all quantities of all units.
-pub(crate) fn follow(fleet: &FleetValues, facts: &dyn UnitFacts, as_of: Timestamp) -> FollowedQuantities {
+pub(crate) fn follow(fleet: &FleetValues, facts: UnitFacts<'_>, as_of: Timestamp) -> FollowedQuantities {
     let positions = by_position(fleet);
     let followed: Vec<FollowedQuantities> = (0..READ.len())
         .into_par_iter()
@@ -69,12 +81,12 @@ pub(crate) fn follow(fleet: &FleetValues, facts: &dyn UnitFacts, as_of: Timestam
 
 fn follow_quantity(
     (units, positions): (&FleetValues, &FleetValues),
-    facts: &dyn UnitFacts,
+    facts: UnitFacts<'_>,
     as_of: Timestamp,
     index: usize,
 ) -> FollowedQuantities {
     let quantity = READ[index].0;
-    let usual = Treatment::of(quantity, &facts.limits(None));
+    let usual = Treatment::of(quantity, &facts.limits.quantities(None));
     let fleet = if usual.is_of_channel { positions } else { units };
     let made: Vec<Option<Subject<'_>>> =
         fleet.par_iter().map(|(name, unit)| subject(name, unit, facts, index)).collect();
@@ -116,11 +128,11 @@ fn follow_quantity(
 fn subject<'a>(
     name: &'a UnitKey,
     unit: &'a UnitValues,
-    facts: &dyn UnitFacts,
+    facts: UnitFacts<'_>,
     index: usize,
 ) -> Option<Subject<'a>> {
     let quantity = READ[index].0;
-    let treatment = Treatment::of(quantity, &facts.limits(name.0.as_deref()));
+    let treatment = Treatment::of(quantity, &facts.limits.quantities(name.0.as_deref()));
     let last = unit.flights.last()?;
     let usual_load_n = unit.usual_load_n;
     let series = facts.series(name).filter(|_| !treatment.is_of_channel);
@@ -285,7 +297,7 @@ struct Assessed<'a> {
     subject: &'a Subject<'a>,
     fit: &'a QuantityChanges,
     quantity: Quantity,
-    facts: &'a dyn UnitFacts,
+    facts: UnitFacts<'a>,
 }
 
 impl Assessed<'_> {
@@ -431,7 +443,7 @@ fn of_common(
     step: &CommonStep,
     subjects: &[Subject<'_>],
     quantity: Quantity,
-    facts: &dyn UnitFacts,
+    facts: UnitFacts<'_>,
 ) -> QuantityChange {
     let member = |m: &attribution::Found| &subjects[m.subject];
     let first = &step.members[0];
