@@ -86,7 +86,7 @@ struct Unit {
 
 impl Unit {
     fn of(tail: usize, place: usize, flights: usize) -> Self {
-        let chance = |what: u64| uniform(tail as u64, place as u64, what);
+        let chance = |what: u64| fleet::random((tail, place, what)).f64();
         let wears = chance(0) < 0.8;
         Self {
             new_um: 20.0 + 6.0 * chance(1),
@@ -105,24 +105,9 @@ impl Unit {
     }
 }
 
-/// A number from zero to one that depends on nothing but its names (SplitMix64's finish).
-fn uniform(a: u64, b: u64, c: u64) -> f64 {
-    let mut z = a.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ b.wrapping_mul(0xd1b5_4a32_d192_ed03) ^ (c << 17);
-    for factor in [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb] {
-        z = (z ^ (z >> 30)).wrapping_mul(factor);
-    }
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// Scatter of one standard deviation: twelve uniform numbers less six.
-fn scatter(tail: usize, place: usize, flight: usize) -> f64 {
-    let name = (tail * POSITIONS.len() + place) as u64;
-    (0..12).map(|k| uniform(name, flight as u64, k + 100)).sum::<f64>() - 6.0
-}
-
 fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<GapRecord> {
-    let gap_um = unit.gap_um(flight) + 1.2 * scatter(tail_at, place, flight);
-    let noise = |quantity: usize| scatter(tail_at, place, quantity << 32 | flight);
+    let gap_um = unit.gap_um(flight) + 1.2 * fleet::scatter((tail_at, place, flight));
+    let noise = |quantity: usize| fleet::scatter((tail_at, place, quantity, flight));
     let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
     let estimate = GapEstimate {
         status: Status::Estimated,
@@ -242,7 +227,7 @@ fn inspections(units: usize, flights: usize) -> Outcomes<String> {
     for k in (0..units).step_by(8) {
         let (tail_at, place) = (k / POSITIONS.len(), (k / 8) % POSITIONS.len());
         let gap_um =
-            Unit::of(tail_at, place, flights).gap_um(at) + 3.0 + 4.0 * scatter(tail_at, place, 9_999);
+            Unit::of(tail_at, place, flights).gap_um(at) + 3.0 + 4.0 * fleet::scatter((tail_at, place));
         let (part, serial) = (PARTS[place / 2], quoted(&serial(tail_at, place)));
         let date = departure(at)?;
         writeln!(table, "{part},{serial},{date},{:e},<i>dial gauge</i>,200", gap_um * 1e-6)?;

@@ -40,16 +40,7 @@ impl At {
 
     /// Scatter of mean zero and standard deviation one, different for each quantity.
     fn scatter(&self, quantity: i32) -> f64 {
-        let mut state = (quantity as u64) << 40 | (self.tail as u64) << 30 | (self.position as u64) << 20;
-        state |= self.flight as u64;
-        // SplitMix64 (Steele, Lea and Flood 2014): neighbouring flights have unrelated numbers.
-        let mut uniform = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        fleet::scatter((quantity, self.tail, self.position, self.flight))
     }
 }
 

@@ -9,7 +9,7 @@ use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
 use std::fmt::Write as _;
 
-use crate::fleet::{self, config, scatter_um};
+use crate::fleet::{self, config, scatter};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
@@ -29,7 +29,7 @@ fn histories(rows: &[GapRecord]) -> Histories {
 fn flown(days: i32) -> Vec<GapRecord> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
-        let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
+        let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter((unit, at));
         let [tail, position] = [format!("T{unit:02}"), format!("place_{unit}")];
         let [serial, flight] = [format!("S{unit:02}"), format!("{unit}-{at}")];
         let names = [&tail, &position, "EMA-27-1040", &serial, &flight];
