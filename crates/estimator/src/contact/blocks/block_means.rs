@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::Samples;
 use crate::contact::codes::Rejection;
-use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::friction::friction_model::{Drive, FrictionState};
 use crate::contact::stats::{LOOKS, middle_and_half};
 use crate::contact::types::{PartPrior, SHORTEST_S};
 use crate::gap::load_band::{quantiles, reversals};
@@ -142,6 +142,13 @@ impl BlockMeans {
         let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
         // A billionth of the motor's travel is rounding.
         (0.0..=1e-9 * motor_m).contains(&screw_m)
+    }
+
+    /// What drives the coupling at a block.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
+    pub(crate) fn drive(&self, k: usize) -> Drive {
+        Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
     }
 
     pub(crate) fn len(&self) -> usize {

@@ -20,50 +20,30 @@ pub(crate) fn integrate(
     couplings.resize(blocks.len(), Coupling::UNKNOWN);
     let params = CouplingParams::new(state, motor_sense);
     for segment in blocks.segments() {
-        let channels = Channels::of(blocks, segment.clone());
-        integrate_segment(params, channels, &mut couplings[segment]);
+        integrate_segment(params, blocks, segment, couplings);
     }
 }
 
-/// The channels of a segment that drive the model.
-#[derive(Debug, Clone, Copy)]
-struct Channels<'a> {
-    motor_m: &'a [f64],
-    load_n: &'a [f64],
-    slowness: &'a [f64],
-}
-
-#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
-impl<'a> Channels<'a> {
-    fn of(blocks: &'a BlockMeans, segment: Range<usize>) -> Self {
-        Self {
-            motor_m: &blocks.motor_m[segment.clone()],
-            load_n: &blocks.load_n[segment.clone()],
-            slowness: &blocks.slowness[segment],
-        }
-    }
-
-    #[inline(always)]
-    fn at(&self, k: usize) -> Drive {
-        Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
-    }
-}
-
-/// Integrates eight parts in parallel lanes, each from an arbitrary state; then from the true start of each part until the
-/// sequential integration meets what the lane found.
-fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut [Coupling]) {
-    let part = found.len() / LANES;
-    let ends = integrate_lanes(params, channels, part, found);
+/// Integrates eight parts of a segment in parallel lanes, each from an arbitrary state; then from the true start of each part
+/// until the sequential integration meets what the lane found.
+fn integrate_segment(
+    params: CouplingParams,
+    blocks: &BlockMeans,
+    segment: Range<usize>,
+    found: &mut [Coupling],
+) {
+    let part = segment.len() / LANES;
+    let ends = integrate_lanes(params, blocks, segment.start, part, found);
+    let rest = segment.start + LANES * part..segment.end;
     let mut screw = None;
-    for number in 0..LANES {
-        let part = number * part..(number + 1) * part;
-        if recompute_until_match(params, &mut screw, channels, part, found) {
-            screw = Some(ends.get(number));
+    for (lane, start) in (segment.start..rest.start).step_by(part.max(1)).enumerate() {
+        if recompute_until_match(params, &mut screw, blocks, start..start + part, found) {
+            screw = Some(ends.get(lane));
         }
     }
     // No lane covers the rest of the segment, which may hold another integration.
-    found[LANES * part..].fill(Coupling::UNKNOWN);
-    recompute_until_match(params, &mut screw, channels, LANES * part..found.len(), found);
+    found[rest.clone()].fill(Coupling::UNKNOWN);
+    recompute_until_match(params, &mut screw, blocks, rest, found);
 }
 
 /// Integrates through a part until its values are those found before: once the screw has slipped, its force determines
@@ -71,12 +51,12 @@ fn integrate_segment(params: CouplingParams, channels: Channels<'_>, found: &mut
 fn recompute_until_match(
     params: CouplingParams,
     screw: &mut Option<ScrewState>,
-    channels: Channels<'_>,
+    blocks: &BlockMeans,
     part: Range<usize>,
     found: &mut [Coupling],
 ) -> bool {
     for k in part {
-        let here = params.follow(screw, channels.at(k));
+        let here = params.follow(screw, blocks.drive(k));
         let is_same = found[k].force_n.to_bits() == here.force_n.to_bits()
             && found[k].dforce_ddry.to_bits() == here.dforce_ddry.to_bits();
         if is_same && here.force_n.is_finite() && screw.is_some_and(|screw| screw.has_slipped) {
@@ -122,7 +102,8 @@ impl ScrewStates8 {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn integrate_lanes(
     params: CouplingParams,
-    channels: Channels<'_>,
+    blocks: &BlockMeans,
+    start: usize,
     part: usize,
     found: &mut [Coupling],
 ) -> ScrewStates8 {
@@ -131,7 +112,7 @@ fn integrate_lanes(
     for k in 0..part {
         let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; LANES];
         for (lane, drive) in drives.iter_mut().enumerate() {
-            *drive = channels.at(lane * part + k);
+            *drive = blocks.drive(start + lane * part + k);
         }
         let mut couplings = [Coupling::UNKNOWN; LANES];
         for lane in 0..LANES {
@@ -141,7 +122,7 @@ fn integrate_lanes(
             couplings[lane] = if is_known { screw.coupling } else { Coupling::UNKNOWN };
         }
         for (lane, coupling) in couplings.into_iter().enumerate() {
-            found[lane * part + k] = coupling;
+            found[start + lane * part + k] = coupling;
         }
     }
     screws
@@ -191,7 +172,7 @@ mod tests {
             for segment in blocks.segments() {
                 let (params, mut screw) = (CouplingParams::new(&state, 1.0), None);
                 for k in segment {
-                    let drive = Channels::of(&blocks, k..k + 1).at(0);
+                    let drive = blocks.drive(k);
                     let bits = |c: Coupling| {
                         [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
                     };
