@@ -192,7 +192,6 @@ fn report(
         preload_n,
         loop_width_m,
         lost_motion_m: prior.reference_load_n.and_then(|n| lost_motion::lost_motion_m(contact, frame, n)),
-        touched_s: design.touched_s,
         load_p95_n: frame.load_n,
         midrange_at_fit_m,
         flags: Vec::new(),

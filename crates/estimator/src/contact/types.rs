@@ -101,8 +101,6 @@ pub struct ContactEstimate {
     pub loop_width_m: Option<(f64, f64)>,
     /// Relative travel between + and − the reference load and its standard error, m, from samples near it.
     pub lost_motion_m: Option<(f64, f64)>,
-    /// Time in contact on the upper and on the lower flank, s.
-    pub touched_s: (f64, f64),
     /// Load magnitude that one sample in twenty exceeds, N.
     pub load_p95_n: f64,
     /// The published mid-range statistic of the same flight with stiffness, load zero, delays, drift and transducer

@@ -37,9 +37,6 @@ pub(crate) const PERIODIC: usize = 15;
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;
-/// Numbers of firm contact; those of light contact are smaller.
-const LOWER_FIRM: usize = 2;
-const UPPER_FIRM: usize = 3;
 
 /// The mean of some blocks in contact on one flank.
 #[derive(Debug, Clone, Copy)]
@@ -54,15 +51,13 @@ pub(crate) struct DesignRow<const N: usize> {
     pub(crate) stretch: u32,
 }
 
-/// All rows, and how long each flank was touched.
+/// All rows.
 #[derive(Debug, Default)]
 pub(crate) struct DesignMatrix {
     /// Rows beyond the share of the load below which flanks may be soft.
     pub(crate) firm: Vec<DesignRow<COLUMNS>>,
     /// Rows below it.
     pub(crate) light: Vec<DesignRow<COLUMNS>>,
-    /// Time in firm contact on the upper and the lower flank, s.
-    pub(crate) touched_s: (f64, f64),
 }
 
 /// Where rows are made from: blocks and the scales.
@@ -92,21 +87,19 @@ impl RowSource<'_> {
                 let Some(kind) = touch(around, firm_n).filter(|_| blocks.is_complete(k)) else { continue };
                 let here = blocks.stretch(k);
                 if here != stretch {
-                    open.iter_mut()
-                        .enumerate()
-                        .for_each(|(kind, row)| design.close(kind, row, blocks.period_s));
+                    open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
                     stretch = here;
                 }
                 // Two touches share a row where the first leaves half of it free.
                 let full = if last == (kind, k.wrapping_sub(1)) { most } else { 0.5 * most };
                 last = (kind, k);
                 if open[kind].blocks >= full {
-                    design.close(kind, &mut open[kind], blocks.period_s);
+                    design.close(kind, &mut open[kind]);
                 }
                 open[kind].add(&self.row(k, &couplings[k]));
             }
         }
-        open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row, blocks.period_s));
+        open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
         design
     }
 
@@ -165,23 +158,25 @@ impl RowSource<'_> {
 
 impl DesignMatrix {
     /// Takes in a row, if it is not empty, and empties it.
-    fn close(&mut self, kind: usize, row: &mut DesignRow<COLUMNS>, period_s: f64) {
-        if row.blocks == 0.0 {
-            return;
+    fn close(&mut self, kind: usize, row: &mut DesignRow<COLUMNS>) {
+        if row.blocks > 0.0 {
+            let rows = if kind < 2 { &mut self.light } else { &mut self.firm };
+            rows.push(std::mem::replace(row, DesignRow::ZERO).mean());
         }
-        let mean = std::mem::replace(row, DesignRow::ZERO).mean();
-        let time_s = mean.blocks * period_s;
-        match kind {
-            UPPER_FIRM => self.touched_s.0 += time_s,
-            LOWER_FIRM => self.touched_s.1 += time_s,
-            _ => return self.light.push(mean),
-        }
-        self.firm.push(mean);
     }
 }
 
-/// The flank that a block and those around it press, and whether they do so firmly, as a number; none where they do not
-/// keep it.
+/// Blocks of the less pressed flank in some rows, times `each`: 1 to count them, their length to have the time in contact, s.
+pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>, each: f64) -> f64 {
+    let (mut upper, mut lower) = (0.0, 0.0);
+    for row in rows {
+        *(if row.x[GAP] > 0.0 { &mut upper } else { &mut lower }) += row.blocks * each;
+    }
+    f64::min(upper, lower)
+}
+
+/// The flank that a block and those around it press, and whether they do so firmly, as a number from 2; none where they
+/// do not keep it.
 #[inline]
 fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
     let here_n = around[BEFORE].force_n;

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot,
+    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot, less_pressed,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
@@ -233,7 +233,10 @@ fn gap_and_error_m(
     let groups = groups(rows);
     let refit = |least: f64| line.fit.leave_one_out(GAP, rows, &groups, (FORCE, least));
     let low = refit(FIRM_SHARE);
-    let high = refit(STIFF_SHARE).filter(|_| has_both_flanks(rows));
+    // A fit of higher loads alone asks for enough rows of either flank.
+    let stiff = rows.iter().filter(|row| row.x[FORCE].abs() >= STIFF_SHARE);
+    let all: f64 = rows.iter().map(|row| row.blocks).sum();
+    let high = if less_pressed(stiff, 1.0) > 0.05 * all { refit(STIFF_SHARE) } else { None };
     let jackknife_m = low.as_ref().map_or_else(
         || line.fit.standard_error_m(GAP, rows),
         |(_, parts)| jackknife_error_m(parts.iter().copied()),
@@ -289,16 +292,6 @@ fn groups(rows: &[DesignRow<COLUMNS>]) -> Vec<Range<usize>> {
         }
     }
     groups
-}
-
-/// Whether enough rows of either flank are loaded beyond the stiff share.
-fn has_both_flanks(rows: &[DesignRow<COLUMNS>]) -> bool {
-    let (mut upper, mut lower) = (0.0, 0.0);
-    for row in rows.iter().filter(|row| row.x[FORCE].abs() >= STIFF_SHARE) {
-        if row.x[GAP] > 0.0 { upper += row.blocks } else { lower += row.blocks }
-    }
-    let all: f64 = rows.iter().map(|row| row.blocks).sum();
-    upper.min(lower) > 0.05 * all
 }
 
 /// Jackknife error of a statistic from its values with one group left out (Tukey 1958).

@@ -4,7 +4,7 @@ use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
-    RowSource, SHARE, SIDE_FORCE, SPEED, STRIBECK,
+    RowSource, SHARE, SIDE_FORCE, SPEED, STRIBECK, less_pressed,
 };
 use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
@@ -46,7 +46,7 @@ pub(crate) fn search(
         blocks.apply_delays(&state);
         integrate(blocks, &state, scaling.motor_sense, couplings);
         let design = RowSource { blocks, scaling }.rows(couplings);
-        rejection_of_contact(design.touched_s.0.min(design.touched_s.1))?;
+        rejection_of_contact(less_pressed(design.firm.iter(), blocks.period_s))?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
         found = Some(GaussNewtonResult { design, fit, at: state, state: after });
