@@ -6,14 +6,14 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray, UInt32Array};
-use arrow::compute::take;
-use arrow::datatypes::Int32Type;
+use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, UInt32Array};
+use arrow::compute::{cast, take};
+use arrow::datatypes::{DataType, Int32Type};
 
 use crate::bounds;
 use crate::error::{Error, ErrorKind};
 use crate::parquet::log_file::{LogFile, Scan};
-use crate::parquet::numeric::as_text;
+use crate::parquet::numeric::wrong_type;
 
 /// Rows decoded at a time: a batch is split among many channels, so it is larger than that of a wide log.
 pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
@@ -21,7 +21,7 @@ pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 /// Memory limit of gathered samples, bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
-/// No combination: the row belongs to a channel that is not requested.
+/// No key: the row belongs to a channel that is not requested.
 const NONE: u32 = u32::MAX;
 
 /// The most combinations of texts of the columns that name rows: more are the numbers or times of a wrong column.
@@ -150,14 +150,14 @@ fn gather(
 ) -> Result<Gathered, Error> {
     let leaves: Vec<&str> = leaves.iter().map(String::as_str).collect();
     let mut gathered: Gathered = vec![vec![Vec::new(); leaves.len()]; keys.len()];
-    let (mut bytes, mut by_key) = (vec![0_usize; keys.len()], vec![Vec::new(); keys.len()]);
+    let mut bytes = vec![0_usize; keys.len()];
     for file in files {
         // The rows of the flight that the file is opened for.
         let of_flight = |rows: &Rows| [rows.as_slice(), &file.flight_rows].concat();
         let keys: Vec<Rows> = keys[..gathered.len()].iter().map(of_flight).collect();
         let columns: Vec<&str> = keys[0].iter().map(|(column, _)| column.as_str()).collect();
         let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
-        let mut combinations = Combinations::of(&keys);
+        let numbered = NumberedKeys::of(&keys).map_err(|fault| file.error(fault))?;
         let may_hold = |group: usize| {
             keys.iter().any(|rows| {
                 rows.iter().all(|(column, text)| {
@@ -168,18 +168,14 @@ fn gather(
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group: &may_hold };
         file.scan(&names, scan, |arrays| {
             let (values, rest) = arrays.split_at(leaves.len());
-            let of_rows = combinations.of_rows(&columns, &rest[..columns.len()], false)?;
-            sort_by_key(of_rows, &mut by_key[..gathered.len()]);
-            for (key, rows) in
-                by_key[..gathered.len()].iter().enumerate().filter(|(_, rows)| !rows.is_empty())
-            {
-                let rows = UInt32Array::from(rows.clone());
-                for (part, array) in gathered[key].iter_mut().zip(values) {
-                    let samples = take(array, &rows, None).map_err(|_| ErrorKind::ColumnType {
-                        column: leaves[0].to_owned(),
-                        found: array.data_type().to_string(),
-                        wanted: "numbers",
-                    })?;
+            let by_key = numbered.rows_by_key(&columns, rest)?;
+            for (key, rows) in by_key.into_iter().take(gathered.len()).enumerate() {
+                if rows.is_empty() {
+                    continue;
+                }
+                let rows = UInt32Array::from(rows);
+                for ((part, array), leaf) in gathered[key].iter_mut().zip(values).zip(&leaves) {
+                    let samples = take(array, &rows, None).map_err(|_| wrong_type(leaf, array, "numbers"))?;
                     bytes[key] += samples.get_array_memory_size();
                     part.push(samples);
                 }
@@ -193,21 +189,9 @@ fn gather(
     Ok(gathered)
 }
 
-/// Sorts the rows of a batch by their keys.
-fn sort_by_key(of_rows: &[u32], by_key: &mut [Vec<u32>]) {
-    by_key.iter_mut().for_each(Vec::clear);
-    for (row, key) in (0..).zip(of_rows) {
-        by_key.get_mut(*key as usize).into_iter().for_each(|rows| rows.push(row));
-    }
-}
-
 /// The combinations of texts that the rows of some columns hold; a row without one of the texts holds none.
 #[derive(Debug, Default)]
-pub(crate) struct DistinctTexts {
-    combinations: Combinations,
-    /// Combinations of row groups that hold but one.
-    stated: BTreeSet<Vec<String>>,
-}
+pub(crate) struct DistinctTexts(BTreeSet<Vec<String>>);
 
 impl DistinctTexts {
     /// Looks at a file; a row group that holds but one combination, by its statistics, is not read.
@@ -215,163 +199,102 @@ impl DistinctTexts {
         let only = |group: usize| -> Option<Vec<String>> {
             names.iter().map(|name| Some(file.text_bounds(name, group)?.only()?.to_owned())).collect()
         };
-        self.stated.extend(file.groups().filter_map(only));
+        self.0.extend(file.groups().filter_map(only));
         let wants_group = &|group| only(group).is_none();
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group };
         file.scan(names, scan, |arrays| self.take(names, arrays))
     }
 
-    /// Looks at a batch.
+    /// Looks at a batch of at most four columns.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
-        self.combinations.of_rows(names, arrays, true).map(drop)
+        let columns = codes(names, arrays)?;
+        // The codes of a row, side by side in one number.
+        let packed = |row: usize| {
+            columns.iter().try_fold(0_u128, |before, column| Some(before << 32 | column.key(row)? as u128))
+        };
+        let mut rows: Vec<(u128, usize)> =
+            (0..arrays[0].len()).filter_map(|row| Some((packed(row)?, row))).collect();
+        rows.sort_unstable();
+        rows.dedup_by_key(|(codes, _)| *codes);
+        let text = |column: &Codes, row: usize| {
+            let code = column.key(row).unwrap_or_default();
+            column.values().as_string::<i32>().value(code).to_owned()
+        };
+        self.0.extend(rows.iter().map(|(_, row)| columns.iter().map(|column| text(column, *row)).collect()));
+        Ok(bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)?)
     }
 
     /// All that were found.
-    pub(crate) fn found(mut self) -> BTreeSet<Vec<String>> {
-        self.stated.extend(self.combinations.texts());
-        self.stated
+    pub(crate) fn found(self) -> BTreeSet<Vec<String>> {
+        self.0
     }
 }
 
-/// Combinations of the texts of some columns, numbered in the order in which they are entered.
-#[derive(Debug, Default)]
-struct Combinations {
-    columns: Vec<TextColumn>,
-    /// Of the rows of the latest batch.
-    rows: Vec<u32>,
+/// A column of texts, each row as a code.
+type Codes = DictionaryArray<Int32Type>;
+
+/// Columns as texts with codes.
+fn codes(names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Codes>, ErrorKind> {
+    let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+    let coded = |(name, array): (&&str, &ArrayRef)| {
+        let coded = cast(array, &kind).map_err(|_| wrong_type(name, array, "text or numbers"))?;
+        Ok(coded.as_dictionary().clone())
+    };
+    names.iter().zip(arrays).map(coded).collect()
 }
 
-impl Combinations {
-    /// The requested rows: combination k is that of key k.
-    fn of(keys: &[Rows]) -> Self {
-        let mut all = Self::default();
-        for rows in keys {
-            all.columns.resize_with(rows.len(), TextColumn::default);
-            let each = all.columns.iter_mut().zip(rows);
-            each.fold(0, |before, (column, (_, text))| {
-                let number = column.number(text);
-                column.enter(before, number)
-            });
-        }
-        all
-    }
-
-    /// The combination of each row. One that is not known becomes known where they are `open`, and is [`NONE`] elsewhere.
-    fn of_rows(&mut self, names: &[&str], arrays: &[ArrayRef], open: bool) -> Result<&[u32], ErrorKind> {
-        self.columns.resize_with(names.len(), TextColumn::default);
-        self.rows.clear();
-        for (column, (name, array)) in self.columns.iter_mut().zip(names.iter().zip(arrays)) {
-            column.append_to(&mut self.rows, name, array, open)?;
-        }
-        Ok(&self.rows)
-    }
-
-    /// The texts of every combination; none before a batch was seen.
-    fn texts(&self) -> Vec<Vec<String>> {
-        let none = vec![Vec::new(); self.columns.len().min(1)];
-        self.columns.iter().fold(none, |before, column| {
-            let texts = |(at, text): &(u32, u32)| {
-                let mut texts = before[*at as usize].clone();
-                texts.push(column.texts[*text as usize].clone());
-                texts
-            };
-            column.parts.iter().map(texts).collect()
-        })
-    }
+/// Keys, found by the numbers that their texts have in each column.
+struct NumberedKeys<'k> {
+    keys: usize,
+    /// The texts of each column in order: the place of a text is its number.
+    texts: Vec<Vec<&'k str>>,
+    /// The key of each combination of numbers, counted by the last column first; [`NONE`] where it is of no key.
+    by_numbers: Vec<u32>,
 }
 
-/// The texts of a column, and their combinations with those of the columns before it.
-#[derive(Debug, Default)]
-struct TextColumn {
-    texts: Vec<String>,
-    numbers: HashMap<String, u32>,
-    /// A dictionary and the number of each of its codes, as batch after batch shares one.
-    coded: Option<(ArrayRef, Vec<u32>)>,
-    /// The combination of a combination of the columns before and the number of a text.
-    combinations: Vec<Vec<u32>>,
-    /// Both parts of each combination.
-    parts: Vec<(u32, u32)>,
-}
-
-impl TextColumn {
-    fn number(&mut self, text: &str) -> u32 {
-        if let Some(number) = self.numbers.get(text) {
-            return *number;
-        }
-        let number = self.texts.len() as u32;
-        self.texts.push(text.to_owned());
-        self.numbers.insert(text.to_owned(), number);
-        number
-    }
-
-    /// The combination of two parts, which becomes known.
-    fn enter(&mut self, before: u32, number: u32) -> u32 {
-        let (row, column) = (before as usize, number as usize);
-        self.combinations.resize_with(self.combinations.len().max(row + 1), Vec::new);
-        let of_before = &mut self.combinations[row];
-        of_before.resize(of_before.len().max(column + 1), NONE);
-        if of_before[column] == NONE {
-            of_before[column] = self.parts.len() as u32;
-            self.parts.push((before, number));
-        }
-        of_before[column]
-    }
-
-    /// Combines the texts of this column with what the columns before gave for each row.
-    fn append_to(
-        &mut self,
-        rows: &mut Vec<u32>,
-        name: &str,
-        array: &ArrayRef,
-        open: bool,
-    ) -> Result<(), ErrorKind> {
-        let codes = array.as_dictionary_opt::<Int32Type>();
-        let dictionary =
-            codes.map_or_else(|| as_text(name, array), |codes| Ok(Arc::clone(codes.values())))?;
-        let known = self.coded.take().filter(|(known, _)| Arc::ptr_eq(known, &dictionary));
-        let (dictionary, numbers) = known.unwrap_or_else(|| {
-            let number = |text: Option<&str>| match text {
-                Some(text) if open => self.number(text),
-                text => text.and_then(|text| self.numbers.get(text)).map_or(NONE, |number| *number),
-            };
-            let numbers = dictionary.as_string::<i32>().iter().map(number).collect();
-            (dictionary, numbers)
-        });
-        let most = (self.texts.len() as u64).saturating_mul(self.combinations.len() as u64);
-        bounds::check("texts of columns that name rows", most, MAX_COMBINATIONS)?;
-        let number = |code: Option<i32>| code.map_or(NONE, |code| numbers[code as usize]);
-        if rows.is_empty() && !open {
-            // Those of the first column are its texts.
-            match codes {
-                None => rows.extend_from_slice(&numbers),
-                Some(codes) => rows.extend(codes.keys().iter().map(number)),
-            }
-            self.coded = codes.map(|_| (dictionary, numbers));
-            return Ok(());
-        }
-        if rows.is_empty() {
-            rows.resize(array.len(), 0);
-        }
-        let mut append = |row: &mut u32, number: u32| {
-            let known = self.combinations.get(*row as usize).and_then(|of_row| of_row.get(number as usize));
-            let known = known.copied().unwrap_or(NONE);
-            let is_new = known == NONE && open && *row != NONE && number != NONE;
-            *row = if is_new { self.enter(*row, number) } else { known };
+impl<'k> NumberedKeys<'k> {
+    fn of(keys: &'k [Rows]) -> Result<Self, ErrorKind> {
+        let in_order = |column: usize| {
+            let texts: BTreeSet<&str> = keys.iter().map(|rows| rows[column].1.as_str()).collect();
+            texts.into_iter().collect()
         };
-        match codes {
-            None => rows.iter_mut().zip(&numbers).for_each(|(row, number)| append(row, *number)),
-            Some(codes) => {
-                rows.iter_mut().zip(codes.keys()).for_each(|(row, code)| append(row, number(code)));
-                self.coded = Some((dictionary, numbers));
+        let texts: Vec<Vec<&str>> = (0..keys[0].len()).map(in_order).collect();
+        let all = texts.iter().fold(1_u64, |all, texts| all.saturating_mul(texts.len() as u64));
+        bounds::check("texts of columns that name rows", all, MAX_COMBINATIONS)?;
+        let mut by_numbers = vec![NONE; all as usize];
+        for (key, rows) in (0..).zip(keys) {
+            let next = |place: usize, (texts, (_, text)): (&Vec<&str>, &(String, String))| {
+                place * texts.len() + texts.partition_point(|other| *other < text.as_str())
+            };
+            by_numbers[texts.iter().zip(rows).fold(0, next)] = key;
+        }
+        Ok(Self { keys: keys.len(), texts, by_numbers })
+    }
+
+    /// The rows of a batch that belong to each key, by the columns that name rows.
+    fn rows_by_key(&self, names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Vec<u32>>, ErrorKind> {
+        let Some(first) = arrays.first() else { return Ok(vec![Vec::new(); self.keys]) };
+        let mut places = vec![0; first.len()];
+        for (column, texts) in codes(names, arrays)?.iter().zip(&self.texts) {
+            let number = |text: Option<&str>| Some(texts.binary_search(&text?).ok()? as u32);
+            let numbers: Vec<Option<u32>> = column.values().as_string::<i32>().iter().map(number).collect();
+            for (place, code) in places.iter_mut().zip(column.keys()) {
+                let number = code.and_then(|code| numbers[code as usize]).filter(|_| *place != NONE);
+                *place = number.map_or(NONE, |number| *place * texts.len() as u32 + number);
             }
         }
-        Ok(())
+        let mut by_key = vec![Vec::new(); self.keys];
+        for (row, place) in (0..).zip(places) {
+            let key = self.by_numbers.get(place as usize).copied().unwrap_or(NONE);
+            by_key.get_mut(key as usize).into_iter().for_each(|rows: &mut Vec<u32>| rows.push(row));
+        }
+        Ok(by_key)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{DictionaryArray, Float64Array, RecordBatch, StringArray};
+    use arrow::array::{Float64Array, RecordBatch, StringArray};
     use arrow::datatypes::Float64Type;
     use parquet::arrow::ArrowWriter;
     use parquet::file::properties::WriterProperties;
@@ -436,26 +359,17 @@ mod tests {
         assert_eq!(file.text_bounds("name", 4).unwrap().only(), Some("p4"));
     }
 
-    /// Two columns mark the rows of a slot; the texts of one are codes of a dictionary, of the other plain.
+    /// Two columns mark the rows of a key; the texts of one are codes of a dictionary, of the other plain.
     #[test]
     fn rows_are_sorted_by_both_of_their_columns() {
         let key =
             |name: &str, place: &str| vec![("name".into(), name.into()), ("place".into(), place.into())];
-        let mut keys = Combinations::of(&[key("motor", "left"), key("load", "right"), key("motor", "right")]);
-        let names: DictionaryArray<Int32Type> =
-            ["motor", "load", "flap", "motor", "motor", "load"].into_iter().collect();
-        let places = StringArray::from(vec![
-            Some("right"),
-            Some("right"),
-            Some("left"),
-            Some("left"),
-            None,
-            Some("left"),
-        ]);
-        let rows = keys.of_rows(&["name", "place"], &[Arc::new(names), Arc::new(places)], false).unwrap();
-        assert_eq!(rows, [2, 1, NONE, 0, NONE, NONE]);
-        let mut by_key = [Vec::new(), Vec::new()];
-        sort_by_key(rows, &mut by_key);
-        assert_eq!(by_key, [[3], [1]]);
+        let keys = [key("motor", "left"), key("load", "right"), key("motor", "right")];
+        let names: Codes = ["motor", "load", "flap", "motor", "motor", "load"].into_iter().collect();
+        let places = [Some("right"), Some("right"), Some("left"), Some("left"), None, Some("left")];
+        let places: StringArray = places.into_iter().collect();
+        let rows = NumberedKeys::of(&keys).unwrap();
+        let rows = rows.rows_by_key(&["name", "place"], &[Arc::new(names), Arc::new(places)]).unwrap();
+        assert_eq!(rows, [vec![3], vec![1], vec![0]]);
     }
 }
