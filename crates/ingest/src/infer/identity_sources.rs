@@ -59,9 +59,14 @@ pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
     rank_of(name).map(|(fact, _)| fact)
 }
 
-/// The name of each fact among some names, the best known one first.
-pub(super) fn facts_of(names: &[&str]) -> BTreeMap<IdentityField, String> {
-    let mut ranked: Vec<_> = names.iter().rev().filter_map(|name| Some((rank_of(name)?, *name))).collect();
+/// The name of each fact among some names, the best known one first; of a field of JSON (`flight.tail`), what follows the
+/// dot counts as the name where the whole is none.
+pub(super) fn facts_of<'n>(
+    names: impl DoubleEndedIterator<Item = &'n str>,
+) -> BTreeMap<IdentityField, String> {
+    let field = |name: &'n str| name.rsplit_once('.').map(|(_, field)| field);
+    let rank = |name: &'n str| Some((rank_of(name).or_else(|| rank_of(field(name)?))?, name));
+    let mut ranked: Vec<_> = names.rev().filter_map(rank).collect();
     // The last name of a fact is the one that remains: the best known, and of equal ones the first.
     ranked.sort_by_key(|((_, rank), _)| std::cmp::Reverse(*rank));
     ranked.into_iter().map(|((fact, _), name)| (fact, name.to_owned())).collect()
@@ -112,7 +117,7 @@ const TIMES: [(&str, &str); 4] =
     [(r"\d\d-\d\d-\d\d", "%H-%M-%S"), (r"\d{6}", "%H%M%S"), (r"\d\d-\d\d", "%H-%M"), (r"\d{4}", "%H%M")];
 
 /// What a tail number looks like.
-const TAIL: &str = r"[A-Z]{1,2}-?[A-Z0-9]{2,6}";
+const TAIL: &str = r"(?:[A-Z]{1,2}-?[A-Z0-9]{2,6}|\d[A-Z]-[A-Z]{3}|\d\d-(?:[03-9]\d{3}|\d{5}))";
 /// What ends a tail number at the beginning of a file name, and what it looks like then: before a hyphen, a recorder's
 /// name (`FDR-20261119`) must not be one.
 const TAILS_IN_NAMES: [(char, &str); 3] =
@@ -128,7 +133,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
     let fits =
         |expression: &str, text: &str| regex::Regex::new(expression).is_ok_and(|regex| regex.is_match(text));
     let folder = |up: usize| path.ancestors().nth(up)?.file_name()?.to_str();
-    let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^{TAIL}$"), text));
+    let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^(?:.*=)?{TAIL}$"), text));
     let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
     let is_known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
     let place_end = place_end();
@@ -146,7 +151,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String
         };
         return Some((format!(r"{tail}[^/]*?(?<departure_utc>{form}){end}$"), (*format).to_owned()));
     }
-    let tail = r"(?<tail_number>[^/]+)/";
+    let tail = r"(?<tail_number>[^/=]+)/";
     let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)));
     let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
     let (expression, format) = if let Some(((day, days), (time, times))) = day.zip(time) {
@@ -208,6 +213,9 @@ mod tests {
                 "%Y%m%dT%H%M%SZ",
             ),
             ("d/TC-JRA_20261119T041300Z.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/97-0042/2026-11-19_0413.parquet", "97-0042 2026-11-19_0413", "%Y-%m-%d_%H%M"),
+            ("d/4X-EKA_20261119_041300.parquet", "4X-EKA 20261119_041300", "%Y%m%d_%H%M%S"),
+            ("d/tail=N412FP/20261119_041300/x1.parquet", "N412FP 20261119_041300", "%Y%m%d_%H%M%S"),
             (
                 "d/N412FP/20261119T041300Z/rudder_l.parquet",
                 "N412FP 20261119T041300Z rudder_l",
@@ -236,10 +244,11 @@ mod tests {
 
     #[test]
     fn facts_are_known_by_their_usual_names() {
-        let found = facts_of(&["Tail", "tail_number", "flight_duration_h", "tail_hours", "value"]);
+        let names = ["Tail", "tail_number", "flight_duration_h", "attrs.tail_hours", "value"];
+        let found = facts_of(names.into_iter());
         assert_eq!(found[&IdentityField::TailNumber], "tail_number");
         assert_eq!(found[&IdentityField::FlightHours], "flight_duration_h");
-        assert_eq!(found[&IdentityField::TailHoursEnd], "tail_hours");
+        assert_eq!(found[&IdentityField::TailHoursEnd], "attrs.tail_hours");
         for (name, fact) in [
             ("tailNumber", IdentityField::TailNumber),
             ("A/C Reg", IdentityField::TailNumber),

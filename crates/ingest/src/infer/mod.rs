@@ -74,12 +74,16 @@ const POSITION_WORDS: &str = "unit location ema servo actuator side surface lru"
 pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
     let file = &table.files[0];
-    let leaves = file.leaves();
-    let mut metadata = facts_of(&file.metadata_keys());
+    let mut leaves = file.leaves().to_vec();
+    for leaf in leaves.iter_mut().filter(|leaf| file.holds_numbers(&leaf.name)) {
+        leaf.kind = DataType::Float64;
+    }
+    let metadata_keys = file.metadata_keys();
+    let mut metadata = facts_of(metadata_keys.iter().map(String::as_str));
     metadata.remove(&IdentityField::Position);
     let constant = |name: &str| table.constant(name, "fact").ok().flatten();
     let (columns, by_row) = identity_columns(&table, &metadata);
-    let layout = layout(&table, &columns)?;
+    let layout = layout(&table, &leaves, &columns)?;
     let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
     let is_identity = |name: &str| columns.values().any(|column| column == name);
     let epoch_of_texts = |name: &str| {
@@ -95,7 +99,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         }
     };
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
-    let clock = clock(leaves, is_fact, epoch_of_texts);
+    let clock = clock(&leaves, is_fact, epoch_of_texts);
     let mut epoch = Epoch::None;
     let clock = clock.map(|(name, unit)| {
         let kind = leaves.iter().find(|leaf| leaf.name == name).map(|leaf| &leaf.kind);
@@ -140,7 +144,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         *unit = units.get(&name).copied().flatten().or_else(|| file.field_metadata(&name).unit);
     }
     found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
-    let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
+    let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata_field(key));
     let tails = match (tail, columns.get(&IdentityField::TailNumber)) {
         (None, Some(column)) => table.texts(column)?.as_ref().clone(),
         (tail, _) => tail.into_iter().collect(),
@@ -157,7 +161,7 @@ fn identity_columns(
     let leaves = table.files[0].leaves();
     let is_constant = |name: &str| table.constant(name, "fact").is_ok_and(|text| text.is_some());
     let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
-    let mut facts = facts_of(&single);
+    let mut facts = facts_of(single.into_iter());
     facts.retain(|fact, _| !metadata.contains_key(fact));
     let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
     let varies = |name: &str| !is_constant(name) && table.texts(name).is_ok_and(|texts| texts.len() > 1);
@@ -168,8 +172,11 @@ fn identity_columns(
 }
 
 /// The layout that columns of names, values and positions show.
-fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
-    let leaves = table.files[0].leaves();
+fn layout(
+    table: &RowTable,
+    leaves: &[LeafColumn],
+    columns: &BTreeMap<IdentityField, String>,
+) -> Result<Layout, Error> {
     let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
     let name =
         leaves.iter().filter(text).find(|leaf| place_in(NAME_COLUMNS, &leaf.name.to_lowercase()).is_some());

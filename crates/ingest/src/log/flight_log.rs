@@ -628,7 +628,7 @@ fn facts(sheet: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Erro
         // A column the log lacks may still be covered by another source; what is missing in all is named later.
         facts.extend(sheet.constant(column, fact.as_str())?.map(|text| (*fact, text)));
     }
-    let stated = |(fact, key): (&IdentityField, &String)| Some((*fact, first.metadata(key)?.to_owned()));
+    let stated = |(fact, key): (&IdentityField, &String)| Some((*fact, first.metadata_field(key)?));
     facts.extend(map.metadata.iter().filter_map(stated));
     Ok(facts)
 }

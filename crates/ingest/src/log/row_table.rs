@@ -365,7 +365,9 @@ impl RowTable {
             (DataType::Timestamp(unit, zone), _) => {
                 return Ok(TickFormat::of_timestamp(*unit, zone.is_none()));
             }
-            (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, _) => {
+            (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, unit)
+                if unit.is_none() || !self.files[0].holds_numbers(column) =>
+            {
                 return Ok(TickFormat::text(self.clock.epoch == Epoch::Midnight));
             }
             (DataType::Time32(unit) | DataType::Time64(unit), _) => return Ok(TickFormat::of_day(*unit)),

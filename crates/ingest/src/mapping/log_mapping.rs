@@ -80,8 +80,8 @@ pub struct GroupMapping {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
-    /// Key-value metadata of the Parquet footer: field → key. Fields: `tail_number`, `flight_id`, `departure_utc`,
-    /// `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
+    /// Key-value metadata of the Parquet footer: field → key, or `key.name` where the value is JSON. Fields: `tail_number`,
+    /// `flight_id`, `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
     /// Columns with one value throughout the log: field → column.

@@ -1,7 +1,7 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
@@ -16,7 +16,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, Parq
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, KeyValue, RowGroupMetaData};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{Error, ErrorKind};
@@ -222,10 +222,28 @@ impl LogFile {
         pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
     }
 
-    /// The keys of that metadata.
-    pub(crate) fn metadata_keys(&self) -> Vec<&str> {
+    /// The same, or a field of a value that is JSON: `flight.tail` of `{"tail": "N1"}` under the key `flight`.
+    pub(crate) fn metadata_field(&self, key: &str) -> Option<String> {
+        if let Some(text) = self.metadata(key) {
+            return Some(text.to_owned());
+        }
+        let (key, field) = key.rsplit_once('.')?;
+        let fields: BTreeMap<String, serde_json::Value> = serde_json::from_str(self.metadata(key)?).ok()?;
+        let value = fields.get(field).filter(|value| value.is_string() || value.is_number())?;
+        Some(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+    }
+
+    /// The keys of that metadata, and those of the fields of values that are JSON.
+    pub(crate) fn metadata_keys(&self) -> Vec<String> {
         let pairs = self.footer.metadata().file_metadata().key_value_metadata();
-        pairs.into_iter().flatten().map(|pair| pair.key.as_str()).collect()
+        let keys = |pair: &KeyValue| {
+            let value = pair.value.as_deref().filter(|value| value.starts_with('{'));
+            let fields = value.and_then(|json| serde_json::from_str(json).ok()).unwrap_or_default();
+            let fields: BTreeMap<String, serde_json::Value> = fields;
+            let fields = fields.into_keys().map(|field| format!("{}.{field}", pair.key));
+            once(pair.key.clone()).chain(fields).collect::<Vec<_>>()
+        };
+        pairs.into_iter().flatten().flat_map(keys).collect()
     }
 
     /// Passes the values of some leaves, batch by batch and aligned by sample, to `take`.
@@ -279,6 +297,14 @@ impl LogFile {
         let (least, greatest) = (statistics.min_bytes_opt()?, statistics.max_bytes_opt()?);
         let is_exact = statistics.min_is_exact() && statistics.max_is_exact();
         Some(TextBounds { least, greatest, is_exact })
+    }
+
+    /// Whether a column of texts seems to hold numbers, by the statistics of its first rows.
+    pub(crate) fn holds_numbers(&self, name: &str) -> bool {
+        self.text_bounds(name, 0).is_some_and(|bounds| {
+            let number = |text| std::str::from_utf8(text).ok()?.trim().parse::<f64>().ok();
+            [bounds.least, bounds.greatest].into_iter().all(|text| number(text).is_some())
+        })
     }
 
     /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages

@@ -18,12 +18,26 @@ pub(crate) fn append(column: &str, array: &ArrayRef, into: &mut impl Extend<f64>
     Ok(())
 }
 
+/// Numbers, truth values, or texts of numbers; a blank text is missing.
 fn real(column: &str, array: &ArrayRef) -> Result<ArrayRef, ErrorKind> {
-    let kind = array.data_type();
-    let is_number = kind.is_numeric() || matches!(kind, DataType::Boolean | DataType::Dictionary(..));
-    match cast(array, &DataType::Float64) {
-        Ok(real) if is_number => Ok(real),
-        _ => Err(wrong_type(column, array, "numbers")),
+    let kind = match array.data_type() {
+        DataType::Dictionary(_, kind) => kind,
+        kind => kind,
+    };
+    let real = cast(array, &DataType::Float64).map_err(|_| wrong_type(column, array, "numbers"))?;
+    if kind.is_numeric() || *kind == DataType::Boolean {
+        return Ok(real);
+    }
+    // The cast makes null of a text that is no number.
+    let texts = as_text(column, array)?;
+    let is_lost = |(row, text): &(usize, &str)| real.is_null(*row) && !text.trim().is_empty();
+    let texts = texts.as_string::<i32>().iter().enumerate().filter_map(|(row, text)| Some((row, text?)));
+    match texts.into_iter().find(is_lost) {
+        Some((_, text)) => {
+            let (column, found) = (column.to_owned(), format!("texts such as `{text}`"));
+            Err(ErrorKind::ColumnType { column, found, wanted: "numbers" })
+        }
+        None => Ok(real),
     }
 }
 

@@ -240,7 +240,9 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
     let text = |t: &str| Column::Text(vec![t.to_owned(); 2]);
     let columns = [("t", Column::Real(vec![0.0, 1.0])), ("tail", text("N2")), ("flight", text("0413"))];
-    let metadata = [("reg", "N3"), ("fh", "1.5")].map(|(key, value)| (key.into(), value.into()));
+    // As pandas writes the attributes of a table.
+    let metadata = [("PANDAS_ATTRS", r#"{"reg": "N3"}"#), ("fh", "1.5")];
+    let metadata = metadata.map(|(key, value)| (key.into(), value.into()));
     write_parquet(&file, &columns.map(|(name, values)| (name.into(), values)), &metadata).unwrap();
     let mut m = plain();
     m.identity.columns = BTreeMap::from([
@@ -250,20 +252,30 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
     let found = |m: &Mapping| own_identity(&opened(&file, m)).unwrap();
     assert_eq!(found(&m).tail_number.as_str(), "N2");
     m.identity.metadata = BTreeMap::from([
-        (IdentityField::TailNumber, "reg".into()),
+        (IdentityField::TailNumber, "PANDAS_ATTRS.reg".into()),
         (IdentityField::FlightHours, "fh".into()),
     ]);
+    let offered = ingest::infer::propose(&file).unwrap().metadata;
+    assert_eq!(offered[&IdentityField::TailNumber], "PANDAS_ATTRS.reg");
     let identity = found(&m);
     assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), ("N3", "0413"));
     assert_eq!(identity.flight_hours, Some(1.5));
 }
 
 #[test]
-fn text_where_numbers_should_stand_is_refused_by_name() {
-    let (x, text) = (reals([0.0, 1.0]), Arc::new(StringArray::from(vec!["0.1", "0.2"])));
-    let columns: [(&str, ArrayRef); 4] = [("t", x.clone()), ("m", text), ("s", x.clone()), ("f", x)];
-    let refused = only(&plain(), &columns).unwrap_err().diagnostic();
+fn texts_of_numbers_are_read_and_other_texts_are_refused_by_name() {
+    let read = |motor: [&str; 3]| {
+        let text = |texts: [&str; 3]| Arc::new(StringArray::from(texts.to_vec())) as ArrayRef;
+        let (t, m) = (text(["0.0", "0.1", "0.2"]), text(motor));
+        let columns = [("t", t), ("m", m), ("s", reals([0.0, 1.0, 2.0])), ("f", reals([0.0, 1.0, 2.0]))];
+        only(&plain(), &columns).map_err(|e| e.diagnostic())
+    };
+    let found = read(["0.5", " ", "-1e-2"]).unwrap();
+    assert_eq!((found.motor_m[0], found.motor_m[2], found.motor_m[1].is_nan()), (0.5, -0.01, true));
+    assert!((found.step_s - 0.1).abs() < 1e-12, "{} s", found.step_s);
+    let refused = read(["0.5", "1,5", "2"]).unwrap_err();
     assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("column_type", Some("m")));
+    assert!(refused.message.contains("`1,5`"), "{refused}");
 }
 
 /// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.
