@@ -1,5 +1,7 @@
 //! Names of columns: the words that name a channel, a unit, a redundant sensor or a position.
 
+use std::ops::Range;
+
 use crate::mapping::Role;
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::{Dimension, Unit};
@@ -71,26 +73,38 @@ pub(super) fn time_unit(name: &str) -> Option<&'static str> {
 }
 
 const ROLES: [(Role, &str); 4] = [
-    (Role::Motor, "motor mot mtr resolver rotor input drive"),
-    (Role::Screw, "screw scrw nut ram lvdt output stroke rod joint"),
-    (Role::Load, "load force frc torque trq loadcell"),
+    (Role::Motor, "motor mot mtr rotor input drive resolver rslvr encoder enc"),
+    (Role::Screw, "screw scrw ballscrew nut ram output stroke rod joint piston extension travel lvdt rvdt"),
+    (Role::Load, "load force frc torque trq moment loadcell"),
     (Role::Temperature, "temp temperature"),
 ];
 
-/// Words without information.
-const FILLERS: &str = "position pos posn angle displacement disp cell sensor meas value raw counts of the";
+/// Kinds of sensors: such a word names a channel where no other does (`output_encoder` is the screw).
+const SENSOR_KINDS: &str = "resolver rslvr encoder enc lvdt rvdt loadcell";
 
-/// The unit of which a text is the symbol, in letters of either case.
+/// Words without information.
+const FILLERS: &str = "position pos posn angle ang rotation displacement disp length cell sensor meas measured actual feedback fbk \
+                       value raw counts of the";
+
+/// The unit of which a text is the symbol, in letters of either case and with any sign of multiplication or none.
 pub(super) fn unit_of(text: &str) -> Option<Unit> {
-    Unit::from_symbol(match text.trim().to_lowercase().as_str() {
-        "n" => "N",
-        "kn" => "kN",
+    let is_sign = |c: char| matches!(c, '.' | '·' | '-' | '*' | '_') || c.is_whitespace();
+    let text = text.to_lowercase().replace(is_sign, "");
+    Unit::from_symbol(match text.as_str() {
+        "n" | "newtons" => "N",
+        "kn" | "kilonewton" | "kilonewtons" => "kN",
         "dan" => "daN",
-        "nm" => "N.m",
+        "nm" | "newtonmeter" | "newtonmetre" => "N.m",
         "knm" => "kN.m",
-        "degc" | "c" => "degC",
-        "degf" => "degF",
+        "lbfin" | "lbin" | "inlbf" | "inlb" | "inlbs" => "lbf.in",
+        "lbfft" | "lbft" | "ftlbf" | "ftlb" | "ftlbs" => "lbf.ft",
+        "degc" | "°c" | "c" => "degC",
+        "degf" | "°f" => "degF",
         "k" => "K",
+        "pound" | "pounds" => "lbf",
+        "meter" | "meters" | "metre" | "metres" => "m",
+        "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm",
+        "revs" | "revolution" | "revolutions" | "rotations" => "rev",
         other => other,
     })
 }
@@ -136,26 +150,33 @@ impl ParsedName {
             Role::Load => 1,
             _ => 2,
         };
-        let (at, role) = named.iter().copied().min_by_key(|(at, role)| (rank(*role), *at))?;
+        let is_sensor = |at: usize| says(SENSOR_KINDS, &words[at].2);
+        let (at, role) =
+            named.iter().copied().min_by_key(|(at, role)| (rank(*role), is_sensor(*at), *at))?;
         let fits = |unit: &Unit| match role {
             Role::Motor | Role::Screw => matches!(unit.dimension(), Dimension::Length | Dimension::Angle),
             Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),
             Role::Temperature => unit.dimension() == Dimension::Temperature,
         };
-        // A unit ends a name, follows the channel, or begins the name.
-        let unit_at = |i: usize| Some((i, unit_of(&words[i].2).filter(fits)?));
+        // A unit ends a name (in several words: `N.m`), follows the channel, or begins the name.
+        let unit_at = |span: Range<usize>| {
+            let (first, last) = (&words[span.start], &words[span.end - 1]);
+            let unit = unit_of(&name[first.0..last.0 + last.1.len()]).filter(fits)?;
+            Some((span, unit))
+        };
         let follower = (at + 1..words.len()).find(|i| !says(FILLERS, &words[*i].2));
-        let last = Some(words.len() - 1).filter(|last| *last != at);
-        let ends = [last, follower, (at > 0).then_some(0)];
-        let found = ends.into_iter().flatten().find_map(unit_at);
-        let unit = found.map(|(_, unit)| unit);
-        let is_unit = |i: usize| found.is_some_and(|(at, _)| at == i);
+        let spans = (at + 1..words.len()).map(|i| i..words.len());
+        let others = [follower, (at > 0).then_some(0)].into_iter().flatten().map(|i| i..i + 1);
+        let found = spans.chain(others).find_map(unit_at);
+        let unit = found.as_ref().map(|(_, unit)| *unit);
+        let is_unit = |i: usize| found.as_ref().is_some_and(|(span, _)| span.contains(&i));
         let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(SENSORS, &words[*i].2));
         let sensor = tag.and_then(|i| place_in(SENSORS, &words[i].2));
         // `RAM_LOAD` and `MTR_RESOLVER`: two words for one channel.
         let is_of_channel = |i: usize| {
             ROLES.iter().any(|(of, known)| {
-                says(known, &words[i].2) && (rank(role) < 2 || (*of == role && i.abs_diff(at) == 1))
+                let is_beside = i.abs_diff(at) == 1 && (*of == role || is_sensor(i));
+                says(known, &words[i].2) && (rank(role) < 2 || is_beside)
             })
         };
         let is_place = |i: &usize| {
@@ -214,6 +235,11 @@ mod tests {
             ("AIL_L_LVDT2_MM", "screw; {position}_LVDT2_MM; AIL_L; mm"),
             ("RUD_ROD_FORCE_LBS", "load; {position}_ROD_FORCE_LBS; RUD; lbf"),
             ("MM_SCREW_RUDDER", "screw; MM_SCREW_{position}; RUDDER; mm"),
+            ("AIL_L_MTR_ANG_DEG", "motor; {position}_MTR_ANG_DEG; AIL_L; deg"),
+            ("lh_aileron_output_encoder_deg", "screw; {position}_output_encoder_deg; lh_aileron; deg"),
+            ("Rudder Hinge Moment (N.m)", "load; {position} Moment (N.m); Rudder Hinge; N.m"),
+            ("rudder_torque_in-lbf", "load; {position}_torque_in-lbf; rudder; lbf.in"),
+            ("rudder.torque.ft lb", "load; {position}.torque.ft lb; rudder; lbf.ft"),
             ("RUD_SCRW_DISP_raw", "screw; {position}_SCRW_DISP_raw; RUD; -"),
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");

@@ -208,19 +208,24 @@ impl DistinctTexts {
     /// Looks at a batch of at most four columns.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
         let columns = codes(names, arrays)?;
-        // The codes of a row, side by side in one number.
-        let packed = |row: usize| {
-            columns.iter().try_fold(0_u128, |before, column| Some(before << 32 | column.key(row)? as u128))
-        };
-        let mut rows: Vec<(u128, usize)> =
-            (0..arrays[0].len()).filter_map(|row| Some((packed(row)?, row))).collect();
-        rows.sort_unstable();
-        rows.dedup_by_key(|(codes, _)| *codes);
+        // Most rows repeat the latest combination with their text of the first column.
+        let mut latest = vec![None; columns[0].values().len()];
+        let mut distinct: HashMap<u128, usize> = HashMap::new();
+        for row in 0..arrays[0].len() {
+            let mut codes = columns.iter().map(|column| column.key(row));
+            // The codes of a row, side by side in one number.
+            let packed = codes.try_fold(0_u128, |before, code| Some(before << 32 | code? as u128));
+            let (Some(packed), Some(first)) = (packed, columns[0].key(row)) else { continue };
+            if latest[first].replace(packed) != Some(packed) {
+                distinct.insert(packed, row);
+            }
+        }
         let text = |column: &Codes, row: usize| {
             let code = column.key(row).unwrap_or_default();
             column.values().as_string::<i32>().value(code).to_owned()
         };
-        self.0.extend(rows.iter().map(|(_, row)| columns.iter().map(|column| text(column, *row)).collect()));
+        let texts = |row: usize| columns.iter().map(|column| text(column, row)).collect();
+        self.0.extend(distinct.into_values().map(texts));
         Ok(bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)?)
     }
 
