@@ -151,8 +151,7 @@ impl ParsedName {
             _ => 2,
         };
         let is_sensor = |at: usize| says(SENSOR_KINDS, &words[at].2);
-        let (at, role) =
-            named.iter().copied().min_by_key(|(at, role)| (rank(*role), is_sensor(*at), *at))?;
+        let (at, role) = named.iter().copied().min_by_key(|(at, role)| (rank(*role), is_sensor(*at), *at))?;
         let fits = |unit: &Unit| match role {
             Role::Motor | Role::Screw => matches!(unit.dimension(), Dimension::Length | Dimension::Angle),
             Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),

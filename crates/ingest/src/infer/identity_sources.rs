@@ -112,56 +112,87 @@ const DEPARTURES: [(&str, &str); 15] = [
 ];
 
 /// Forms of a day and of a time that lie in a folder and in a file name.
-const DAYS: [(&str, &str); 2] = [(r"\d{4}-\d\d-\d\d", "%Y-%m-%d"), (r"\d{8}", "%Y%m%d")];
+const DAYS: [(&str, &str); 3] =
+    [(r"\d{4}-\d\d-\d\d", "%Y-%m-%d"), (r"\d{8}", "%Y%m%d"), (r"20\d\d/\d\d/\d\d", "%Y/%m/%d")];
 const TIMES: [(&str, &str); 4] =
     [(r"\d\d-\d\d-\d\d", "%H-%M-%S"), (r"\d{6}", "%H%M%S"), (r"\d\d-\d\d", "%H-%M"), (r"\d{4}", "%H%M")];
 
-/// What a tail number looks like.
-const TAIL: &str = r"(?:[A-Z]{1,2}-?[A-Z0-9]{2,6}|\d[A-Z]-[A-Z]{3}|\d\d-(?:[03-9]\d{3}|\d{5}))";
-/// What ends a tail number at the beginning of a file name, and what it looks like then: before a hyphen, a recorder's
-/// name (`FDR-20261119`) must not be one.
+/// What a tail number looks like: with a hyphen, with a digit after its first letters, or five letters.
+const TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z0-9]{2,6}|[A-Z]{1,2}\d[A-Z0-9]{0,5}|[A-Z]{5}|\d[A-Z]-[A-Z]{3}|\d\d-(?:[03-9]\d{3}|\d{5}))";
+/// The same after a departure, where a flight number such as `TK1923` must not be one.
+const SURE_TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z]{3,4}|N\d{1,4}[A-Z]{1,2}|\d[A-Z]-[A-Z]{3})";
+/// What ends a tail number before a departure, and what it looks like then: before a hyphen, a number of a recorder
+/// (`AB-2026`) must not be one.
 const TAILS_IN_NAMES: [(char, &str); 3] =
-    [('_', TAIL), (' ', TAIL), ('-', r"[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})")];
-/// A type of aircraft before a tail number: `A320_N412FP`.
-const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]";
+    [('_', TAIL), (' ', TAIL), ('-', r"(?:[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})|\d[A-Z]-[A-Z]{3})")];
+/// What may stand before a tail number: a type of aircraft (`A320_N412FP`), nothing, or the name of a recorder (`QAR-N412FP`).
+const BEFORE_TAIL: [&str; 3] = [AIRCRAFT_TYPE, "", "[A-Za-z]{3,}[_ -]"];
+const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
+/// Folders between that of the tail and the log, at most.
+const MOST_FOLDERS: usize = 4;
 
-/// An expression and a departure format for logs whose path holds tail and departure, if this one seems to: as
-/// `TAIL/…departure….parquet`, `TAIL/POSITION/…departure….parquet`, `TAIL_departure.parquet`, `TAIL/departure/….parquet`
-/// or `TAIL/day/time.parquet`. Where `with_position`, the path holds the position as [`path_position`] finds it.
-pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String)> {
+/// An expression for logs whose path holds tail, departure or both, if this one seems to, and the form of the departure:
+/// `TAIL/…departure….parquet`, `TAIL/POSITION/…departure….parquet`, `TAIL_departure.parquet`, `departure_TAIL.parquet`,
+/// `TAIL/departure/….parquet`, `TAIL/day/time.parquet` or `TAIL/….parquet`. Where `with_position`, the path holds the
+/// position as [`path_position`] finds it.
+pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option<String>)> {
     let name = path.file_name()?.to_str()?;
     let fits =
         |expression: &str, text: &str| regex::Regex::new(expression).is_ok_and(|regex| regex.is_match(text));
-    let folder = |up: usize| path.ancestors().nth(up)?.file_name()?.to_str();
-    let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^(?:.*=)?{TAIL}$"), text));
-    let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
-    let is_known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
+    let folder = |up: usize| path.ancestors().nth(up).and_then(Path::file_name)?.to_str();
     let place_end = place_end();
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
     let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
-    if let Some((form, format)) = is_known(name) {
-        let kind = if fits(&format!("^{AIRCRAFT_TYPE}"), name) { AIRCRAFT_TYPE } else { "" };
-        let in_name =
-            TAILS_IN_NAMES.iter().find(|(end, tail)| fits(&format!("^{kind}{tail}{end}[^/]*?{form}"), name));
-        let tail = match in_name {
-            Some((end, tail)) if !is_tail(folder(1)) => format!("{kind}(?<tail_number>{tail}){end}"),
-            _ if is_tail(folder(1)) || !is_tail(folder(2)) => "(?<tail_number>[^/]+)/".to_owned(),
-            _ if with_position && !is_place => format!("(?<tail_number>[^/]+)/(?<position>{PLACE})/"),
-            _ => "(?<tail_number>[^/]+)/[^/]+/".to_owned(),
-        };
-        return Some((format!(r"{tail}[^/]*?(?<departure_utc>{form}){end}$"), (*format).to_owned()));
-    }
-    let tail = r"(?<tail_number>[^/=]+)/";
-    let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)));
+    let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
+    let known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
+    let days = path.parent().and_then(Path::to_str).unwrap_or_default();
+    let day = DAYS.iter().find(|(form, _)| fits(&format!("(?:^|/){form}$"), days));
     let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
-    let (expression, format) = if let Some(((day, days), (time, times))) = day.zip(time) {
-        let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet$");
-        (parts, format!("{days}T{times}"))
+    // The departure, its form, and the folders that it takes.
+    let (departure, format, taken) = if let Some((form, format)) = known(name) {
+        (format!(r"[^/]*?(?<departure_utc>{form}){end}"), Some((*format).to_owned()), 0)
+    } else if let Some(((day, days), (time, times))) = day.zip(time) {
+        let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet");
+        (parts, Some(format!("{days}T{times}")), 1 + day.matches('/').count())
+    } else if let Some((form, format)) = folder(1).and_then(known) {
+        (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}"), Some((*format).to_owned()), 1)
     } else {
-        let (form, format) = folder(1).and_then(is_known)?;
-        (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}$"), (*format).to_owned())
+        (end.to_owned(), None, 0)
     };
-    is_tail(folder(2)).then(|| (format!("{tail}{expression}"), format))
+    // The folder of the tail: one that is surely none else, or the outermost, as folders of flights look alike.
+    let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
+    let tails = || (taken + 1..=taken + MOST_FOLDERS).filter(|up| is(*up, TAIL) && !is(*up, AIRCRAFT_TYPE));
+    let tail_folder = tails().find(|up| is(*up, SURE_TAIL)).or(tails().last());
+    let in_name = || {
+        let (form, _) = known(name)?;
+        let tails =
+            BEFORE_TAIL.iter().flat_map(|before| TAILS_IN_NAMES.map(|(end, tail)| (before, tail, end)));
+        let mut before = tails.map(|(before, tail, end)| format!("{before}(?<tail_number>{tail}){end}"));
+        if let Some(tail) = before.find(|tail| fits(&format!("^{tail}[^/]*?{form}"), name)) {
+            return Some(format!("{tail}{departure}"));
+        }
+        let after = format!(
+            r"(?<departure_utc>{form})[^/]*?[_ -](?<tail_number>{SURE_TAIL})(?:[_ -][^/]*)?\.parquet"
+        );
+        fits(&format!("{after}$"), name).then_some(after)
+    };
+    // A name with a digit that is no date may be a tail too; `logs` is none.
+    let may_be_tail =
+        |text: &str| text.contains(|c: char| c.is_ascii_digit()) && !fits(r"(?:19|20)\d\d|^\d\d?$", text);
+    let tail = r"(?<tail_number>[^/=]+)/";
+    let below = |up: usize| "[^/]+/".repeat(up - taken - 1);
+    let expression = match (tail_folder, in_name()) {
+        (Some(up), _) if up == taken + 1 => format!("{tail}{departure}"),
+        (_, Some(whole)) => whole,
+        (Some(2), _) if with_position && !is_place && taken == 0 => {
+            format!("{tail}(?<position>{PLACE})/{departure}")
+        }
+        (Some(up), _) => format!("{tail}{}{departure}", below(up)),
+        (None, None) if format.is_none() => return None,
+        (None, None) if folder(taken + 1).is_some_and(may_be_tail) => format!("{tail}{departure}"),
+        (None, None) => departure,
+    };
+    Some((format!("{expression}$"), format))
 }
 
 /// The tail number in a path of one of the forms that [`path_identity`] knows.
@@ -215,6 +246,12 @@ mod tests {
             ("d/TC-JRA_20261119T041300Z.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/97-0042/2026-11-19_0413.parquet", "97-0042 2026-11-19_0413", "%Y-%m-%d_%H%M"),
             ("d/4X-EKA_20261119_041300.parquet", "4X-EKA 20261119_041300", "%Y%m%d_%H%M%S"),
+            ("d/QAR-N412FP-20261119T041300Z.parquet", "N412FP 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/FDR_20261119_041300_N412FP.parquet", "20261119_041300 N412FP", "%Y%m%d_%H%M%S"),
+            ("logs/20261119T041300Z_17.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/N412FP/2026/11/19/041300.parquet", "N412FP 2026/11/19 041300", "%Y/%m/%dT%H%M%S"),
+            ("d/N412FP/F0017/x1.parquet", "N412FP", ""),
+            ("d/A320/JA8089/TK1923/20261119T041300Z.parquet", "JA8089 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/tail=N412FP/20261119_041300/x1.parquet", "N412FP 20261119_041300", "%Y%m%d_%H%M%S"),
             (
                 "d/N412FP/20261119T041300Z/rudder_l.parquet",
@@ -229,12 +266,13 @@ mod tests {
         ] {
             let position = path_position(Path::new(path)).map(|(position, _)| position);
             let (expression, found) = path_identity(Path::new(path), position.is_some()).unwrap();
+            let found = found.unwrap_or_default();
             let groups = regex::Regex::new(&expression).unwrap().captures(path).unwrap();
             let facts: Vec<&str> = groups.iter().skip(1).flatten().map(|group| group.as_str()).collect();
             assert_eq!((facts.join(" ").as_str(), found.as_str()), (wanted, format), "{expression}");
             assert_eq!(position.as_deref(), groups.name("position").map(|group| group.as_str()), "{path}");
         }
-        assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet"), false), None);
+        assert_eq!(path_identity(Path::new("logs/flight 7.parquet"), false), None);
         assert_eq!(
             path_tail(Path::new("d/N412FP/rudder_l/20261119T041300Z.parquet")).as_deref(),
             Some("N412FP")

@@ -572,6 +572,8 @@ fn needed_position(log: &Path, offer: &InferredMapping) -> Option<(String, Strin
     if needs_position(offer) { path_position(log) } else { None }
 }
 
+const NO_DEPARTURE: &str = "# No departure was found: it is the first timestamp if the clock has a date.\n";
+
 fn identity(offer: &InferredMapping, log: &Path) -> String {
     let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
         let facts: Vec<String> =
@@ -609,12 +611,17 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
                 path = path.replace(&format!("(?<{}>", fact.as_str()), "(?:");
             }
             let _ = writeln!(text, "path = '{path}'   # medium: the form of {}", escape(&display_path(log)));
-            if !has(IdentityField::DepartureUtc) {
-                let _ = writeln!(text, "departure_format = {format:?}");
+            if !has(IdentityField::TailNumber) && !path.contains("<tail_number>") {
+                text.push_str("# TODO: no tail was found: set it in `path`, `folders` or `columns`.\n");
+            }
+            match format {
+                _ if has(IdentityField::DepartureUtc) => {}
+                Some(format) => drop(writeln!(text, "departure_format = {format:?}")),
+                None => text.push_str(NO_DEPARTURE),
             }
         }
         None if has(IdentityField::TailNumber) => {
-            text.push_str("# No departure was found: it is the first timestamp if the clock has a date.\n");
+            text.push_str(NO_DEPARTURE);
         }
         None => {
             text.push_str(
