@@ -162,7 +162,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     // The folder of the tail: one that is surely none else, or the outermost, as folders of flights look alike.
     let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
     let tails = || (taken + 1..=taken + MOST_FOLDERS).filter(|up| is(*up, TAIL) && !is(*up, AIRCRAFT_TYPE));
-    let tail_folder = tails().find(|up| is(*up, SURE_TAIL)).or(tails().last());
+    let tail_folder = tails().find(|up| is(*up, SURE_TAIL)).or_else(|| tails().next_back());
     let in_name = || {
         let (form, _) = known(name)?;
         let tails =
