@@ -1,6 +1,6 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP, RowSource};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;

@@ -21,7 +21,7 @@
 //! to zero load, and `lost_motion_m` at a reference load is the number that does not depend on the extrapolation.
 
 mod acceptance;
-mod blocks;
+mod block_means;
 mod codes;
 mod fit;
 mod friction;
@@ -31,7 +31,7 @@ mod stats;
 mod types;
 
 pub use codes::{QualityFlag, Rejection};
-pub use fit::workspace::ContactWorkspace;
+pub use fit::flank_fit::ContactWorkspace;
 pub use friction::flank::Flank;
 pub use friction::friction_model::Friction;
 pub use plot_data::{ContactPlot, Touch};

@@ -1,6 +1,6 @@
 //! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::Coupling;

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot, less_pressed,
@@ -16,10 +16,9 @@ use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
 use crate::contact::fit::robust_regression::REWEIGHTINGS;
 use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
-use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::flank::FIRM_SHARE;
-use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::friction::friction_model::{Coupling, FrictionState};
 use crate::contact::stats::{LOOKS, second_difference_rms};
 use crate::gap::midrange;
 use crate::kalman::Filter;
@@ -38,6 +37,14 @@ const SHORT_BLOCKS: usize = 10 * EXCERPT_BLOCKS;
 const STIFF_SHARE: f64 = 0.3;
 /// Groups of rows that the jackknife leaves out in turn.
 const GROUPS: usize = 10;
+/// Scratch memory of a regression, reused from flight to flight.
+#[derive(Debug, Default)]
+pub struct ContactWorkspace {
+    pub(crate) whole: BlockMeans,
+    excerpt: BlockMeans,
+    couplings: Vec<Coupling>,
+}
+
 /// The fitted flanks.
 #[derive(Debug)]
 pub(crate) struct FlankFit {
@@ -47,7 +54,7 @@ pub(crate) struct FlankFit {
     pub(crate) compliance_m_per_n: (f64, f64),
     pub(crate) load_zero_se_n: f64,
     /// Rms of the residuals of single blocks, m.
-    pub(crate) residual_rms_m: f64,
+    residual_rms_m: f64,
     /// Length of a block, s.
     pub(crate) period_s: f64,
     /// The gap along the stroke, where it varies.

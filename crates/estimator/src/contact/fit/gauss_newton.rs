@@ -1,6 +1,6 @@
 //! Gauss–Newton iteration over the parameters that the force in the coupling depends on.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,

@@ -8,4 +8,3 @@ mod robust_regression;
 pub(super) mod scaling;
 pub(super) mod sign_check;
 pub(super) mod stroke_profile;
-pub(super) mod workspace;

@@ -4,7 +4,7 @@
 //! Candidates are compared by their misfit of all complete blocks, in contact or within the gap: which blocks are in
 //! contact depends on the candidate, so that a comparison over contact alone would compare different data.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, RowSource, SPEED, dot};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};

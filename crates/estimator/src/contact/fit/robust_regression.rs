@@ -117,23 +117,13 @@ fn squares_of_stretches<const N: usize>(
 /// Rows that stay in the first cache while every column takes them in.
 const CHUNK: usize = 64;
 
-/// Σ w x xᵀ and Σ w x y.
+/// Σ w x xᵀ and Σ w x y: whole columns, since what is above the diagonal comes for nothing.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn normal_equations<const N: usize>(
     rows: &[DesignRow<N>],
     weights: &[f64],
 ) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
-    let mut sums = ([[0.0; N]; N], [0.0; N]);
-    add_products(rows, weights, &mut sums);
-    (SMatrix::from_fn(|i, j| sums.0[i][j]), SVector::from(sums.1))
-}
-
-/// Adds the products of some rows: whole columns, since what is above the diagonal comes for nothing.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-fn add_products<const N: usize>(
-    rows: &[DesignRow<N>],
-    weights: &[f64],
-    (squares, right): &mut ([[f64; N]; N], [f64; N]),
-) {
+    let (mut squares, mut right) = ([[0.0; N]; N], [0.0; N]);
     for (rows, weights) in rows.chunks(CHUNK).zip(weights.chunks(CHUNK)) {
         for (i, (square, right)) in squares.iter_mut().zip(right.iter_mut()).enumerate() {
             let mut sums = *square;
@@ -147,6 +137,7 @@ fn add_products<const N: usize>(
             *square = sums;
         }
     }
+    (SMatrix::from_fn(|i, j| squares[i][j]), SVector::from(right))
 }
 
 fn solve<const N: usize>(

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::stats::middle_and_half;
 use crate::contact::types::PartPrior;

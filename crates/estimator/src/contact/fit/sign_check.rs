@@ -1,6 +1,6 @@
 //! Sign and ratio check of the channels, before the regression.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::DesignRow;
 use crate::contact::fit::flank_fit::UNSEEN_GAP;

@@ -3,7 +3,7 @@
 //! Where the residuals of the fit with one gap show that the gap depends on the place, the regression is repeated with
 //! a gap, and a common error of the transducer, at each of some knots in addition; between knots both change linearly.
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE, dot};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, priors};
 use crate::contact::fit::robust_regression::{GaussianPrior, REWEIGHTINGS, fit};

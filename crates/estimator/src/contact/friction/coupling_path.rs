@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::block_means::BlockMeans;
 use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, FrictionState, ScrewState};
 
 /// Parts of a segment that are integrated side by side.
