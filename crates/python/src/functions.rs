@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use ::records::TrendRow;
 use ::records::row_schema::to_nullable_batch;
 use ::records::{Diagnostic, Installations, PartNumber};
 use arrow::array::RecordBatch;
@@ -131,41 +130,20 @@ pub(crate) fn trend(
     let ask = UnitSelection { tail_number: tail, serial_number: serial, part_number, as_of_utc };
     let estimate_batches = estimates.map(arrow_capsule::batches).transpose()?;
     let queries_table = queries.map(|table| to_table(table, "queries")).transpose()?;
-    let found =
-        py.detach(|| assess(&config.inner, installations, estimate_batches, queries_table.as_ref(), &ask));
+    let assess = || {
+        let chunks = estimate_batches.map(chunks);
+        let histories = chunks.map(|chunks| external_estimates::from_batches(&chunks)).transpose()?;
+        let queries = queries_table.as_ref().map(external_estimates::queries_of).transpose()?;
+        trends::assess(&config.inner, installations, histories, queries.as_deref(), &ask)
+    };
+    let found = py.detach(assess);
     let found = found.map_err(|error| to_run_exception(py, error))?;
-    Ok(Table::of(to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?))
+    Ok(Table::of(to_nullable_batch(&found.now).map_err(|e| to_run_exception(py, e.into()))?))
 }
 
 fn to_table(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {
     let read = Cells::of_batches(name.as_ref(), &arrow_capsule::batches(table)?);
     read.map_err(|error| config_error(table.py(), error.diagnostic()))
-}
-
-fn assess(
-    config: &job::Config,
-    installations: &Installations,
-    estimate_batches: Option<Vec<RecordBatch>>,
-    queries_table: Option<&Cells>,
-    ask: &UnitSelection,
-) -> Result<Vec<TrendRow>, pipeline::Error> {
-    let histories = match (estimate_batches, queries_table) {
-        (None, None) => {
-            let store = pipeline::open_store(config, installations)?;
-            return Ok(trends::assess_store(config, installations, &store, ask)?.now);
-        }
-        (Some(batches), _) => external_estimates::from_batches(&chunks(batches))?,
-        (None, Some(_)) => trends::load_histories(&pipeline::open_store(config, installations)?)?,
-    };
-    match queries_table {
-        None => trends::assess_histories(config, installations, histories, ask),
-        Some(queries_table) => trends::assess_queries(
-            config,
-            installations,
-            histories,
-            &external_estimates::queries_of(queries_table)?,
-        ),
-    }
 }
 
 /// The rows of a table from memory, counted through.

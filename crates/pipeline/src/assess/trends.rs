@@ -26,6 +26,7 @@ use crate::findings::monitoring::recent::{RecentDiagnostics, recent_diagnostics}
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::fleet::bookkeeping::inspections::InspectionIndex;
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
+use crate::fleet::bookkeeping::join::open_store;
 use crate::fleet::bookkeeping::usage::UsageSources;
 use crate::fleet::builder::{self, FlightColumns};
 use crate::fleet::external_estimates::AsOfQuery;
@@ -191,8 +192,8 @@ pub(crate) struct ReportAssessments {
     pub(crate) fleet: StoreAssessment,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
-    /// Assessments of earlier dates, by the number of days before.
-    pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
+    /// Assessments of earlier dates, by the number of days before and unit; of units that had flown by then.
+    pub(crate) before: BTreeMap<i64, BTreeMap<UnitKey, TrendRow>>,
     /// Forecasts of those dates for the date of the report, by days and unit.
     pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
     /// Fleet prior of each part, and its training cut-off.
@@ -224,7 +225,10 @@ pub(crate) fn assess_for_report(
         .iter()
         .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
         .collect::<Result<_, Error>>()?;
-    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?.0));
+    let then = |(days, at): (i64, Timestamp)| {
+        let flown = fleet.statements(names.iter(), at)?.0.into_iter().filter(|row| row.flights > 0);
+        Ok((days, flown.map(|row| (row.unit(), row)).collect()))
+    };
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let selected: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let priors = |part: Option<&str>| {
@@ -236,11 +240,41 @@ pub(crate) fn assess_for_report(
     Ok(ReportAssessments { fleet, drawn, before, past, priors })
 }
 
-/// One assessment for each query, without data later than its date.
+/// Assesses the selected units of the store, or of the `histories` of a table made elsewhere; with `queries`, the unit and
+/// the date of each query instead.
 ///
 /// # Errors
-/// When a history or a part's limits are invalid.
-pub fn assess_queries(
+/// As [`assess_store`], and when a history is invalid.
+pub fn assess(
+    config: &Config,
+    installations: &Installations,
+    histories: Option<Histories>,
+    queries: Option<&[AsOfQuery]>,
+    ask: &UnitSelection,
+) -> Result<StoreAssessment, Error> {
+    let mut histories = match (histories, queries) {
+        (Some(histories), _) => histories,
+        (None, Some(_)) => load_histories(&open_store(config, installations)?)?,
+        (None, None) => {
+            return assess_store(config, installations, &open_store(config, installations)?, ask);
+        }
+    };
+    if let Some(queries) = queries {
+        let now = assess_queries(config, installations, histories, queries)?;
+        return Ok(StoreAssessment { now, ..StoreAssessment::default() });
+    }
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
+        return Ok(StoreAssessment::default());
+    };
+    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
+    let (now, _) = fleet.selected(ask, as_of)?;
+    let newest = now.iter().filter_map(|row| row.latest_utc).max();
+    let notes = coverage::notes(&now, newest, ask.as_of_utc.unwrap_or_else(Timestamp::now), config);
+    Ok(StoreAssessment { now, notes, ..StoreAssessment::default() })
+}
+
+/// One assessment for each query, without data later than its date.
+fn assess_queries(
     config: &Config,
     installations: &Installations,
     mut histories: Histories,
@@ -272,21 +306,6 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
         FlightColumns::stored(chunk, batch)?.add_to(rows, |_| ())
     })?;
     Ok(builder::histories(flights, true).0)
-}
-
-/// One assessment for each selected unit, by part and serial number.
-///
-/// # Errors
-/// When a history or a part's limits are invalid.
-pub fn assess_histories(
-    config: &Config,
-    installations: &Installations,
-    mut histories: Histories,
-    ask: &UnitSelection,
-) -> Result<Vec<TrendRow>, Error> {
-    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
-    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    Ok(fleet.selected(ask, as_of)?.0)
 }
 
 /// All units, and the fleet prior of each part by training cut-off.

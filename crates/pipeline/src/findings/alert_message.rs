@@ -1,5 +1,7 @@
 //! Message of an alert: one JSON document, made once and sent unchanged in every attempt.
 
+use std::collections::BTreeMap;
+
 use records::TrendRow;
 use records::sanitize::escape_cell;
 use serde_json::{Value, json};
@@ -26,28 +28,21 @@ pub(super) fn unit_text(part: Option<&str>, serial: &str) -> String {
 /// Message of a change.
 pub(super) fn change(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -> String {
     let mut message = unit_fields(to);
-    let head = json!({
-        "freeplay_alert": VERSION,
-        "id": id,
-        "kind": "change",
-        "text": change_text(from, to),
-        "from": word(from),
-        "to": word(to.state),
-        "cause": to.cause,
-        "run_id": run_id,
-    });
-    merge(&mut message, head);
+    message["freeplay_alert"] = json!(VERSION);
+    message["id"] = json!(id);
+    message["kind"] = json!("change");
+    message["text"] = json!(change_text(from, to));
+    message["from"] = json!(word(from));
+    message["to"] = json!(word(to.state));
+    message["cause"] = json!(to.cause);
+    message["run_id"] = json!(run_id);
     message.to_string()
 }
 
 /// Summary of the states that are known when alerts begin.
 pub(super) fn baseline(id: &str, known: &[&Finding], selected: &[&Finding], run_id: &str) -> String {
-    let count = |state: &str| known.iter().filter(|f| word(f.state) == state).count();
-    let mut states = serde_json::Map::new();
-    for finding in known {
-        let state = word(finding.state);
-        states.entry(state).or_insert_with(|| json!(count(state)));
-    }
+    let mut states = BTreeMap::<&str, usize>::new();
+    known.iter().for_each(|finding| *states.entry(word(finding.state)).or_default() += 1);
     let text = format!(
         "Alerts begin with {} units, {} of them in a selected state; from now on changes are sent.",
         known.len(),
@@ -86,12 +81,6 @@ fn unit_fields(finding: &Finding) -> Value {
         "likely_utc": row.and_then(|row| row.likely_utc),
         "work_request": finding.work_request,
     })
-}
-
-fn merge(message: &mut Value, more: Value) {
-    if let (Value::Object(message), Value::Object(more)) = (message, more) {
-        message.extend(more);
-    }
 }
 
 /// One line for people.

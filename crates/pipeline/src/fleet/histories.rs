@@ -87,19 +87,20 @@ impl History {
         &self.places[flown.place as usize]
     }
 
-    /// The installation, of those of the unit, that a flight belongs to.
-    pub(crate) fn installation<'a>(
-        &self,
-        flown: &FlightRow,
-        installations: &[&'a Installation],
-    ) -> Option<&'a Installation> {
+    /// Rank by name of each place.
+    pub(crate) fn place_ranks(&self) -> Vec<usize> {
+        self.places.iter().map(|place| self.places.iter().filter(|other| *other < place).count()).collect()
+    }
+
+    /// The index of the installation, of those of the unit, that a flight belongs to.
+    pub(crate) fn installation(&self, flown: &FlightRow, installations: &[&Installation]) -> Option<usize> {
         let TailPosition { tail_number, position } = self.place(flown);
-        let is_here = |installation: &&&Installation| {
+        let is_here = |installation: &&Installation| {
             tail_number.as_deref() == Some(installation.tail_number.as_str())
                 && position.as_deref() == Some(installation.position.as_str())
                 && installation.covers(flown.departure_utc())
         };
-        installations.iter().find(is_here).copied()
+        installations.iter().position(is_here)
     }
 
     /// The history of a unit's rows, each with what else `R` holds of it; sorted, so that it does not depend on the order of

@@ -128,7 +128,8 @@ fn replay(
 }
 
 /// Whether a record is reproduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum ReplayVerdict {
     /// The estimate is the same, bitwise.
     Same,
@@ -158,13 +159,7 @@ impl ReplayVerdict {
 
     /// Stable word for scripts.
     pub fn code(self) -> &'static str {
-        match self {
-            Self::Same => "same",
-            Self::OtherSettings => "other_settings",
-            Self::OtherLog => "other_log",
-            Self::OtherNumber => "other_number",
-            Self::NotReplayed => "not_replayed",
-        }
+        self.into()
     }
 }
 

@@ -7,21 +7,11 @@ use std::path::{Path, PathBuf};
 use records::Diagnostic;
 
 /// The format of a table, by the files in its folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]
 enum TableFormat {
     Delta,
     Iceberg,
     Hudi,
-}
-
-impl TableFormat {
-    fn as_str(self) -> &'static str {
-        match self {
-            Self::Delta => "Delta",
-            Self::Iceberg => "Iceberg",
-            Self::Hudi => "Hudi",
-        }
-    }
 }
 
 /// Tables among the folders of logs. Local folders are searched when they contain a log; those of object stores are known
@@ -177,8 +167,7 @@ fn is_iceberg_metadata(path: &Path) -> bool {
 /// The live files of a table, and whether rows of each were deleted.
 fn live_files(root: &Path, format: TableFormat) -> Result<BTreeMap<PathBuf, bool>, Diagnostic> {
     if format != TableFormat::Delta {
-        let name = format.as_str();
-        let what = format!("the folder is a table of Apache {name}, which is not supported");
+        let what = format!("the folder is a table of Apache {format}, which is not supported");
         let hint = format!(
             "export its current snapshot to a folder of Parquet files and name that folder in `logs.files` \
              (DuckDB: `COPY (FROM {}) TO 'logs' (FORMAT parquet, PARTITION_BY (tail, flight))`)",

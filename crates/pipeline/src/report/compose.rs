@@ -61,7 +61,7 @@ pub fn compose(
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
     let compose = ReportComposer {
         config,
-        before: &by_name(before),
+        before: &before,
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
         installations: &InstallationIndex::new(installations),
@@ -145,20 +145,10 @@ impl Logs {
     }
 }
 
-/// The statements of one and of more days before, by days; of units that had flown by then.
-type PastAssessments = BTreeMap<i64, BTreeMap<Name, TrendRow>>;
-
-fn by_name(before: BTreeMap<i64, Vec<TrendRow>>) -> PastAssessments {
-    let named = |rows: Vec<TrendRow>| {
-        rows.into_iter().filter(|row| row.flights > 0).map(|row| (row.unit(), row)).collect()
-    };
-    before.into_iter().map(|(days, rows)| (days, named(rows))).collect()
-}
-
 /// What all units' pages are composed from.
 struct ReportComposer<'a> {
     config: &'a Config,
-    before: &'a PastAssessments,
+    before: &'a BTreeMap<i64, BTreeMap<Name, TrendRow>>,
     past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
     installations: &'a InstallationIndex<'a>,

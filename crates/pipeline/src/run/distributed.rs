@@ -184,7 +184,9 @@ fn read(batches: &[RecordBatch]) -> Result<HashMap<String, ProcessedLog>, Error>
     let mut records: HashMap<String, BTreeMap<RecordKey, GapRecord>> = HashMap::new();
     for batch in batches {
         let batch = typed(batch)?;
-        let (logs, accounts) = (text(&batch, "log_path")?, text(&batch, "account")?);
+        let text =
+            |name: &str| Ok::<_, Error>(batch.column(batch.schema_ref().index_of(name)?).as_string::<i32>());
+        let (logs, accounts) = (text("log_path")?, text("account")?);
         for row in (0..batch.num_rows()).filter(|row| accounts.is_valid(*row)) {
             let process_log =
                 serde_json::from_str(accounts.value(row)).map_err(|e| Error::Engine(e.to_string()))?;
@@ -214,9 +216,4 @@ fn typed(batch: &RecordBatch) -> Result<RecordBatch, Error> {
     };
     let columns = schema.fields().iter().map(column).collect::<Result<Vec<_>, Error>>()?;
     Ok(RecordBatch::try_new(schema, columns)?)
-}
-
-fn text<'b>(batch: &'b RecordBatch, name: &str) -> Result<&'b StringArray, Error> {
-    let column = batch.column_by_name(name).and_then(|column| column.as_string_opt::<i32>());
-    column.ok_or_else(|| Error::Engine(format!("an answer lacks `{name}`")))
 }

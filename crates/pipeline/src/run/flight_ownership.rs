@@ -43,6 +43,12 @@ impl ProcessedLog {
         Self { account, records: Vec::new(), diagnostics }
     }
 
+    /// A log in error for one reason.
+    pub(crate) fn in_error(mut account: LogRecord, diagnostic: Diagnostic) -> Self {
+        summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
+        Self::without_records(account, vec![diagnostic])
+    }
+
     /// Whether the content is known, so that no record was made.
     pub(crate) fn is_known(&self) -> bool {
         self.account.outcome == LogOutcome::Known
@@ -199,7 +205,8 @@ impl<'a> OwnershipLedger<'a> {
         } else if let Some(owner) = worse_than {
             account.error_detail = Some(format!("the records with a gap of {owner} stay"));
         }
-        let mut results = vec![self.store(account, kept, &diagnostics, moved_from, report)];
+        let done = ProcessedLog { account, records: kept, diagnostics };
+        let mut results = vec![self.store(done, moved_from, report)];
         for (log, is_same) in displaced {
             let Some(mut loser) = self.accounts.get(&log).cloned() else { continue };
             let left = self.left_to(&loser);
@@ -210,12 +217,12 @@ impl<'a> OwnershipLedger<'a> {
                 results.push(LogResult { account: loser, records: Vec::new(), moved_from: Vec::new() });
                 continue;
             }
-            let (loser, diagnostics) = superseded(loser, &results[0].account, is_same);
+            let loser = superseded(loser, &results[0].account, is_same);
             if is_same {
                 let (log, owner) = (log, results[0].account.log_path.clone());
                 report.duplicates.push(DuplicateLog { log, owner });
             }
-            results.push(self.store(loser, Vec::new(), &diagnostics, Vec::new(), report));
+            results.push(self.store(loser, Vec::new(), report));
         }
         Ok(results)
     }
@@ -336,33 +343,34 @@ impl<'a> OwnershipLedger<'a> {
             let (own, others) = departures.unwrap_or_default();
             let diagnostic = pieces_undeclared(&account.log_path, own, &other.log_path, others);
             (account.estimated, account.refused) = (0, 0);
-            summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
-            (account, vec![diagnostic])
+            ProcessedLog::in_error(account, diagnostic)
         };
         // A log with an error of its own keeps it.
-        let (own, diagnostics) =
-            if diagnostics.is_empty() { refused(account, &pieces[0]) } else { (account, diagnostics) };
-        let mut results = vec![self.store(own.clone(), Vec::new(), &diagnostics, Vec::new(), report)];
+        let done = if diagnostics.is_empty() {
+            refused(account, &pieces[0])
+        } else {
+            ProcessedLog::without_records(account, diagnostics)
+        };
+        let own = done.account.clone();
+        let mut results = vec![self.store(done, Vec::new(), report)];
         let pieces = pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0);
         for piece in pieces.filter(|piece| !self.is_stored(piece)).collect::<Vec<_>>() {
             // Records of this run that are taken back: they were stored before their other pieces were known.
             let keys = piece.keys();
             keys.iter().for_each(|key| drop(self.own.remove(key)));
-            let (piece, diagnostics) = refused(piece, &own);
-            results.push(self.store(piece, Vec::new(), &diagnostics, keys, report));
+            results.push(self.store(refused(piece, &own), keys, report));
         }
         results
     }
 
     fn store(
         &mut self,
-        mut account: LogRecord,
-        records: Vec<GapRecord>,
-        diagnostics: &[Diagnostic],
+        done: ProcessedLog,
         moved_from: Vec<RecordKey>,
         report: &mut RunSummary,
     ) -> LogResult {
-        report.count(&account, &records, diagnostics);
+        report.count(&done.account, &done.records, &done.diagnostics);
+        let ProcessedLog { mut account, records, .. } = done;
         let refused = records.iter().filter(|record| record.estimate.status == Status::Refused).count();
         (account.estimated, account.refused) = ((records.len() - refused) as i64, refused as i64);
         self.keep_counts(&mut account, report);
@@ -397,14 +405,13 @@ fn hash_of_id(account: &LogRecord) -> Option<u64> {
     Some(hash.finish())
 }
 
-/// Status of a log whose flight belongs to another log.
-fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogRecord, Vec<Diagnostic>) {
+/// Outcome of a log whose flight belongs to another log.
+fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> ProcessedLog {
     account.outcome = LogOutcome::Done;
     if is_same {
         account.error_detail = Some(format!("copy of {}", owner.log_path));
-        return (account, Vec::new());
+        return ProcessedLog::without_records(account, Vec::new());
     }
     let diagnostic = duplicate_flight(&account.log_path, &owner.log_path);
-    summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
-    (account, vec![diagnostic])
+    ProcessedLog::in_error(account, diagnostic)
 }

@@ -32,7 +32,7 @@ use crate::run::event::Event;
 use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::summary::{self, KilledRun, RunSummary};
-use crate::run::worker_pool::{Next, PoolSettings, StepCount, WorkerPool};
+use crate::run::worker_pool::{PoolSettings, StepCount, WorkerPool};
 
 /// Longest wait of a finished flight for others of the same commit: each commit is a file and a log entry.
 const BATCH_WAIT: Duration = Duration::from_millis(500);
@@ -239,8 +239,7 @@ impl RunInputs {
             known => known.to_owned(),
         };
         account.config_digest = Some(digest);
-        summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
-        ProcessedLog::without_records(account, vec![diagnostic])
+        ProcessedLog::in_error(account, diagnostic)
     }
 
     /// The records that are known of this flight's content under these settings: its own, those of a log that
@@ -288,8 +287,15 @@ fn process_all(
         fail: &|work, diagnostic| inputs.failed(work, diagnostic),
     };
     let mut pool = WorkerPool::start(settings, Box::new(process_log))?;
-    while let Next::Log(first) = pool.next(None)? {
-        store(collect_batch(*first, &mut pool)?)?;
+    while let Some(first) = pool.next(None)? {
+        let deadline = Instant::now() + BATCH_WAIT;
+        let mut finished = vec![*first];
+        while finished.len() < BATCH_LOGS
+            && let Some(next) = pool.next(Some(deadline))?
+        {
+            finished.push(*next);
+        }
+        store(finished)?;
     }
     Ok(())
 }
@@ -393,17 +399,4 @@ impl WorkerContext<'_> {
         }
         (records, diagnostics)
     }
-}
-
-/// Results that arrive within a short time after the first.
-fn collect_batch(first: ProcessedLog, pool: &mut WorkerPool<'_>) -> Result<Vec<ProcessedLog>, Error> {
-    let deadline = Instant::now() + BATCH_WAIT;
-    let mut gathered = vec![first];
-    while gathered.len() < BATCH_LOGS {
-        match pool.next(Some(deadline))? {
-            Next::Log(next) => gathered.push(*next),
-            Next::Nothing | Next::End => break,
-        }
-    }
-    Ok(gathered)
 }

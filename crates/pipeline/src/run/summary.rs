@@ -14,7 +14,6 @@ use crate::error::is_passing;
 use crate::findings::monitoring::REPORTED_DAYS;
 use crate::findings::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
 use crate::findings::monitoring::mapping_faults::MappingFault;
-use crate::findings::monitoring::recent;
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::findings::monitoring::repeated_samples::{self, RepeatedSamples};
 use crate::findings::summary::FollowUpSummary;
@@ -265,7 +264,11 @@ impl RunSummary {
         } = assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
-        let newest = recent::newest_utc(&recent).unwrap_or_default();
+        let newest = recent
+            .values()
+            .filter_map(|flights| Some(flights.last()?.departure_utc))
+            .max()
+            .unwrap_or_default();
         self.recorder_moved = recorder_changes(&followed.changes, newest);
         self.recorder_moved.retain(|m| touched(&m.tail_number));
         self.quantity_changes = followed.changes;

@@ -53,16 +53,6 @@ enum Message {
     Finished { log: usize, outcome: Box<ProcessedLog> },
 }
 
-/// What comes next.
-pub(crate) enum Next {
-    /// What came of a log.
-    Log(Box<ProcessedLog>),
-    /// Nothing until the deadline.
-    Nothing,
-    /// Every log is finished or will not be reached.
-    End,
-}
-
 /// What the threads of a pool share; owned, since an abandoned pool outlives the run.
 struct Shared {
     process_log: Arc<ProcessLog>,
@@ -194,18 +184,19 @@ impl<'a> WorkerPool<'a> {
         })
     }
 
-    /// Waits for what comes of the next log, until a deadline if there is one.
+    /// Waits for what comes of the next log, until a deadline if there is one; none after it, and when every log is finished
+    /// or will not be reached.
     ///
     /// # Errors
     /// When abandoned workers cannot be replaced.
-    pub(crate) fn next(&mut self, until: Option<Instant>) -> Result<Next, Error> {
+    pub(crate) fn next(&mut self, until: Option<Instant>) -> Result<Option<Box<ProcessedLog>>, Error> {
         loop {
             if let Some(log) = self.late.pop() {
                 let work = &self.settings.plan.work[log];
                 let limit_s = self.settings.limit.as_secs_f64();
                 let mut outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s));
                 outcome.account.duration_s = limit_s;
-                return Ok(self.finished(log, Box::new(outcome)));
+                return Ok(Some(self.finished(log, Box::new(outcome))));
             }
             let now = Instant::now();
             if self.settings.stop.load(Ordering::Relaxed) {
@@ -221,17 +212,17 @@ impl<'a> WorkerPool<'a> {
                 Ok(Message::Finished { log, outcome }) => {
                     if self.in_progress.remove(&log).is_some() {
                         self.abandoned_in_a_row = 0;
-                        return Ok(self.finished(log, outcome));
+                        return Ok(Some(self.finished(log, outcome)));
                     }
                 }
-                Err(RecvTimeoutError::Disconnected) => return Ok(Next::End),
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => {
                     if self.stop_seen.is_some_and(|seen| seen.elapsed() > STOP_GRACE) {
-                        return Ok(Next::End);
+                        return Ok(None);
                     }
                     self.abandon_late()?;
                     if until.is_some_and(|until| until <= Instant::now()) {
-                        return Ok(Next::Nothing);
+                        return Ok(None);
                     }
                 }
             }
@@ -244,9 +235,9 @@ impl<'a> WorkerPool<'a> {
         self.workers.shared.stop();
     }
 
-    fn finished(&self, log: usize, outcome: Box<ProcessedLog>) -> Next {
+    fn finished(&self, log: usize, outcome: Box<ProcessedLog>) -> Box<ProcessedLog> {
         (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
-        Next::Log(outcome)
+        outcome
     }
 
     /// Looks for logs that have passed their limit, when all messages are read, and replaces their workers. A log that
@@ -338,7 +329,7 @@ mod tests {
         };
         let mut pool = WorkerPool::start(settings, Box::new(process_log)).unwrap();
         let mut outcomes = 0;
-        while let Next::Log(_) = pool.next(None).unwrap() {
+        while pool.next(None).unwrap().is_some() {
             outcomes += 1;
         }
         (outcomes - late.get(), late.get())

@@ -45,10 +45,20 @@ fn unit(record: &GapRecord) -> i32 {
     record.serial_number.as_str()[1..].parse().unwrap()
 }
 
+/// Assessments of the units of some histories.
+fn assess_histories(
+    config: &Config,
+    installations: &Installations,
+    histories: Histories,
+    ask: &UnitSelection,
+) -> Vec<TrendRow> {
+    trends::assess(config, installations, Some(histories), None, ask).unwrap().now
+}
+
 /// Assessments of all units at a date, by default that of the newest record.
 fn assess_with(config: &Config, flown: &[GapRecord], as_of_utc: Option<Timestamp>) -> Vec<TrendRow> {
     let ask = UnitSelection { as_of_utc, ..UnitSelection::default() };
-    trends::assess_histories(config, &Installations::default(), histories(flown), &ask).unwrap()
+    assess_histories(config, &Installations::default(), histories(flown), &ask)
 }
 
 fn assess(flown: &[GapRecord], as_of: Timestamp) -> Vec<TrendRow> {
@@ -129,7 +139,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
     let installations =
         ingest::tables::installations(table.path(), &config.document.columns.installations).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
-    let rows = trends::assess_histories(&config, &installations, histories(&rows), &ask).unwrap();
+    let rows = assess_histories(&config, &installations, histories(&rows), &ask);
     for row in &rows {
         let is_removed = row.serial_number == "S03";
         assert_eq!(row.state.is_none(), is_removed, "{row:?}");
@@ -182,12 +192,8 @@ fn recorded_maintenance_is_a_change_point_from_its_date_on() {
 #[test]
 fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     let nobody = Installations::default();
-    let found = trends::assess_histories(
-        &booked("maintenance_unknown.csv"),
-        &nobody,
-        histories(&flown(20)),
-        &UnitSelection::default(),
-    );
+    let (config, flown) = (booked("maintenance_unknown.csv"), histories(&flown(20)));
+    let found = trends::assess(&config, &nobody, Some(flown), None, &UnitSelection::default());
     let Err(pipeline::Error::Refused(diagnostics)) = found else { panic!("{found:?}") };
     let text = format!("{diagnostics:?}");
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
@@ -229,7 +235,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight.flight_id.as_str().ends_with(['1', '3', '5', '7', '9']));
         logged.iter_mut().for_each(|row| row.flight.tail_hours_end = None);
-        trends::assess_histories(config, &installations, histories(&logged), &ask).unwrap()
+        assess_histories(config, &installations, histories(&logged), &ask)
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in assess(&config_with).iter().zip(assess(&config())).enumerate() {
@@ -340,14 +346,13 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
             "{reason}"
         );
     }
-    // Asked for alone, a unit is configured_axis the same.
+    // Asked for alone, a unit is assessed the same.
     let ask = UnitSelection {
         as_of_utc: Some(day(227)),
         serial_number: Some("S02".into()),
         ..UnitSelection::default()
     };
-    let alone =
-        trends::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
+    let alone = assess_histories(&config(), &Installations::default(), histories(&rows), &ask);
     assert_eq!(alone, assess[2..3]);
 }
 
@@ -389,7 +394,7 @@ fn contradicting_rows_of_a_flight_are_named_and_decide_nothing() {
         as_of_utc: Some("2026-01-12T06:00:00Z".parse().unwrap()),
         ..UnitSelection::default()
     };
-    let rows = trends::assess_histories(&config(), &Installations::default(), histories, &ask).unwrap();
+    let rows = assess_histories(&config(), &Installations::default(), histories, &ask);
     let reason = rows[0].reason.as_deref().unwrap();
     assert!(reason.contains("1 flights with records that contradict each other"), "{reason}");
     assert!((rows[0].gap_m.unwrap() - 30e-6).abs() < 1e-7, "{:?}", rows[0]);

@@ -4,11 +4,10 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use jiff::Timestamp;
 use job::Config;
 use pipeline::State;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
-use pipeline::findings::monitoring::coverage;
+use pipeline::fleet::external_estimates;
 use records::uncertainty::NORMAL_95;
 use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 
@@ -29,36 +28,13 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if args.quantities || args.changes {
         return quantities(args, &ask, &config, &installations, output);
     }
-    let found = match (&args.external.estimates, &args.queries) {
-        (None, None) => {
-            let store = pipeline::open_store(&config, &installations)?;
-            trends::assess_store(&config, &installations, &store, &ask)?
-        }
-        (estimates, queries) => {
-            let histories = match estimates {
-                Some(file) => pipeline::fleet::external_estimates::read(file)?,
-                None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
-            };
-            let now = match queries {
-                Some(file) => {
-                    let queries = pipeline::fleet::external_estimates::queries(file)?;
-                    trends::assess_queries(&config, &installations, histories, &queries)?
-                }
-                None => trends::assess_histories(&config, &installations, histories, &ask)?,
-            };
-            let newest = now.iter().filter_map(|row| row.latest_utc).max();
-            let today = args.as_of.unwrap_or_else(Timestamp::now);
-            let notes = match queries {
-                Some(_) => Vec::new(),
-                None => coverage::notes(&now, newest, today, &config),
-            };
-            StoreAssessment { now, notes, ..StoreAssessment::default() }
-        }
-    };
+    let histories = args.external.estimates.as_deref().map(external_estimates::read).transpose()?;
+    let queries = args.queries.as_deref().map(external_estimates::queries).transpose()?;
+    let found = trends::assess(&config, &installations, histories, queries.as_deref(), &ask)?;
     let mut nothing = "no unit was queried\n".to_owned();
     if found.now.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
-            Some(file) => KnownNames::Estimates(pipeline::fleet::external_estimates::read(file)?),
+            Some(file) => KnownNames::Estimates(external_estimates::read(file)?),
             None => KnownNames::of(&config),
         };
         known.check_units(&args.units)?;

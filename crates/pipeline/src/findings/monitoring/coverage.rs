@@ -14,7 +14,7 @@ use store::LogRecord;
 /// Limits, hours and new logs that the assessments of some units lack, in words.
 ///
 /// `newest_log` is the departure of the newest log of these units, and `today` the date from which its age counts.
-pub fn notes(
+pub(crate) fn notes(
     rows: &[TrendRow],
     newest_log: Option<Timestamp>,
     today: Timestamp,

@@ -99,12 +99,3 @@ fn add(rows: &mut RowsByUnit<(u32, FlightDiagnostics)>, chunk: &TableBatch) -> R
         Ok(())
     })
 }
-
-/// The newest departure of all.
-pub(crate) fn newest_utc(recent_diagnostics: &RecentDiagnostics) -> Option<Timestamp> {
-    recent_diagnostics
-        .values()
-        .filter_map(|diagnostics| diagnostics.last())
-        .map(|diagnostics| diagnostics.departure_utc)
-        .max()
-}

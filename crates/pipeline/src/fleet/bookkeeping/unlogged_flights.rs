@@ -33,24 +33,24 @@ impl<'a> UnloggedFlights<'a> {
         self.by_tail.contains_key(tail)
     }
 
-    /// Flights of a unit's installations for which it has no row, each with its installation.
+    /// Flights of a unit's installations for which it has no row, each with the index of its installation.
     ///
     /// Histories of which no row belongs to an installation are taken as they are.
-    pub(crate) fn of_unit<'s>(
+    pub(crate) fn of_unit(
         &self,
         history: &History,
-        installations: &[&'s Installation],
-    ) -> Vec<(&'s Installation, &'a Flight)> {
+        installations: &[&Installation],
+    ) -> Vec<(usize, &'a Flight)> {
         if self.by_tail.is_empty()
             || history.flights().iter().all(|f| history.installation(f, installations).is_none())
         {
             return Vec::new();
         }
         let known = &Known::of(history);
-        let missing = installations.iter().flat_map(|&installation| {
+        let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
             let flights = self.by_tail.get(installation.tail_number.as_str()).map_or(&[][..], Vec::as_slice);
             let missing = flights.iter().filter(|f| installation.covers(f.departure_utc) && !known.holds(f));
-            missing.map(move |&flight| (installation, flight))
+            missing.map(move |&flight| (index, flight))
         });
         missing.collect()
     }

@@ -1,6 +1,5 @@
 //! Accumulated usage of a unit: its rows, flights without a row, and recorded maintenance.
 
-use jiff::Timestamp;
 use job::Config;
 use records::{Installation, Installations};
 use trend::{Observation, Series, UsageDefaults, UsageSource};
@@ -10,8 +9,7 @@ use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log;
 use crate::fleet::bookkeeping::unlogged_flights::UnloggedFlights;
-use crate::fleet::flight_row::FlightRow;
-use crate::fleet::histories::{History, TailPosition, UnitKey};
+use crate::fleet::histories::{History, UnitKey};
 
 /// Sources of usage in addition to rows: installations, maintenance, flights without a log.
 pub(crate) struct UsageSources<'a> {
@@ -71,14 +69,17 @@ fn maintenance_events(
 fn observations(
     history: &History,
     installations: &[&Installation],
-    unlogged: &[(&Installation, &records::Flight)],
+    unlogged: &[(usize, &records::Flight)],
 ) -> Vec<Observation> {
-    let mut numbers = InstallationIds::default();
+    let outside = history.place_ranks();
     let seen = history.flights().iter().map(|f| {
         let extras = history.extras(f);
+        // Numbers beyond the installations are those of places without one.
+        let installation = history.installation(f, installations);
+        let installation = installation.unwrap_or_else(|| installations.len() + outside[f.place as usize]);
         Observation {
             departure_us: f.departure_us(),
-            installation: numbers.of_flown(f, history, installations),
+            installation: installation as u32,
             flight_hours: extras.flight_hours(),
             tail_hours_end: extras.tail_hours_end(),
             load_reversals: extras.load_reversals(),
@@ -90,44 +91,10 @@ fn observations(
     let mut observations: Vec<Observation> = seen.collect();
     observations.extend(unlogged.iter().map(|(installation, flight)| Observation {
         departure_us: flight.departure_utc.as_microsecond(),
-        installation: numbers.of(&TailPosition::of(installation), Some(installation)),
+        installation: *installation as u32,
         flight_hours: flight.flight_hours,
         tail_hours_end: flight.tail_hours_end,
         ..Observation::default()
     }));
     observations
-}
-
-/// Installations of one unit, numbered as they come.
-#[derive(Default)]
-struct InstallationIds<'a> {
-    known: Vec<(TailPosition, Option<Timestamp>)>,
-    /// Position and installation of the previous flight, and their number.
-    last: Option<(u32, &'a Installation, u32)>,
-}
-
-impl<'a> InstallationIds<'a> {
-    /// Installation number of a flight. Installations of one position do not overlap, so most flights have that of the
-    /// previous flight.
-    fn of_flown(&mut self, flown: &FlightRow, history: &History, installations: &[&'a Installation]) -> u32 {
-        let is_here =
-            |last: &(u32, &Installation, u32)| last.0 == flown.place && last.1.covers(flown.departure_utc());
-        if let Some((_, _, number)) = self.last.filter(is_here) {
-            return number;
-        }
-        let installation = history.installation(flown, installations);
-        let number = self.of(history.place(flown), installation);
-        self.last = installation.map(|installation| (flown.place, installation, number));
-        number
-    }
-
-    fn of(&mut self, place: &TailPosition, installation: Option<&Installation>) -> u32 {
-        let installed_utc = installation.map(|installation| installation.installed_utc);
-        let known = self.known.iter().rposition(|(p, at)| p == place && *at == installed_utc);
-        let number = known.unwrap_or_else(|| {
-            self.known.push((place.clone(), installed_utc));
-            self.known.len() - 1
-        });
-        number as u32
-    }
 }

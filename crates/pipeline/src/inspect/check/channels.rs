@@ -3,6 +3,7 @@
 use ingest::channel::position_ratio::position_ratio;
 use ingest::{ActuatorChannels, ActuatorColumns, Quality};
 use job::flight_log::FlightLog;
+use job::part_identification::IdentifiedParams;
 use job::{Config, estimate, rejection};
 use records::{Diagnostic, Installations, PartNumber};
 
@@ -55,12 +56,16 @@ impl ChannelCheck {
     }
 }
 
+/// Parameters that the flight of an actuator shows of its part, and why a run would refuse it, or the code of a stiffness
+/// unlike the configured one.
+pub(super) type Identified = (PartNumber, IdentifiedParams, Option<&'static str>);
+
 /// Findings of one actuator.
+#[derive(Default)]
 pub(super) struct ActuatorCheck {
     pub(super) found: Vec<ChannelCheck>,
     pub(super) clock: Option<String>,
-    pub(super) identified: Option<(PartNumber, job::part_identification::IdentifiedParams)>,
-    pub(super) rejection: Option<&'static str>,
+    pub(super) identified: Option<Identified>,
 }
 
 /// Time base of an actuator as text.
@@ -120,9 +125,7 @@ pub(super) fn actuator(
                 remedy: rejection::remedy("channel_unmapped"),
                 ..base("all", at.columns[0].as_ref(), "")
             }],
-            clock: None,
-            identified: None,
-            rejection: None,
+            ..ActuatorCheck::default()
         });
     }
     let a = opened.channels(at, part)?;
@@ -155,9 +158,12 @@ pub(super) fn actuator(
         channel.note = Some(format!("{before}would be refused, {code}"));
         channel.remedy = rejection::remedy(code);
     }
-    let params = job::part_identification::IdentifiedParams::of(&a, tested.as_deref().ok());
-    let identified = Some((installation.part_number.clone(), params));
-    Ok(ActuatorCheck { found, clock: Some(clock(&a)), identified, rejection })
+    let params = IdentifiedParams::of(&a, tested.as_deref().ok());
+    let configured = part.actuator.stiffness_n_per_m();
+    let is_unlike = |fitted| rejection::is_stiffness_unlike(fitted, configured);
+    let unlike = params.stiffness_n_per_m.is_some_and(is_unlike).then_some(rejection::STIFFNESS_UNLIKE);
+    let identified = Some((installation.part_number.clone(), params, rejection.or(unlike)));
+    Ok(ActuatorCheck { found, clock: Some(clock(&a)), identified })
 }
 
 /// Row of the channel that a rejection concerns: motor, screw, their difference, load.

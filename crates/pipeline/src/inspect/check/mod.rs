@@ -14,7 +14,7 @@ use records::{Diagnostic, Installations, PartNumber};
 
 use crate::run::time_limit::within_time_limit;
 
-use channels::{ActuatorCheck, actuator};
+use channels::{ActuatorCheck, Identified, actuator};
 pub use channels::{ChannelCheck, RATIO};
 use flight_owners::{CheckedLog, FlightOwners, flight_keys};
 
@@ -36,8 +36,7 @@ pub struct LogCheck {
     /// Its channels.
     pub channels: Vec<ChannelCheck>,
     diagnostics: Vec<Diagnostic>,
-    /// Parameters and rejection of each actuator.
-    identified: Vec<(PartNumber, IdentifiedParams, Option<&'static str>)>,
+    identified: Vec<Identified>,
 }
 
 /// What was found in logs.
@@ -127,16 +126,10 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
     };
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
-            Ok(ActuatorCheck { found, clock, identified, rejection: refused }) => {
+            Ok(ActuatorCheck { found, clock, identified }) => {
                 seen.channels.extend(found);
                 seen.clocks.extend(clock);
-                if let Some((part, identified)) = identified {
-                    let configured = config.parts.get(&part).map(|p| p.actuator.stiffness_n_per_m());
-                    let unlike = identified.stiffness_n_per_m.zip(configured);
-                    let unlike = unlike.filter(|(fitted, own)| rejection::is_stiffness_unlike(*fitted, *own));
-                    let code = refused.or(unlike.map(|_| rejection::STIFFNESS_UNLIKE));
-                    seen.identified.push((part, identified, code));
-                }
+                seen.identified.extend(identified);
             }
             // A fault of the whole log is reported for each of its actuators.
             Err(diagnostic) => {
