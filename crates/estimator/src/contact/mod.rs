@@ -71,11 +71,7 @@ pub fn estimate_with(
     room: &mut ContactWorkspace,
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
-    Ok(look(samples, prior, room).map(|(frame, contact)| {
-        let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact);
-        let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
-        Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m))
-    }))
+    Ok(look(samples, prior, room).map(|(frame, contact)| Box::new(report(room, &frame, prior, &contact))))
 }
 
 /// Why a flight does not allow an estimate, as far as the channels show it without a regression: for the published
@@ -155,11 +151,10 @@ fn look(
 }
 
 fn report(
+    room: &ContactWorkspace,
     frame: &Scaling,
     prior: &PartPrior,
     contact: &FlankFit,
-    midrange_at_fit_m: Option<f64>,
-    loop_width_m: Option<(f64, f64)>,
 ) -> ContactEstimate {
     let preload_n = lost_motion::preload_n(contact);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
@@ -190,10 +185,10 @@ fn report(
         },
         gap_profile: contact.profile.as_ref().map(|profile| profile.places.clone()).unwrap_or_default(),
         preload_n,
-        loop_width_m,
+        loop_width_m: lost_motion::loop_width_m(contact, &room.whole, frame),
         lost_motion_m: prior.reference_load_n.and_then(|n| lost_motion::lost_motion_m(contact, frame, n)),
         load_p95_n: frame.load_n,
-        midrange_at_fit_m,
+        midrange_at_fit_m: flank_fit::midrange_at_fit_m(room, frame, contact),
         flags: Vec::new(),
     };
     found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft);

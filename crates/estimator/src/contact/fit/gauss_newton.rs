@@ -12,13 +12,6 @@ use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
 use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
-/// Dry friction over the 95 % load, and the share of load lost: most likely value and spread.
-const FRICTION_DRY: (f64, f64) = (0.02, 0.06);
-/// See [`FRICTION_DRY`].
-const FRICTION_SHARE: (f64, f64) = (0.03, 0.06);
-/// Spread of the delays between channels, s.
-const SKEW_S: f64 = 5e-3;
-
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
 pub(crate) struct GaussNewtonResult {
@@ -55,15 +48,6 @@ pub(crate) fn search(
     found.ok_or(Rejection::TooShort)
 }
 
-/// The start of a search: the part's stiffness, a usual friction, no gap and no delays.
-pub(crate) fn start(scaling: &Scaling) -> FrictionState {
-    FrictionState {
-        stiffness_n_per_m: scaling.stiffness_n_per_m,
-        friction: Friction { dry_n: FRICTION_DRY.0 * scaling.load_n, lost_share: FRICTION_SHARE.0 },
-        ..FrictionState::default()
-    }
-}
-
 /// The reason of a flight whose less pressed flank is pressed for a time, s.
 pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     if least_s < MIN_CONTACT_S {
@@ -90,16 +74,16 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
         SIDE_FORCE => zero(0.05 * windup_m),
         FORCE_DRIFT => zero(0.03 * windup_m),
-        DRY => lack(FRICTION_DRY, state.friction.dry_n / scaling.load_n),
-        SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
-        // Friction at rest exceeds that in motion by 30 %, or by nothing.
+        // Dry friction over the 95 % load, the share of load lost, and the excess of friction at rest: most likely and spread.
+        DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
+        SHARE => lack((0.03, 0.06), state.friction.lost_share),
         STRIBECK => lack((0.0, 0.3), state.stribeck),
         // A screw that is locked has no delay: viscous friction is left, 0.1 ms.
         SPEED if scaling.is_locked() => zero(1e-4 * SPEED_M_PER_S),
-        // The delays that remain once the channels are realigned.
-        SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
+        // The delays that remain once the channels are realigned: 5 ms.
+        SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: 5e-3 * SPEED_M_PER_S },
         LOAD_RATE => {
-            GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: SKEW_S / LATE_S * here_m }
+            GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: 5e-3 / LATE_S * here_m }
         }
         // The drift within a flight, linear and quadratic.
         DRIFT => zero(50e-6),

@@ -7,7 +7,7 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, RowSource, SPEED, dot};
-use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
+use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
@@ -88,8 +88,12 @@ impl<'a> ParameterSearch<'a> {
         let mut rejection = Rejection::TooShort;
         // Dry friction over the 95 % load, and lost share: usual ones, and heavy ones.
         for (dry, lost_share) in [(0.02, 0.03), (0.10, 0.12)] {
-            let friction = Friction { dry_n: dry * self.scaling.load_n, lost_share };
-            match self.search(FrictionState { friction, ..start(self.scaling) }, 3) {
+            let state = FrictionState {
+                stiffness_n_per_m: self.scaling.stiffness_n_per_m,
+                friction: Friction { dry_n: dry * self.scaling.load_n, lost_share },
+                ..FrictionState::default()
+            };
+            match self.search(state, 3) {
                 Ok(result) => {
                     let mut residuals_m: Vec<f64> = Vec::new();
                     self.each_residual(&result, result.at.load_zero_n, |e_m| residuals_m.push(e_m));
