@@ -165,23 +165,21 @@ impl Filter {
         if !(s_m2.is_finite() && s_m2 > 0.0) {
             return Err(Error::InnovationCovariance { s_m2 });
         }
-        let (innovation_variance_m2, prior) = (s_m2, *prior);
-        if y_m.is_nan() {
-            let gain = Vector3::zeros();
-            return Ok(FilterStep {
-                prior,
-                posterior: prior,
-                innovation_m: f64::NAN,
-                innovation_variance_m2,
-                gain,
-            });
+        let mut step = FilterStep {
+            prior: *prior,
+            posterior: *prior,
+            innovation_m: f64::NAN,
+            innovation_variance_m2: s_m2,
+            gain: Vector3::zeros(),
+        };
+        if !y_m.is_nan() {
+            step.gain = prior.p.column(0) / s_m2;
+            step.innovation_m = y_m - prior.x[0];
+            let p = symmetric(&(prior.p - step.gain * prior.p.row(0)));
+            debug_assert!(has_positive_variances(&p, &prior.p), "P(k+1/k+1) = {p}");
+            step.posterior = KalmanState { x: prior.x + step.gain * step.innovation_m, p };
         }
-        let gain = prior.p.column(0) / s_m2;
-        let innovation_m = y_m - prior.x[0];
-        let p = symmetric(&(prior.p - gain * prior.p.row(0)));
-        debug_assert!(has_positive_variances(&p, &prior.p), "P(k+1/k+1) = {p}");
-        let posterior = KalmanState { x: prior.x + gain * innovation_m, p };
-        Ok(FilterStep { prior, posterior, innovation_m, innovation_variance_m2, gain })
+        Ok(step)
     }
 
     /// Steady-state gain, 3×1 [1, s⁻¹, 1], and its P(k+1/k), 3×3: the fixed point of 25, 26 and 28 (discrete algebraic

@@ -1,15 +1,14 @@
 //! Flights of an independent simulator (MuJoCo) with known gap, and the reference estimate of each;
 //! `tests/data/flights/README.md` documents them.
 
-use std::fs::File;
-use std::path::PathBuf;
+use std::ops::Range;
 
 use estimator::SensorNoise;
 use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use serde_json::Value;
 
-use crate::parquet_fixture::columns;
+use crate::parquet_fixture::load;
 
 const FLIGHTS: [&str; 4] =
     ["A_nominal", "B_worn_stiffness_assumed_15pc_high", "C_new_small_gap", "D_no_reversal"];
@@ -19,20 +18,16 @@ struct Log {
     motor_m: Vec<f64>,
     dx_m: Vec<f64>,
     load_n: Vec<f64>,
-}
-
-fn data(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/flights").join(name)
+    segment: Range<usize>,
 }
 
 impl Log {
     fn load(name: &str) -> Self {
-        let all: Value = serde_json::from_reader(File::open(data("truth.json")).unwrap()).unwrap();
-        let mut columns = columns(&data(&format!("{name}.parquet")));
+        let (truth, mut columns) = load("flights", "truth.json", name);
         let mut take = |column: &str| columns.remove(column).unwrap();
         let (motor_m, screw_m, load_n) = (take("motor_position_m"), take("screw_position_m"), take("load_n"));
-        let dx_m = screw_m.iter().zip(&motor_m).map(|(screw, motor)| screw - motor).collect();
-        Self { truth: all[name].clone(), motor_m, dx_m, load_n }
+        let dx_m: Vec<f64> = screw_m.iter().zip(&motor_m).map(|(screw, motor)| screw - motor).collect();
+        Self { truth, segment: 0..dx_m.len(), motor_m, dx_m, load_n }
     }
 
     fn number(&self, group: &str, key: &str) -> f64 {
@@ -62,24 +57,23 @@ impl Log {
     }
 
     fn midrange_m(&self) -> f64 {
-        let whole = 0..self.dx_m.len();
-        midrange::estimate(&self.samples(std::slice::from_ref(&whole)), &self.filter()).unwrap().gap.gap_m
+        midrange::estimate(&self.samples(), &self.filter()).unwrap().gap.gap_m
     }
 
     fn contact(&self) -> ContactOutcome {
-        let whole = 0..self.dx_m.len();
         let stiffness_n_per_m = self.number("assumed", "stiffness_n_per_m");
         let prior =
             PartPrior { reference_load_n: Some(3000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
-        contact::estimate(&self.samples(std::slice::from_ref(&whole)), &prior).unwrap()
+        contact::estimate(&self.samples(), &prior).unwrap()
     }
 
     fn gap(&self) -> Box<ContactEstimate> {
         self.contact().unwrap()
     }
 
-    fn samples<'a>(&'a self, segments: &'a [std::ops::Range<usize>]) -> Samples<'a> {
-        let Self { motor_m, dx_m, load_n, .. } = self;
+    fn samples(&self) -> Samples<'_> {
+        let Self { motor_m, dx_m, load_n, segment, .. } = self;
+        let segments = std::slice::from_ref(segment);
         Samples { step_s: self.step_s(), motor_m, dx_m, load_n, segments }
     }
 }

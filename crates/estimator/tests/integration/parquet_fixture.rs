@@ -1,4 +1,4 @@
-//! Parquet columns as `f64`, missing values as NaN.
+//! Reference data of `tests/data`: an entry of a JSON file, and Parquet columns as `f64` with missing values as NaN.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -8,9 +8,17 @@ use arrow::array::{Array, AsArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::Value;
+
+/// The entry of a name in the JSON file of a folder, and the columns of its Parquet file.
+pub(crate) fn load(folder: &str, json: &str, name: &str) -> (Value, BTreeMap<String, Vec<f64>>) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(folder);
+    let all: Value = serde_json::from_reader(File::open(folder.join(json)).unwrap()).unwrap();
+    (all[name].clone(), columns(&folder.join(format!("{name}.parquet"))))
+}
 
 /// Every numeric column of a file.
-pub(crate) fn columns(path: &Path) -> BTreeMap<String, Vec<f64>> {
+fn columns(path: &Path) -> BTreeMap<String, Vec<f64>> {
     let reader =
         ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap().build().unwrap();
     let mut columns = BTreeMap::<String, Vec<f64>>::new();

@@ -1,22 +1,15 @@
 //! Reference vectors by mpmath in 50 digits, compared with scipy and filterpy; `tests/data/lkf/README.md` documents
 //! their origin and accuracy.
 
-use std::fs::File;
-use std::path::PathBuf;
-
 use estimator::{ActuatorModel, Filter, NoiseModel, SensorNoise, gap};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
 use crate::batch;
-use crate::parquet_fixture::columns;
+use crate::parquet_fixture::load;
 
 pub(crate) const SETS: [&str; 4] =
     ["a_nominal_250hz", "b_stiff_light_1khz", "c_soft_heavy_100hz_missing", "d_rotary_200hz"];
-
-fn data(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/lkf").join(name)
-}
 
 pub(crate) struct Set {
     json: Value,
@@ -25,9 +18,8 @@ pub(crate) struct Set {
 
 impl Set {
     pub(crate) fn load(name: &str) -> Self {
-        let all: Value = serde_json::from_reader(File::open(data("vectors.json")).unwrap()).unwrap();
-        let columns = columns(&data(&format!("{name}.parquet")));
-        Self { json: all[name].clone(), columns }
+        let (json, columns) = load("lkf", "vectors.json", name);
+        Self { json, columns }
     }
 
     pub(crate) fn number(&self, key: &str) -> f64 {
