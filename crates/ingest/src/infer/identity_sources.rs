@@ -1,7 +1,10 @@
 //! Sources of a flight's identity: names of columns, metadata keys, folders, and forms of paths.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
+
+use regex::Regex;
 
 use crate::infer::column_names::{place_in, words};
 use crate::log::identity::hive_folders;
@@ -92,17 +95,21 @@ pub fn folder_value(path: &Path, name: &str) -> Option<String> {
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
-const DEPARTURES: [(&str, &str); 15] = [
+const DEPARTURES: [(&str, &str); 19] = [
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", "%Y-%m-%dT%H:%M:%S"),
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\d-\d\d-\d\d-\d\d", "%Y-%m-%d-%H-%M-%S"),
+    (r"\d{4}_\d\d_\d\d_\d{6}", "%Y_%m_%d_%H%M%S"),
     (r"\d{4}-\d\d-\d\dT\d{6}", "%Y-%m-%dT%H%M%S"),
     (r"\d{4}-\d\d-\d\d_\d{6}", "%Y-%m-%d_%H%M%S"),
     (r"\d{4}-\d\d-\d\d_\d{4}", "%Y-%m-%d_%H%M"),
     (r"\d{4}-\d\d-\d\d \d{4}", "%Y-%m-%d %H%M"),
     (r"\d{8}T\d{6}Z", "%Y%m%dT%H%M%SZ"),
     (r"\d{8}T\d{6}", "%Y%m%dT%H%M%S"),
+    (r"\d{8}T\d{4}", "%Y%m%dT%H%M"),
     (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
+    (r"\d{8}-\d{6}", "%Y%m%d-%H%M%S"),
     (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
     (r"\d{14}", "%Y%m%d%H%M%S"),
     (r"\d{12}", "%Y%m%d%H%M"),
@@ -119,7 +126,7 @@ const TIMES: [(&str, &str); 4] =
 
 /// What a tail number looks like: with a hyphen, with a digit after its first letters, or five letters.
 const TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z0-9]{2,6}|[A-Z]{1,2}\d[A-Z0-9]{0,5}|[A-Z]{5}|\d[A-Z]-[A-Z]{3}|\d\d-(?:[03-9]\d{3}|\d{5}))";
-/// The same after a departure, where a flight number such as `TK1923` must not be one.
+/// The same where a flight number such as `TK1923` must not be one.
 const SURE_TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z]{3,4}|N\d{1,4}[A-Z]{1,2}|\d[A-Z]-[A-Z]{3})";
 /// What ends a tail number before a departure, and what it looks like then: before a hyphen, a number of a recorder
 /// (`AB-2026`) must not be one.
@@ -137,8 +144,6 @@ const MOST_FOLDERS: usize = 4;
 /// position as [`path_position`] finds it.
 pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option<String>)> {
     let name = path.file_name()?.to_str()?;
-    let fits =
-        |expression: &str, text: &str| regex::Regex::new(expression).is_ok_and(|regex| regex.is_match(text));
     let folder = |up: usize| path.ancestors().nth(up).and_then(Path::file_name)?.to_str();
     let place_end = place_end();
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
@@ -167,8 +172,11 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
         let (form, _) = known(name)?;
         let tails =
             BEFORE_TAIL.iter().flat_map(|before| TAILS_IN_NAMES.map(|(end, tail)| (before, tail, end)));
-        let mut before = tails.map(|(before, tail, end)| format!("{before}(?<tail_number>{tail}){end}"));
-        if let Some(tail) = before.find(|tail| fits(&format!("^{tail}[^/]*?{form}"), name)) {
+        let before = tails.map(|(before, tail, end)| format!("{before}(?<tail_number>{tail}){end}"));
+        let sure = format!("(?:[^/]*[_ -])?(?<tail_number>{SURE_TAIL})[_ -]");
+        if let Some(tail) =
+            std::iter::once(sure).chain(before).find(|tail| fits(&format!("^{tail}[^/]*?{form}"), name))
+        {
             return Some(format!("{tail}{departure}"));
         }
         let after = format!(
@@ -219,8 +227,22 @@ pub fn path_position(path: &Path) -> Option<(String, String)> {
 
 /// What a named group of an expression matches in a text.
 fn captured(expression: &str, text: &str, group: &str) -> Option<String> {
-    let regex = regex::Regex::new(expression).ok()?;
-    Some(regex.captures(text)?.name(group)?.as_str().to_owned())
+    Some(compiled(expression)?.captures(text)?.name(group)?.as_str().to_owned())
+}
+
+fn fits(expression: &str, text: &str) -> bool {
+    compiled(expression).is_some_and(|regex| regex.is_match(text))
+}
+
+thread_local! {
+    /// Compiling an expression takes a hundred times longer than matching it, and a fleet has thousands of logs.
+    static COMPILED: RefCell<HashMap<String, Option<Regex>>> = RefCell::default();
+}
+
+fn compiled(expression: &str) -> Option<Regex> {
+    COMPILED.with_borrow_mut(|known| {
+        known.entry(expression.to_owned()).or_insert_with(|| Regex::new(expression).ok()).clone()
+    })
 }
 
 #[cfg(test)]
@@ -247,6 +269,7 @@ mod tests {
             ("d/97-0042/2026-11-19_0413.parquet", "97-0042 2026-11-19_0413", "%Y-%m-%d_%H%M"),
             ("d/4X-EKA_20261119_041300.parquet", "4X-EKA 20261119_041300", "%Y%m%d_%H%M%S"),
             ("d/QAR-N412FP-20261119T041300Z.parquet", "N412FP 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/TK1923_N412FP_20261119-041300.parquet", "N412FP 20261119-041300", "%Y%m%d-%H%M%S"),
             ("d/FDR_20261119_041300_N412FP.parquet", "20261119_041300 N412FP", "%Y%m%d_%H%M%S"),
             ("logs/20261119T041300Z_17.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/N412FP/2026/11/19/041300.parquet", "N412FP 2026/11/19 041300", "%Y/%m/%dT%H%M%S"),
@@ -267,7 +290,7 @@ mod tests {
             let position = path_position(Path::new(path)).map(|(position, _)| position);
             let (expression, found) = path_identity(Path::new(path), position.is_some()).unwrap();
             let found = found.unwrap_or_default();
-            let groups = regex::Regex::new(&expression).unwrap().captures(path).unwrap();
+            let groups = Regex::new(&expression).unwrap().captures(path).unwrap();
             let facts: Vec<&str> = groups.iter().skip(1).flatten().map(|group| group.as_str()).collect();
             assert_eq!((facts.join(" ").as_str(), found.as_str()), (wanted, format), "{expression}");
             assert_eq!(position.as_deref(), groups.name("position").map(|group| group.as_str()), "{path}");
