@@ -197,6 +197,12 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let step_s = checked_step(seen_s, clock, &stamps.column)?;
     let breaks: Vec<usize> =
         (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
+    // After 041359.99 comes 041400.00.
+    let is_packed = |&i: &usize| ((step(i) - step_s) % 4000.0 - 40.0).abs() < step_s;
+    if breaks.len() > 1 && breaks.iter().all(is_packed) {
+        let found = "a clock that reads as HHMMSS: it leaps by 40 after each minute".to_owned();
+        return Err(ErrorKind::TimeUnit { column: stamps.column.clone(), found });
+    }
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
     let repairs =
         TimestampRepairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
@@ -446,6 +452,17 @@ mod tests {
     fn two_recordings_whose_rows_alternate_are_not_sorted_into_each_other() {
         let t: Vec<f64> = (0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect();
         assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeGoesBack { .. })));
+    }
+
+    /// From 04:58:00 on, past a full hour.
+    #[test]
+    fn a_clock_that_reads_as_hours_minutes_and_seconds_is_refused() {
+        let packed = |k: u32| {
+            let s = 17_880.0 + 0.05 * f64::from(k);
+            (s / 3600.0).floor() * 1e4 + (s % 3600.0 / 60.0).floor() * 100.0 + s % 60.0
+        };
+        let t: Vec<f64> = (0..4800).map(packed).collect();
+        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeUnit { .. })));
     }
 
     #[test]
