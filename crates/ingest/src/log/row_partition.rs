@@ -301,10 +301,10 @@ impl<'k> NumberedKeys<'k> {
 mod tests {
     use arrow::array::{Float64Array, RecordBatch, StringArray};
     use arrow::datatypes::Float64Type;
-    use parquet::arrow::ArrowWriter;
     use parquet::file::properties::WriterProperties;
 
     use super::*;
+    use crate::parquet::writer::write_batch;
 
     /// Rows of parameters p0 to p9 in turn, or one parameter after the other, whose values are their row numbers.
     fn file(folder: &std::path::Path, is_sorted: bool) -> LogFile {
@@ -315,10 +315,7 @@ mod tests {
         let batch = RecordBatch::try_from_iter(columns).unwrap();
         let path = folder.join("log.parquet");
         let groups = WriterProperties::builder().set_max_row_group_row_count(Some(100)).build();
-        let sink = std::fs::File::create(&path).unwrap();
-        let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(groups)).unwrap();
-        writer.write(&batch).unwrap();
-        writer.close().unwrap();
+        write_batch(std::fs::File::create(&path).unwrap(), &batch, groups).unwrap();
         LogFile::open(&path).unwrap()
     }
 

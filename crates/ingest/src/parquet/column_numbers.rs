@@ -98,13 +98,13 @@ mod tests {
     use std::sync::Arc;
 
     use arrow::array::{ArrayRef, Float32Array, Float64Array, RecordBatch};
-    use parquet::arrow::ArrowWriter;
     use parquet::basic::{Compression, Encoding, ZstdLevel};
     use parquet::file::properties::{WriterProperties, WriterVersion};
     use proptest::prelude::*;
 
     use super::*;
     use crate::parquet::log_file::LogFile;
+    use crate::parquet::writer::write_batch;
 
     /// Values that may be missing, some of which stay for a while.
     fn channel(value: impl Strategy<Value = f32>) -> impl Strategy<Value = Vec<Option<f32>>> {
@@ -146,10 +146,7 @@ mod tests {
             let batch = RecordBatch::try_from_iter_with_nullable([("x", array, values.contains(&None))]).unwrap();
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("x.parquet");
-            let sink = std::fs::File::create(&path).unwrap();
-            let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(properties.build())).unwrap();
-            writer.write(&batch).unwrap();
-            writer.close().unwrap();
+            write_batch(std::fs::File::create(&path).unwrap(), &batch, properties.build()).unwrap();
             let from = from.min(values.len());
             let stretch = [from..values.len(), values.len()..values.len()];
             let mut read = ColumnBuilder::with_capacity(0, None);

@@ -91,7 +91,6 @@ pub(crate) fn write_encoded(
     let io = |source: std::io::Error| fail(source.into());
     let bad = |e: String| fail(ErrorKind::Table { row: None, column: None, detail: e });
     let batch = batch(columns).map_err(|e| bad(e.to_string()))?;
-    let schema = batch.schema();
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder).map_err(io)?;
     }
@@ -99,16 +98,24 @@ pub(crate) fn write_encoded(
     let own = format!("{}-{}", std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
     let [bare, beside] = ["bare", "part"].map(|end| file.with_extension(format!("{own}.{end}")));
     let sink = object_io::create_fresh(&bare).map_err(io)?;
-    let mut writer = ArrowWriter::try_new(sink, schema, Some(properties(&batch, metadata, encoding)))
-        .map_err(|e| bad(e.to_string()))?;
-    writer.write(&batch).map_err(|e| bad(e.to_string()))?;
-    writer.close().map_err(|e| bad(e.to_string()))?;
+    write_batch(sink, &batch, properties(&batch, metadata, encoding)).map_err(|e| bad(e.to_string()))?;
     let from = File::open(&bare).map_err(io)?;
     let mut to = object_io::create_fresh(&beside).map_err(io)?;
     page_crc::copy(&from, &mut to).map_err(|e| bad(e.to_string()))?;
     to.sync_all().map_err(io)?;
     fs::remove_file(&bare).map_err(io)?;
     fs::rename(&beside, file).map_err(io)
+}
+
+/// A batch as Parquet.
+pub(crate) fn write_batch(
+    sink: File,
+    batch: &RecordBatch,
+    properties: WriterProperties,
+) -> parquet::errors::Result<()> {
+    let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(properties))?;
+    writer.write(batch)?;
+    writer.close().map(drop)
 }
 
 /// Columns of one length as they would be read back.

@@ -348,14 +348,12 @@ fn bad_row(error: &csv::Error) -> ErrorKind {
 
 #[cfg(test)]
 mod tests {
-    use std::fs::File;
-
     use arrow::array::{Int64Array, TimestampSecondArray};
-    use parquet::arrow::ArrowWriter;
     use parquet::file::properties::WriterProperties;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::parquet::writer::write_batch;
 
     fn batch(columns: Vec<(&str, ArrayRef)>) -> RecordBatch {
         RecordBatch::try_from_iter(columns).unwrap()
@@ -365,10 +363,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("table.parquet");
         let groups = WriterProperties::builder().set_max_row_group_row_count(Some(3)).build();
-        let sink = File::create(&file).unwrap();
-        let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(groups)).unwrap();
-        writer.write(batch).unwrap();
-        writer.close().unwrap();
+        write_batch(File::create(&file).unwrap(), batch, groups).unwrap();
         (dir, file)
     }
 
