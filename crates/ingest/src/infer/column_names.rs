@@ -110,7 +110,8 @@ pub(super) fn unit_of(text: &str) -> Option<Unit> {
 }
 
 /// Words of quantities that are no position, load or temperature.
-const OTHERS: &str = "current speed velocity voltage cmd command demand power status valid ssm mode target setpoint error fault";
+const OTHERS: &str = "current speed velocity vel rate rpm acceleration accel voltage power cmd command demand target setpoint reference \
+                      ref status valid ssm mode error fault limit";
 
 /// Words that distinguish redundant sensors of one quantity, best first.
 const SENSORS: &str = "a primary main 1 cha ch1 b secondary backup 2 chb ch2";
@@ -243,7 +244,11 @@ mod tests {
         ] {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");
         }
-        assert_eq!((inferred("airspeed_kt"), inferred("aileron_left_motor_torque_nm")), (None, None));
+        for other in
+            ["airspeed_kt", "aileron_left_motor_torque_nm", "AIL_L_MOTOR_REF_DEG", "rudder_output_rate_deg_s"]
+        {
+            assert_eq!(inferred(other), None, "{other}");
+        }
     }
 
     #[test]
