@@ -117,7 +117,7 @@ impl BlockMeans {
         };
         let pile = between(top_n - width_n, f64::INFINITY);
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
-        // The ratio of both is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second.
+        // The ratio of both is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second or more.
         let is_pile = pile > 2.0 * below && pile * count as f64 * self.period_s > 1.0;
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
@@ -217,7 +217,8 @@ impl BlockMeans {
     }
 
     /// The windows of an excerpt in order of time: one half by the number of load reversals in them, which pass 15 % of the
-    /// 95 % load on either side, the other evenly among the rest. The load alone selects, so that what is estimated does not select its own data.
+    /// 95 % load on either side, the other evenly among the rest. The load alone selects, so that what is estimated does
+    /// not select its own data.
     fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
         let of_segment = |segment: Range<usize>| {
             let starts = segment.clone().step_by(WINDOW_BLOCKS).take(segment.len() / WINDOW_BLOCKS);

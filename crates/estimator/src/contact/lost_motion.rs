@@ -17,8 +17,10 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
     let overlap_m = -gap_m;
     let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n.0;
     let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
-    // A closed loop overlaps by less than half of what the extrapolated flanks do.
-    let closes = || lightly_loaded_m(contact).is_some_and(|loop_m| loop_m > -0.5 * overlap_m);
+    // A closed loop, of the lightly loaded rows that the straight fit never saw, overlaps by less than half of what the
+    // extrapolated flanks do.
+    let loop_m = || travel_m(contact, 0.0, &contact.line.design.light.iter());
+    let closes = || loop_m().is_some_and(|(loop_m, _)| loop_m > -0.5 * overlap_m);
     (is_overlap && closes()).then(|| (force_n(overlap_m), force_n(gap_se_m)))
 }
 
@@ -47,35 +49,30 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
     Some((upper.0 - lower.0, upper.1.hypot(lower.1).hypot(contact.unexplained_m)))
 }
 
-/// Lost motion at zero load, friction taken off, from the lightly loaded rows, which the straight fit never saw, m.
-fn lightly_loaded_m(contact: &FlankFit) -> Option<f64> {
-    let light = &contact.line.design.light;
-    let beyond_m = |flank| beyond_m(contact, light.iter(), flank);
-    Some(contact.line.fit.beta[GAP] + beyond_m(Flank::Upper)?.0 + beyond_m(Flank::Lower)?.0)
-}
-
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows within 25 % of it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
 pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
-    let near = |row: &&DesignRow<COLUMNS>| (row.x[FORCE].abs() - load).abs() < 0.25 * load;
-    let rows = &contact.line.design;
-    let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
-    let beta = &contact.line.fit.beta;
-    let line_m = beta[GAP] + 2.0 * load * beta[FORCE];
-    let (upper, lower) = (beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?);
-    // The uncertainty of the gap (drift, transducer, friction) applies here too; the scatter of the medians is added.
-    Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))
+    let rows = contact.line.design.firm.iter().chain(&contact.line.design.light);
+    travel_m(contact, load, &rows.filter(move |row| (row.x[FORCE].abs() - load).abs() < 0.25 * load))
 }
 
-/// How far outwards of the fitted line the rows of a flank lie, m, and the standard error.
-fn beyond_m<'a>(
+/// Relative travel between + and − a load over the 95 % load, and its standard error, m: that of the fitted line, and how far
+/// outwards of it some rows of either flank lie.
+fn travel_m<'a>(
     contact: &FlankFit,
-    rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>,
-    flank: Flank,
+    load: f64,
+    rows: &(impl Iterator<Item = &'a DesignRow<COLUMNS>> + Clone),
 ) -> Option<(f64, f64)> {
-    let of_flank = rows.filter(|row| row.x[GAP] * flank.sign() > 0.0);
-    median_and_error_m(of_flank.map(|row| (flank.sign() * contact.line.fit.residual_m(row), row.stretch)))
+    let line = &contact.line.fit;
+    let beyond_m = |flank: Flank| {
+        let of_flank = rows.clone().filter(|row| row.x[GAP] * flank.sign() > 0.0);
+        median_and_error_m(of_flank.map(|row| (flank.sign() * line.residual_m(row), row.stretch)))
+    };
+    let (upper, lower) = (beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?);
+    let line_m = line.beta[GAP] + 2.0 * load * line.beta[FORCE];
+    // The uncertainty of the gap (drift, transducer, friction) applies here too; the scatter of the medians is added.
+    Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))
 }
 
 /// The median of lengths, m, and its standard error with those of one stretch taken as one; none of fewer than five.

@@ -75,11 +75,11 @@ impl RowSource<'_> {
     /// full or its stretch ends.
     pub(crate) fn rows(&self, couplings: &[Coupling]) -> DesignMatrix {
         let Self { blocks, scaling } = self;
-        let rows = blocks.len() / scaling.row_blocks(blocks.period_s);
-        let mut design = DesignMatrix { firm: Vec::with_capacity(rows), ..DesignMatrix::default() };
+        let most = scaling.row_blocks(blocks.period_s);
+        let firm = Vec::with_capacity(blocks.len() / most);
+        let (mut design, most) = (DesignMatrix { firm, light: Vec::new() }, most as f64);
         // Of the lower and the upper flank, lightly and firmly touched.
         let mut open = [DesignRow::ZERO; 4];
-        let most = scaling.row_blocks(blocks.period_s) as f64;
         let firm_n = FIRM_SHARE * scaling.load_n;
         let (mut stretch, mut last) = (0, (0, 0));
         for segment in blocks.segments() {

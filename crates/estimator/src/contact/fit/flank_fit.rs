@@ -59,7 +59,7 @@ pub(crate) struct FlankFit {
     pub(crate) period_s: f64,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
-    /// Whether higher loads alone read another gap.
+    /// Whether higher loads alone read another gap, by more than 2.3 jackknife errors.
     pub(crate) is_soft: bool,
     /// Travel that neither gap nor wind-up accounts for, m: a part of the error of the gap and of the loop.
     pub(crate) unexplained_m: f64,
@@ -214,7 +214,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     Ok(SearchResult { found, ..best })
 }
 
-/// Whether errors that repeat with the position are there for certain, and matter.
+/// Whether errors that repeat with the position are there for certain, and matter: 0.2 µm do.
 fn is_periodic(found: &GaussNewtonResult) -> bool {
     [PERIODIC, PERIODIC + 1].into_iter().any(|column| {
         let size_m = found.fit.beta[column].abs();
@@ -258,16 +258,17 @@ fn gap_and_error_m(
     let sigma = difference_m.abs() / (error_m + 5e-8);
     let weight = sigma * sigma / (sigma * sigma + 2.0);
     let (windup_m, FrictionState { stiffness_n_per_m, friction, .. }) = (scaling.windup_m(), line.state);
-    // Weights of the parts of the error and of the exponents of its growth: fitted by maximum likelihood (Student's t with
-    // five degrees of freedom) to 2,800 simulated flights of all classes, then widened until nearly every class holds 80 % of
-    // its 90 % intervals. That of the bend is so large that a bent load cell counts.
+    // The weights of the parts of the error, and of the exponents of its growth, are fitted by maximum likelihood (Student's t
+    // with five degrees of freedom) to 2,800 simulated flights of all classes, then widened until nearly every class holds
+    // 80 % of its 90 % intervals. The weight of the bend is so large that a bent load cell counts.
     //
-    // What hangs on the choice between both fits, and the bend that a load cell may have: one that is nonlinear by 3 % of its
-    // range bends flanks by 1 % of the wind-up, and flanks that bend by more are soft.
+    // What hangs on the choice between both fits, and the bend that a load cell may have: a cell that is nonlinear by 3 % of
+    // its range bends flanks by 1 % of the wind-up, and flanks that bend by more are soft.
     let choice = 2.6 * (1.0 - weight);
     let bend = 3.0 / (1.0 + (difference_m / (0.012 * windup_m)).powi(2));
     let vibration_m = friction.lost_share * vibration_n / stiffness_n_per_m;
     let changes = rows.array_windows().filter(|[before, row]| before.x[GAP] * row.x[GAP] < 0.0).count();
+    // Friction counts up to 60 % of the load.
     let friction_share = (friction.at_n(scaling.load_n) / scaling.load_n).min(0.6);
     let growth = 1.5 / (changes.max(1) as f64).sqrt() + 0.8 * friction_share;
     // The friction model is driven by the reading of the load cell, also where that is at its end.
@@ -326,7 +327,8 @@ fn unexplained_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &Flan
     let noise_m = span_m(design.firm.iter().map(|row| line.residual_m(row)).collect());
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
-    // Over some 300 simulated flights that show their gap, travel exceeded what is expected by 3 % at most, with positions
+    // A quarter more is allowed. Over some 300 simulated flights that show their gap, travel exceeded what is expected by 3 % at
+    // most, with positions
     // that freeze for seconds by 15 %; over the flights that were given a wrong gap before, by 50 % and more. Of 3,000 sound
     // flights of the study twelve are refused for it.
     if seen_m - blurred_m > 0.25 * expected_m { seen_m - expected_m } else { 0.0 }

@@ -78,7 +78,7 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
         STRIBECK => lack((0.0, 0.3), state.stribeck),
-        // A screw that is locked has no delay: viscous friction is left, 0.1 ms.
+        // A screw that is locked has no delay: what is left is viscous friction, 0.1 ms.
         SPEED if scaling.is_locked() => zero(1e-4 * SPEED_M_PER_S),
         // The delays that remain once the channels are realigned: 5 ms.
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: 5e-3 * SPEED_M_PER_S },
@@ -101,7 +101,7 @@ fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> F
     // A factor of three from the scale's stiffness at most.
     let stiffness = scaling.load_n / beta[FORCE].clamp(windup_m / 3.0, windup_m * 3.0);
     let lacking = |column: usize| beta[column] * stiffness / scaling.load_n;
-    // Friction takes half of the load at most.
+    // Either part of the friction takes half of the load at most.
     let share = |value: f64| value.clamp(0.0, 0.5);
     FrictionState {
         stiffness_n_per_m: stiffness,
@@ -111,6 +111,7 @@ fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> F
             dry_n: scaling.load_n * share(state.friction.dry_n / scaling.load_n + lacking(DRY)),
             lost_share: share(state.friction.lost_share + lacking(SHARE)),
         },
+        // Friction at rest is 2.2 times that in motion at most.
         stribeck: (state.stribeck + lacking(STRIBECK)).clamp(0.0, 1.2),
         // 40 ms at most.
         load_delay_s: (state.load_delay_s + lacking(LOAD_RATE) * LATE_S).clamp(-0.04, 0.04),
