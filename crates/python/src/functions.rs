@@ -133,7 +133,7 @@ pub(crate) fn trend(
     let assess = || {
         let chunks = estimate_batches.map(chunks);
         let histories = chunks.map(|chunks| external_estimates::from_batches(&chunks)).transpose()?;
-        let queries = queries_table.as_ref().map(external_estimates::queries_of).transpose()?;
+        let queries = queries_table.as_ref().map(external_estimates::queries).transpose()?;
         trends::assess(&config.inner, installations, histories, queries.as_deref(), &ask)
     };
     let found = py.detach(assess);

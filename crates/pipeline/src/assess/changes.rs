@@ -158,6 +158,7 @@ fn of_unit(
 fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunFacts<'_>) -> (Cause, String) {
     let unit = now.unit();
     let moved: Vec<String> = moved_of(&unit, run).collect();
+    let differ = |(one, other)| one != other;
     let micrometers =
         |limit_m: Option<f64>| limit_m.map_or("none".to_owned(), |m| format!("{:.0} µm", m * 1e6));
     match before {
@@ -167,7 +168,9 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
             (Cause::Limit, format!("limit_m changed from {from} to {to} ({place})"))
         }
         _ if !moved.is_empty() => (Cause::Bookkeeping, moved.join("; ")),
-        Some(before) if is_other(before.settings_digest.as_ref(), now.settings_digest.as_ref()) => {
+        Some(before)
+            if before.settings_digest.as_ref().zip(now.settings_digest.as_ref()).is_some_and(differ) =>
+        {
             (Cause::Settings, "the settings of its estimates changed".to_owned())
         }
         Some(before) if (&before.tail_number, &before.position) != (&now.tail_number, &now.position) => {
@@ -184,11 +187,6 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
         _ if run.with_records.contains(&unit) => (Cause::Records, "records of this run".to_owned()),
         _ => (Cause::Date, "no record of its own: the date, or records of other units".to_owned()),
     }
-}
-
-/// Whether two digests are known and differ.
-fn is_other(one: Option<&String>, other: Option<&String>) -> bool {
-    one.zip(other).is_some_and(|(one, other)| one != other)
 }
 
 fn moved_of<'a>(unit: &'a UnitKey, run: RunFacts<'a>) -> impl Iterator<Item = String> + 'a {

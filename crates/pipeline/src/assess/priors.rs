@@ -21,21 +21,16 @@ impl Executor for RayonExecutor {
 /// departure on, and when it has grown older by a tenth.
 ///
 /// A prior changes slowly and costs as much as its fleet's assessments, so it is used until the next cut-off.
-#[derive(Debug, Clone, Default)]
-struct TrainingCutoffs(Vec<i64>);
+fn training_cutoffs(first_us: i64, last_us: i64) -> Vec<i64> {
+    const MONTH_US: i64 = 30 * 86_400_000_000;
+    const GROWN: i64 = 10;
+    let next = |cutoff: &i64| Some(cutoff + MONTH_US.max((cutoff - first_us) / GROWN));
+    std::iter::successors(Some(first_us), next).take_while(|cutoff| *cutoff <= last_us).collect()
+}
 
-impl TrainingCutoffs {
-    fn of(first_us: i64, last_us: i64) -> Self {
-        const MONTH_US: i64 = 30 * 86_400_000_000;
-        const GROWN: i64 = 10;
-        let next = |cutoff: &i64| Some(cutoff + MONTH_US.max((cutoff - first_us) / GROWN));
-        Self(std::iter::successors(Some(first_us), next).take_while(|cutoff| *cutoff <= last_us).collect())
-    }
-
-    /// The last cut-off before a date.
-    fn train(&self, as_of: Timestamp) -> Option<i64> {
-        self.0[..self.0.partition_point(|cutoff| *cutoff <= as_of.as_microsecond())].last().copied()
-    }
+/// The last cut-off before a date.
+fn cutoff_before(cutoffs: &[i64], as_of: Timestamp) -> Option<i64> {
+    cutoffs[..cutoffs.partition_point(|cutoff| *cutoff <= as_of.as_microsecond())].last().copied()
 }
 
 /// Part numbers that share a prior.
@@ -44,7 +39,7 @@ type Parts<'a> = Vec<Option<&'a str>>;
 /// The fleet priors trained so far, by cut-off.
 #[derive(Default)]
 pub(crate) struct FleetPriors<'a> {
-    cutoffs: TrainingCutoffs,
+    cutoffs: Vec<i64>,
     priors: BTreeMap<(i64, Option<&'a str>), FleetPrior>,
 }
 
@@ -61,7 +56,7 @@ impl<'a> FleetPriors<'a> {
         }
         let trainer = PriorTrainer { classes, limits };
         let cutoffs = trainer.cutoffs(days);
-        let asked: BTreeSet<i64> = days.iter().filter_map(|day| cutoffs.train(*day)).collect();
+        let asked: BTreeSet<i64> = days.iter().filter_map(|day| cutoff_before(&cutoffs, *day)).collect();
         let trained: Vec<_> = asked.into_par_iter().map(|cutoff| (cutoff, trainer.trained(cutoff))).collect();
         let mut priors = BTreeMap::new();
         for (cutoff, groups) in trained {
@@ -74,7 +69,7 @@ impl<'a> FleetPriors<'a> {
 
     /// Fleet prior of a part at a date, and its cut-off, microseconds since 1970 UTC.
     pub(crate) fn of<'s>(&'s self, part: Option<&'s str>, as_of: Timestamp) -> Option<(i64, &'s FleetPrior)> {
-        let cutoff_us = self.cutoffs.train(as_of)?;
+        let cutoff_us = cutoff_before(&self.cutoffs, as_of)?;
         Some((cutoff_us, self.priors.get(&(cutoff_us, part))?))
     }
 }
@@ -87,22 +82,17 @@ struct PriorTrainer<'a, 's> {
 
 impl<'a> PriorTrainer<'a, '_> {
     /// Training cut-offs up to the last of some dates.
-    fn cutoffs(&self, days: &[Timestamp]) -> TrainingCutoffs {
+    fn cutoffs(&self, days: &[Timestamp]) -> Vec<i64> {
         let first = self.classes.values().flatten().filter_map(|series| series.flights().first());
         let first_us = first.map(|flight| flight.departure_us).min();
         let last = first_us.zip(days.iter().max());
-        last.map_or_else(TrainingCutoffs::default, |(first_us, last)| {
-            TrainingCutoffs::of(first_us, last.as_microsecond())
-        })
+        last.map_or_else(Vec::new, |(first_us, last)| training_cutoffs(first_us, last.as_microsecond()))
     }
 
     /// Fleet priors of the parts at a cut-off; similar parts share one.
     fn trained(&self, cutoff_us: i64) -> Vec<(Parts<'a>, FleetPrior)> {
-        let pool_similar_parts = self.pool_similar_parts(cutoff_us);
-        pool_similar_parts
-            .into_par_iter()
-            .map(|parts| (parts.clone(), self.learn(cutoff_us, &parts)))
-            .collect()
+        let groups = self.pool_similar_parts(cutoff_us).into_par_iter();
+        groups.map(|parts| (parts.clone(), self.learn(cutoff_us, &parts))).collect()
     }
 
     /// Groups of parts that share one fleet prior: of one limit, along one axis where that is configured,

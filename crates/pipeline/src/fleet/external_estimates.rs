@@ -47,19 +47,11 @@ pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
     Ok(builder::histories(parts, false).0)
 }
 
-/// Reads a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.
+/// The units and days of a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.
 ///
 /// # Errors
 /// As [`read`].
-pub fn queries(file: &Path) -> Result<Vec<AsOfQuery>, Error> {
-    queries_of(&Table::read(file)?)
-}
-
-/// The units and days of a table of queries.
-///
-/// # Errors
-/// As [`read`].
-pub fn queries_of(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
+pub fn queries(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
     let serial = table.column(&["serial_number", "serial"])?;
     let as_of = table.column(&["as_of_utc"])?;
     let part = table.find(&["part_number"]);

@@ -117,13 +117,12 @@ fn replay(
                 .in_file(log_path)
         })?;
         let (_, part) = opened.unit(at, config, installations)?;
-        if !at.lacking.is_empty() {
-            let estimate = opened.estimate(at, part, config)?;
-            return Ok(Recomputation { digest: opened.digest.clone(), channels: None, estimate });
-        }
-        let channels = opened.channels(at, part)?;
-        let estimate = estimate::estimate(&channels, part, &config.document.estimate)?;
-        Ok(Recomputation { digest: opened.digest.clone(), channels: Some(channels), estimate })
+        let channels = at.lacking.is_empty().then(|| opened.channels(at, part)).transpose()?;
+        let estimate = match &channels {
+            Some(channels) => estimate::estimate(channels, part, &config.document.estimate)?,
+            None => opened.estimate(at, part, config)?,
+        };
+        Ok(Recomputation { digest: opened.digest, channels, estimate })
     })
 }
 

@@ -9,6 +9,7 @@ use ingest::{IdentityMapping, LogFiles};
 use jiff::Timestamp;
 use job::Config;
 use job::flight_log::{MAX_BETWEEN_PIECES, flights_in, identify, identify_companion};
+use object_io::Address;
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
@@ -16,7 +17,7 @@ use crate::error::{Error, is_passing};
 use crate::logs::discover_remote;
 use crate::logs::file_stat::{FileStat, SeenObjects};
 use crate::logs::local_files;
-use crate::logs::table_folders::{TableFolders, TableMembership};
+use crate::logs::table_folders::{IsLog, TableFolders};
 use crate::logs::temporary_files::{is_temporary, parts_written_out};
 
 /// The logs that fit the patterns.
@@ -284,12 +285,13 @@ fn matching(
         let mut files: Vec<(PathBuf, Option<FileStat>)> = Vec::new();
         if object_io::is_address(pattern) {
             let mut tables = TableFolders::default();
-            let listed = discover_remote::each(pattern, &mut tables, |entry| {
+            let address = Address::parse_required(pattern)?;
+            let wanted = glob::Pattern::new(address.key()).map_err(|e| invalid(pattern, &e))?;
+            discover_remote::each(&address, &wanted, &mut tables, |entry| {
                 if !ours(&entry.path) && !is_temporary(&entry.path, Path::new(pattern)) {
                     files.push((entry.path.clone(), Some(entry.into())));
                 }
             })?;
-            listed.map_err(|e| invalid(pattern, &e))?;
             files.retain(|(path, _)| is_log(config, path, tables.object(path), unlisted));
         } else {
             let local =
@@ -342,16 +344,15 @@ fn folder_written_out(pattern: &Path) -> PathBuf {
 fn is_log(
     config: &Config,
     path: &Path,
-    membership: TableMembership,
+    is_log: IsLog,
     unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
 ) -> bool {
-    if let TableMembership::Fault(at, diagnostic) = membership {
+    is_log.unwrap_or_else(|(at, diagnostic)| {
         debug_assert!(path.starts_with(&at), "the fault of another table");
         let shown = log_path(config, &at);
         unlisted.insert(shown.clone(), (at, diagnostic.in_file(&shown)));
-        return false;
-    }
-    matches!(membership, TableMembership::Log)
+        false
+    })
 }
 
 /// Whether a path is a file; links that lead nowhere, pipes and devices are errors, files that were deleted meanwhile

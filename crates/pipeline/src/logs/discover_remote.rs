@@ -21,31 +21,26 @@ const MOST_NOTED: usize = 1000;
 /// wildcard is listed, and what does not fit is not kept.
 ///
 /// # Errors
-/// [`Error::Objects`] when the store is not reachable; the text of an error in the pattern.
+/// [`Error::Objects`] when the store is not reachable.
 pub(crate) fn each(
-    pattern: &str,
+    address: &Address,
+    wanted: &glob::Pattern,
     tables: &mut TableFolders,
     mut take: impl FnMut(ListEntry),
-) -> Result<Result<(), String>, Error> {
-    let address = Address::parse_required(pattern)?;
-    let wanted = match glob::Pattern::new(address.key()) {
-        Ok(wanted) => wanted,
-        Err(e) => return Ok(Err(e.to_string())),
-    };
+) -> Result<(), Error> {
     let Some(first) = address.key().find(['*', '?', '[']) else {
-        note_tables_above(&address, address.key(), tables)?;
-        return match object_io::head(Path::new(pattern)) {
-            Ok(entry) => {
-                take(entry);
-                Ok(Ok(()))
+        note_tables_above(address, address.key(), tables)?;
+        return match object_io::head(Path::new(&address.to_string())) {
+            Err(object_io::Error::Missing { .. }) => Ok(()),
+            entry => {
+                take(entry?);
+                Ok(())
             }
-            Err(object_io::Error::Missing { .. }) => Ok(Ok(())),
-            Err(error) => Err(error.into()),
         };
     };
     let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
     let root = address.bucket_url();
-    note_tables_above(&address, folder, tables)?;
+    note_tables_above(address, folder, tables)?;
     object_io::list(&address.with_key(folder), |entry| {
         tables.note(&entry.path);
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
@@ -53,7 +48,7 @@ pub(crate) fn each(
             take(entry);
         }
     })?;
-    Ok(Ok(()))
+    Ok(())
 }
 
 /// Notes the tables whose folders lie above a key: a pattern may name a partition of a table. Folders that these

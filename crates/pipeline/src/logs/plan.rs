@@ -268,11 +268,8 @@ pub fn plan(
 
 /// Digests of a log that was processed without an error.
 pub(crate) fn digests(account: &LogRecord) -> Option<(String, String)> {
-    account
-        .outcome
-        .is_success()
-        .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
-        .flatten()
+    let digests = account.log_digest.clone().zip(account.config_digest.clone());
+    digests.filter(|_| account.outcome.is_success())
 }
 
 /// Whether two logs are of one flight: one departure of one aircraft.

@@ -24,16 +24,9 @@ pub(crate) struct TableFolders {
     tables: BTreeMap<PathBuf, Option<BTreeMap<PathBuf, bool>>>,
 }
 
-/// What a file is to the table in whose folder it lies.
-#[derive(Debug)]
-pub(crate) enum TableMembership {
-    /// A log: of no table, or of one that has it.
-    Log,
-    /// No log: the table does not have it, or cannot be used.
-    Withdrawn,
-    /// The table, or this file of it, cannot be used: the path at fault and why.
-    Fault(PathBuf, Box<Diagnostic>),
-}
+/// Whether a file is a log: of no table, or of one that has it. An error where the table, or this file of it, cannot be used:
+/// the path at fault and why.
+pub(crate) type IsLog = Result<bool, (PathBuf, Box<Diagnostic>)>;
 
 impl TableFolders {
     /// The folders in which tables keep their logs.
@@ -55,7 +48,7 @@ impl TableFolders {
 
     /// Whether a local file is a log. `written_out` is the folder before the pattern's first wildcard: a folder above it
     /// may forbid to be listed.
-    pub(crate) fn local(&mut self, file: &Path, written_out: &Path) -> TableMembership {
+    pub(crate) fn local(&mut self, file: &Path, written_out: &Path) -> IsLog {
         for folder in file.ancestors().skip(1) {
             let format = match self.folders.get(folder) {
                 Some(format) => *format,
@@ -78,54 +71,43 @@ impl TableFolders {
                 return self.member(file, folder, format);
             }
         }
-        TableMembership::Log
+        Ok(true)
     }
 
     /// A folder that may be a table: any of its files may be withdrawn. It is one fault for all of them.
-    fn unknown(&mut self, folder: &Path, error: &std::io::Error) -> TableMembership {
+    fn unknown(&mut self, folder: &Path, error: &std::io::Error) -> IsLog {
         self.folders.insert(folder.to_owned(), Some(TableFormat::Delta));
         self.tables.insert(folder.to_owned(), None);
         let what =
             format!("whether the folder is a Delta, Iceberg or Hudi table cannot be determined: {error}");
         let hint = "check its owner and mode, or the share; then `freeplay run`";
-        TableMembership::Fault(
-            folder.to_owned(),
-            Box::new(Diagnostic::new("folder_unreadable", what).hint(hint)),
-        )
+        Err((folder.to_owned(), Box::new(Diagnostic::new("folder_unreadable", what).hint(hint))))
     }
 
     /// Whether an object of a listing is a log, by what was noted of that listing.
-    pub(crate) fn object(&mut self, object: &Path) -> TableMembership {
+    pub(crate) fn object(&mut self, object: &Path) -> IsLog {
         let known = |folder: &Path| Some((folder.to_owned(), (*self.folders.get(folder)?)?));
         match object.ancestors().skip(1).find_map(known) {
             Some((folder, format)) => self.member(object, &folder, format),
-            None => TableMembership::Log,
+            None => Ok(true),
         }
     }
 
-    fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> TableMembership {
+    fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> IsLog {
         if !self.tables.contains_key(root) {
-            let (live, fault) = match live_files(root, format) {
-                Ok(live) => (Some(live), None),
-                Err(diagnostic) => (None, Some(diagnostic)),
-            };
-            self.tables.insert(root.to_owned(), live);
-            if let Some(diagnostic) = fault {
-                return TableMembership::Fault(root.to_owned(), Box::new(diagnostic));
-            }
+            let live = live_files(root, format);
+            self.tables.insert(root.to_owned(), live.as_ref().ok().cloned());
+            live.map_err(|diagnostic| (root.to_owned(), Box::new(diagnostic)))?;
         }
         let live = self.tables.get(root).and_then(Option::as_ref);
         match live.and_then(|live| live.get(file)) {
-            None => TableMembership::Withdrawn,
-            Some(false) => TableMembership::Log,
+            None => Ok(false),
+            Some(false) => Ok(true),
             Some(true) => {
                 let what =
                     "rows of this file were deleted from its Delta table, and the file still holds them";
                 let hint = "rewrite the table without deletion vectors: `REORG TABLE … APPLY (PURGE)`, or `OPTIMIZE`";
-                TableMembership::Fault(
-                    file.to_owned(),
-                    Box::new(Diagnostic::new("table_unsupported", what).hint(hint)),
-                )
+                Err((file.to_owned(), Box::new(Diagnostic::new("table_unsupported", what).hint(hint))))
             }
         }
     }

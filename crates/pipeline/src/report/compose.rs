@@ -7,7 +7,7 @@ use ::report::{Event, FleetPriorView, Installation, Quality, QuantityView, Repor
 use jiff::Timestamp;
 use job::Config;
 use records::{Installations, PartNumber, Quantity, QuantityRow};
-use store::{LogOutcome, Store};
+use store::{LogOutcome, LogRecord, Store};
 use trend::Forecast;
 
 use crate::assess::trends::{self, ReportAssessments, StoreAssessment, UnitSelection};
@@ -42,7 +42,10 @@ pub fn compose(
     program: &str,
 ) -> Result<Report, Error> {
     let mut checks = inspections::read(config)?;
-    let mut logs = Logs::of(store)?;
+    let (accounts, mut logs_known) = (store.accounts()?, BTreeMap::<_, usize>::new());
+    accounts.iter().for_each(|log| *logs_known.entry(log.tail_number.clone()).or_default() += 1);
+    let failed = accounts.into_iter().filter(|log| log.outcome == LogOutcome::Error);
+    let mut log_errors: Vec<ReportLogErrorRow> = failed.map(log_error).collect();
     let StoreContents { mut histories, mut extras, store_version } =
         StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
@@ -79,10 +82,10 @@ pub fn compose(
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.row.tail_number.as_deref()).collect();
     let scope = scope(ask);
     let narrowed = scope.is_some();
-    attribute_by_path(&mut logs.faults, &tails, installations);
+    attribute_by_path(&mut log_errors, &tails, installations);
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
-    logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
-    add_log_errors(&mut tails, &logs.faults);
+    log_errors.retain(|fault| wanted(fault.tail_number.as_deref()));
+    add_log_errors(&mut tails, &log_errors);
     let tails = tails.into_values().filter(|t| wanted(Some(&t.tail_number))).collect();
     Ok(Report {
         made_utc,
@@ -91,8 +94,8 @@ pub fn compose(
         scope,
         as_of_utc,
         newest_departure_utc,
-        logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
-        log_errors: logs.faults,
+        logs_known: logs_known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
+        log_errors,
         priors: priors.into_iter().map(prior).collect(),
         tails,
         inspections_given: checks.is_some(),
@@ -121,27 +124,12 @@ fn scope(ask: &UnitSelection) -> Option<String> {
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-/// Logs: number by tail, and those in error.
-struct Logs {
-    known: BTreeMap<Option<String>, usize>,
-    faults: Vec<ReportLogErrorRow>,
-}
-
-impl Logs {
-    fn of(store: &Store) -> Result<Self, Error> {
-        let (mut known, mut faults) = (BTreeMap::new(), Vec::new());
-        for account in store.accounts()? {
-            *known.entry(account.tail_number.clone()).or_default() += 1;
-            if account.outcome == LogOutcome::Error {
-                faults.push(ReportLogErrorRow {
-                    log_path: account.log_path,
-                    tail_number: account.tail_number,
-                    error_code: account.error_code.unwrap_or_default(),
-                    processed_utc: account.processed_utc,
-                });
-            }
-        }
-        Ok(Self { known, faults })
+fn log_error(account: LogRecord) -> ReportLogErrorRow {
+    ReportLogErrorRow {
+        log_path: account.log_path,
+        tail_number: account.tail_number,
+        error_code: account.error_code.unwrap_or_default(),
+        processed_utc: account.processed_utc,
     }
 }
 

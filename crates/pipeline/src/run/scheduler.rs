@@ -278,6 +278,7 @@ fn process_all(
     };
     let run = &inputs.config.document.run;
     let settings = PoolSettings {
+        process_log: Arc::new(process_log),
         plan: &inputs.plan,
         workers,
         limit: Duration::try_from_secs_f64(run.log_timeout_s).unwrap_or(Duration::MAX),
@@ -286,7 +287,7 @@ fn process_all(
         watch: context.watch,
         fail: &|work, diagnostic| inputs.failed(work, diagnostic),
     };
-    let mut pool = WorkerPool::start(settings, Box::new(process_log))?;
+    let mut pool = WorkerPool::start(settings)?;
     while let Some(first) = pool.next(None)? {
         let deadline = Instant::now() + BATCH_WAIT;
         let mut finished = vec![*first];

@@ -93,13 +93,8 @@ pub struct KilledRun {
 }
 
 impl From<RunRecord> for KilledRun {
-    fn from(run: RunRecord) -> Self {
-        Self {
-            run_id: run.run_id,
-            started_utc: run.started_utc,
-            done: run.done,
-            not_reached: run.not_reached,
-        }
+    fn from(RunRecord { run_id, started_utc, done, not_reached, .. }: RunRecord) -> Self {
+        Self { run_id, started_utc, done, not_reached }
     }
 }
 
@@ -249,35 +244,19 @@ impl RunSummary {
     }
 
     /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
-    pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
-        let RunAssessments {
-            now,
-            changes,
-            recent,
-            followed,
-            states,
-            stale_now,
-            work_list,
-            mapping_faults,
-            notes,
-            findings: _,
-        } = assessments;
-        let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
-        let touched = |tail: &String| tails.contains(tail.as_str());
-        let newest = recent
-            .values()
-            .filter_map(|flights| Some(flights.last()?.departure_utc))
-            .max()
-            .unwrap_or_default();
-        self.recorder_moved = recorder_changes(&followed.changes, newest);
-        self.recorder_moved.retain(|m| touched(&m.tail_number));
-        self.quantity_changes = followed.changes;
+    pub(crate) fn add_assessments(&mut self, found: RunAssessments) {
+        let tails: BTreeSet<&str> = found.now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
+        let latest = found.recent.values().filter_map(|flights| Some(flights.last()?.departure_utc));
+        let newest = latest.max().unwrap_or_default();
+        self.recorder_moved = recorder_changes(&found.followed.changes, newest);
+        self.recorder_moved.retain(|moved| tails.contains(moved.tail_number.as_str()));
+        self.quantity_changes = found.followed.changes;
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
-        self.samples_repeated = repeated_samples::detect(&recent);
-        (self.trends, self.changed, self.states) = (now, changes.changed, states);
-        self.stale_now = stale_now;
-        (self.work_list, self.mapping_faults) = (work_list, mapping_faults);
-        self.notes.extend(notes);
+        self.samples_repeated = repeated_samples::detect(&found.recent);
+        (self.trends, self.changed, self.states) = (found.now, found.changes.changed, found.states);
+        self.stale_now = found.stale_now;
+        (self.work_list, self.mapping_faults) = (found.work_list, found.mapping_faults);
+        self.notes.extend(found.notes);
     }
 
     /// Adds what the status of all logs shows about the aircraft.

@@ -110,13 +110,9 @@ struct Workers {
 }
 
 impl Workers {
-    fn start(
-        settings: &PoolSettings<'_>,
-        process_log: &Arc<ProcessLog>,
-        rest: VecDeque<usize>,
-    ) -> Result<Self, Error> {
+    fn start(settings: &PoolSettings<'_>, rest: VecDeque<usize>) -> Result<Self, Error> {
         let shared = Arc::new(Shared {
-            process_log: Arc::clone(process_log),
+            process_log: Arc::clone(&settings.process_log),
             steps: settings.plan.work.iter().map(|_| StepCount::default()).collect(),
             rest: Mutex::new(rest),
             budget: MemoryBudget::new(settings.memory_mib),
@@ -141,6 +137,7 @@ impl Workers {
 
 /// What the workers of a run are started for.
 pub(crate) struct PoolSettings<'a> {
+    pub(crate) process_log: Arc<ProcessLog>,
     pub(crate) plan: &'a Plan,
     pub(crate) workers: usize,
     /// Time limit of one log.
@@ -155,7 +152,6 @@ pub(crate) struct PoolSettings<'a> {
 /// The workers of a run, seen from the thread that writes.
 pub(crate) struct WorkerPool<'a> {
     settings: PoolSettings<'a>,
-    process_log: Arc<ProcessLog>,
     workers: Workers,
     /// Logs in progress, and since when.
     in_progress: BTreeMap<usize, Instant>,
@@ -168,13 +164,10 @@ pub(crate) struct WorkerPool<'a> {
 
 impl<'a> WorkerPool<'a> {
     /// Starts the workers.
-    pub(crate) fn start(settings: PoolSettings<'a>, process_log: Box<ProcessLog>) -> Result<Self, Error> {
-        let logs = settings.plan.work.len();
-        let process_log: Arc<ProcessLog> = Arc::from(process_log);
-        let workers = Workers::start(&settings, &process_log, (0..logs).collect())?;
+    pub(crate) fn start(settings: PoolSettings<'a>) -> Result<Self, Error> {
+        let workers = Workers::start(&settings, (0..settings.plan.work.len()).collect())?;
         Ok(Self {
             settings,
-            process_log,
             workers,
             in_progress: BTreeMap::new(),
             late: Vec::new(),
@@ -274,7 +267,7 @@ impl<'a> WorkerPool<'a> {
         let mixed = |log: &usize| (*log as u32).wrapping_mul(0x9E37_79B9);
         rest.sort_by_key(|log| (self.settings.plan.work[*log].failed_before(), mixed(log)));
         self.in_progress.clear();
-        self.workers = Workers::start(&self.settings, &self.process_log, rest.into())?;
+        self.workers = Workers::start(&self.settings, rest.into())?;
         Ok(())
     }
 }
@@ -316,6 +309,7 @@ mod tests {
         };
         let late = std::cell::Cell::new(0);
         let settings = PoolSettings {
+            process_log: Arc::new(process_log),
             plan: &plan,
             workers: 2,
             limit,
@@ -327,7 +321,7 @@ mod tests {
                 outcome(work)
             },
         };
-        let mut pool = WorkerPool::start(settings, Box::new(process_log)).unwrap();
+        let mut pool = WorkerPool::start(settings).unwrap();
         let mut outcomes = 0;
         while pool.next(None).unwrap().is_some() {
             outcomes += 1;

@@ -7,7 +7,6 @@ use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
-use std::fmt::Write as _;
 
 use crate::fleet::{self, config, scatter};
 
@@ -38,6 +37,12 @@ fn flown(days: i32) -> Vec<GapRecord> {
         record
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
+}
+
+/// The installation of a unit of [`flown`].
+fn installation(unit: i32, removed_utc: Option<Timestamp>) -> Installation {
+    let names = [&*format!("T{unit:02}"), &format!("place_{unit}"), "EMA-27-1040", &format!("S{unit:02}")];
+    fleet::installation(names, day(-1), removed_utc)
 }
 
 /// The number of the unit that a record of [`flown`] is of.
@@ -127,19 +132,10 @@ fn utilisation_counts_the_flights_that_left_no_log() {
 
 #[test]
 fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
-    let config = config();
-    let rows = flown(200);
-    let table = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
-    let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n".to_owned();
-    for unit in 0..14 {
-        let removed = if unit == 3 { "2024-07-20" } else { "" };
-        writeln!(text, "T{unit:02},place_{unit},EMA-27-1040,S{unit:02},2023-12-01,{removed}").unwrap();
-    }
-    std::fs::write(table.path(), text).unwrap();
-    let installations =
-        ingest::tables::installations(table.path(), &config.document.columns.installations).unwrap();
+    let installed = |unit| installation(unit, (unit == 3).then(|| "2024-07-20T00:00:00Z".parse().unwrap()));
+    let installations = Installations::new((0..14).map(installed).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
-    let rows = assess_histories(&config, &installations, histories(&rows), &ask);
+    let rows = assess_histories(&config(), &installations, histories(&flown(200)), &ask);
     for row in &rows {
         let is_removed = row.serial_number == "S03";
         assert_eq!(row.state.is_none(), is_removed, "{row:?}");
@@ -223,13 +219,8 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     let rows = (0..UNITS).flat_map(|unit| (0..DAYS + 50).map(move |at| row(unit, at)));
     let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
     let config_with = fleet::with_flights(config(), &rows.fold(head, |all, row| all + &row));
-    let installation = |unit: i32| {
-        let [tail, position, serial] =
-            [format!("T{unit:02}"), format!("place_{unit}"), format!("S{unit:02}")];
-        let names = [&*tail, &position, "EMA-27-1040", &serial];
-        Installation { unit_hours_at_install: Some(100.0), ..fleet::installation(names, day(-1), None) }
-    };
-    let installations = Installations::new((0..UNITS).map(installation).collect()).unwrap();
+    let installed = |unit| Installation { unit_hours_at_install: Some(100.0), ..installation(unit, None) };
+    let installations = Installations::new((0..UNITS).map(installed).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
     let assess = |config: &Config| {
         let mut logged = flown(DAYS);

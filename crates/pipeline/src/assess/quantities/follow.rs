@@ -112,10 +112,7 @@ fn follow_quantity(
     for subject in &subjects {
         let Some(fit) = &subject.fit else { continue };
         let assessed = Assessed { subject, fit, quantity, facts };
-        let is_tails = subject
-            .last_place()
-            .and_then(|p| p.tail_number.as_deref())
-            .is_some_and(|t| drifting_tails.contains_key(t));
+        let is_tails = subject.tail().is_some_and(|tail| drifting_tails.contains_key(tail));
         found.rows.push(assessed.row(as_of, is_tails));
         found.changes.extend(assessed.change(is_tails));
     }
@@ -260,8 +257,7 @@ fn curves(subjects: &[Subject<'_>], follow: &[bool]) -> BTreeMap<Option<String>,
     let mut parts: BTreeMap<Option<String>, Vec<(usize, &[QuantityValue])>> = BTreeMap::new();
     for (subject, _) in subjects.iter().zip(follow).filter(|(_, follows)| **follows) {
         let count = tails.len();
-        let tail = subject.last_place().and_then(|p| p.tail_number.as_deref());
-        let tail = *tails.entry(tail).or_insert(count);
+        let tail = *tails.entry(subject.tail()).or_insert(count);
         parts.entry(subject.name.0.clone()).or_default().push((tail, &subject.values));
     }
     // The scale of units differs little within a part, and is one for delays.
@@ -272,11 +268,7 @@ fn curves(subjects: &[Subject<'_>], follow: &[bool]) -> BTreeMap<Option<String>,
 fn drifting_tails(subjects: &[Subject<'_>]) -> BTreeMap<String, Vec<usize>> {
     let mut tails: BTreeMap<&str, (Vec<usize>, Vec<usize>, usize)> = BTreeMap::new();
     for (k, subject) in subjects.iter().enumerate() {
-        let (Some(fit), Some(tail)) =
-            (&subject.fit, subject.last_place().and_then(|p| p.tail_number.as_deref()))
-        else {
-            continue;
-        };
+        let (Some(fit), Some(tail)) = (&subject.fit, subject.tail()) else { continue };
         let entry = tails.entry(tail).or_default();
         entry.2 += usize::from(fit.flights >= MIN_FLIGHTS);
         let Some(limit) = subject.treatment.limit else { continue };
@@ -502,10 +494,8 @@ fn positions<'s>(units: impl Iterator<Item = &'s Subject<'s>>) -> Vec<String> {
 fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Quantity) -> QuantityChange {
     let known: Vec<(&Subject<'_>, &QuantityChanges)> =
         members.iter().filter_map(|&k| Some((&subjects[k], subjects[k].fit.as_ref()?))).collect();
-    let (from, change) = (
-        median(known.iter().map(|(_, f)| f.baseline).collect()),
-        median(known.iter().map(|(_, f)| f.change).collect()),
-    );
+    let (from, change): (Vec<f64>, Vec<f64>) = known.iter().map(|(_, f)| (f.baseline, f.change)).unzip();
+    let (from, change) = (median(from), median(change));
     let shares: Vec<f64> = known.iter().map(|(s, f)| f.change / s.scale).collect();
     let middle = |values: &[QuantityValue]| values.get(values.len() / 2).and_then(|v| utc(v.departure_us));
     QuantityChange {

@@ -40,6 +40,11 @@ impl Subject<'_> {
         Some(self.unit.place(self.unit.flights.last()?))
     }
 
+    /// Tail of the last flight.
+    pub(crate) fn tail(&self) -> Option<&str> {
+        self.last_place()?.tail_number.as_deref()
+    }
+
     /// Position of the last flight.
     pub(crate) fn position(&self) -> Option<&str> {
         self.last_place()?.position.as_deref()

@@ -53,16 +53,11 @@ impl<'a> UsageSources<'a> {
         let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
         let mut series = Series::new(observations, &usage)?;
         series.faults.meter_readings = dropped;
-        Ok(series.with_maintenance(maintenance_events(&self.maintenance, name)))
+        // None is recorded of a unit without a part number.
+        let unit = name.0.clone().map(|part| (part, name.1.clone()));
+        let events = unit.and_then(|unit| self.maintenance.get(&unit).cloned());
+        Ok(series.with_maintenance(events.unwrap_or_default()))
     }
-}
-
-/// Recorded maintenance of a unit; nothing for a unit without a part number.
-fn maintenance_events(
-    maintenance: &maintenance_log::MaintenanceLog,
-    (part, serial): &UnitKey,
-) -> Vec<trend::MaintenanceEvent> {
-    part.clone().and_then(|part| maintenance.get(&(part, serial.clone())).cloned()).unwrap_or_default()
 }
 
 /// A unit's flights as the trend knows them, those that left no record among them.
