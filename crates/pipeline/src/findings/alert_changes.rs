@@ -122,16 +122,10 @@ fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timest
         let selected: Vec<&Finding> = findings.iter().filter(is_selected).collect();
         let id = identifier(first.as_of_utc, &[BASELINE, name, run_id]);
         let message = alert_message::baseline(&id, &all, &selected, run_id);
-        let of_fleet = Finding {
-            unit: (None, String::new()),
-            tail_number: None,
-            position: None,
-            state: None,
-            reason: None,
-            ..first.clone()
-        };
+        let (quantity, as_of_utc) = (first.quantity, first.as_of_utc);
+        let of_fleet = Finding { quantity, as_of_utc, ..Finding::default() };
         let summary = row(&id, BASELINE, 0, None, &of_fleet, run_id, now);
-        let summary = AlertRecord { serial_number: None, since_utc: None, ..summary };
+        let summary = AlertRecord { serial_number: None, ..summary };
         rows.push(pending(&summary, name, &message));
     }
     rows

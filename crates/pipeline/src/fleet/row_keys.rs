@@ -31,22 +31,19 @@ impl KeyColumns {
     }
 }
 
-/// Cached results for the position keys of earlier rows: of the last one, and of the last one of each serial number
-/// where these have codes.
-pub(crate) struct KeyCache<T> {
-    last: Option<(usize, T)>,
-    by_code: Vec<Option<(usize, T)>>,
+/// Numbers of a unit and of its place.
+type Seat = (usize, u32);
+
+/// Seats of earlier rows: of the last one, and of the last one of each serial number where these have codes.
+#[derive(Default)]
+pub(crate) struct KeyCache {
+    last: Option<(usize, Seat)>,
+    by_code: Vec<Option<(usize, Seat)>>,
 }
 
-impl<T> Default for KeyCache<T> {
-    fn default() -> Self {
-        Self { last: None, by_code: Vec::new() }
-    }
-}
-
-impl<T: Copy> KeyCache<T> {
-    /// Cached result for a row's position key.
-    pub(crate) fn get(&self, keys: &KeyColumns, row: usize) -> Option<T> {
+impl KeyCache {
+    /// The seat of a row, if it is that of an earlier row.
+    pub(crate) fn get(&self, keys: &KeyColumns, row: usize) -> Option<Seat> {
         let of_code = match keys.serials.code(row) {
             Some(code) => self.by_code.get(code).copied().flatten(),
             None => self.last,
@@ -54,8 +51,8 @@ impl<T: Copy> KeyCache<T> {
         of_code.filter(|(before, _)| keys.are_same(*before, row)).map(|(_, found)| found)
     }
 
-    /// Caches the result for a row's position key.
-    pub(crate) fn put(&mut self, keys: &KeyColumns, row: usize, found: T) {
+    /// Remembers the seat of a row.
+    pub(crate) fn put(&mut self, keys: &KeyColumns, row: usize, found: Seat) {
         self.last = Some((row, found));
         let Some(code) = keys.serials.code(row) else { return };
         if self.by_code.len() <= code {

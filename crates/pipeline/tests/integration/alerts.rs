@@ -51,6 +51,7 @@ fn channels() -> Channels {
 struct Killed;
 
 /// A table in memory, receivers, and a kill before or after the n-th write.
+#[derive(Default)]
 struct World {
     table: BTreeMap<(String, String), AlertRecord>,
     received: Vec<(String, String)>,
@@ -64,18 +65,6 @@ struct World {
 }
 
 impl World {
-    fn new() -> Self {
-        Self {
-            table: BTreeMap::new(),
-            received: Vec::new(),
-            random: fastrand::Rng::with_seed(25),
-            kill_in: None,
-            is_calm: false,
-            refused: BTreeSet::new(),
-            attempts: 0,
-        }
-    }
-
     fn write_all(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
         let (is_last, is_durable) = match &mut self.kill_in {
             Some((0, is_durable)) => (true, *is_durable),
@@ -149,7 +138,7 @@ impl Courier for World {
 /// 1,000 runs; every third is killed at a random write, most are repeated, some leave and return within one run.
 #[test]
 fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
-    let mut world = World::new();
+    let mut world = World { random: fastrand::Rng::with_seed(25), ..World::default() };
     let mut truth: BTreeMap<&str, Option<&'static str>> =
         SERIALS.into_iter().map(|serial| (serial, Some("normal"))).collect();
     let (mut expected, mut kills) = (0, 0);
@@ -273,7 +262,7 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     let mut due = alert_changes::detect(&known, &findings("act"), &channels, "1", now);
     due.retain(|row| !row.channel.is_empty());
     let refused = serials.iter().cloned().collect();
-    let mut world = World { is_calm: true, refused, ..World::new() };
+    let mut world = World { is_calm: true, refused, ..World::default() };
     world.write_all(&due).unwrap();
     let run = |world: &mut World| {
         let rows = world.table.values().cloned().collect();

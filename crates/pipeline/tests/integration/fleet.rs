@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ingest::Flights;
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use records::{
     Flight, FlightId, GapEstimate, GapRecord, Installation, PartNumber, Position, Provenance, SerialNumber,
@@ -135,4 +135,26 @@ pub(crate) fn random(names: impl Hash) -> fastrand::Rng {
 pub(crate) fn scatter(names: impl Hash) -> f64 {
     let mut random = random(names);
     (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
+}
+
+/// First departure of the nth day of a fleet that wears.
+pub(crate) fn day(count: i32) -> Timestamp {
+    "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + SignedDuration::from_hours(24) * count
+}
+
+/// A record of a unit that wears by a number of µm in 1,000 h from 20 µm on, flies some hours a day, and is read by the
+/// hour meter of its tail.
+pub(crate) fn worn(
+    unit: i32,
+    at: i32,
+    position: &str,
+    [um_per_1000_h, hours_a_day, flight_hours]: [f64; 3],
+) -> GapRecord {
+    let hours = hours_a_day * f64::from(at + 1);
+    let gap_um = 20.0 + um_per_1000_h * hours / 1000.0 + scatter((unit, at));
+    let [tail, serial, flight] = [format!("T{unit:02}"), format!("S{unit:02}"), format!("{unit}-{at}")];
+    let names = [&tail, position, "EMA-27-1040", &serial, &flight];
+    let mut record = record(names, day(at), flight_hours, estimated(gap_um));
+    record.flight.tail_hours_end = Some(500.0 + hours);
+    record
 }

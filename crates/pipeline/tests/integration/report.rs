@@ -13,7 +13,7 @@ use records::{GapRecord, Installations, TrendRow};
 use report::{Report, UnitView};
 use store::{LogResult, Store};
 
-use crate::fleet::{self, config, scatter};
+use crate::fleet::{self, config, day};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 6.0;
@@ -24,19 +24,9 @@ const DAYS: i32 = 400;
 const LAST: i32 = DAYS - DAYS_A_LOG;
 const LIMIT_M: f64 = 150e-6;
 
-fn day(count: i32) -> Timestamp {
-    "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
-}
-
 /// The nth unit wears by 20 + 2 n µm in 1,000 h.
 fn record(unit: i32, at: i32) -> GapRecord {
-    let hours = HOURS_A_DAY * f64::from(at + 1);
-    let gap_um = 20.0 + (20.0 + 2.0 * f64::from(unit)) * hours / 1000.0 + scatter((unit, at));
-    let [tail, serial, flight] = [format!("T{unit:02}"), format!("S{unit:02}"), format!("{unit}-{at}")];
-    let names = [&tail, "aileron_left", "EMA-27-1040", &serial, &flight];
-    let mut record = fleet::record(names, day(at), 1.5, fleet::estimated(gap_um));
-    record.flight.tail_hours_end = Some(500.0 + hours);
-    record
+    fleet::worn(unit, at, "aileron_left", [20.0 + 2.0 * f64::from(unit), HOURS_A_DAY, 1.5])
 }
 
 fn assessed(store: &Store, as_of: Timestamp) -> BTreeMap<String, TrendRow> {

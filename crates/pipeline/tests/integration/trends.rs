@@ -8,14 +8,10 @@ use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
 
-use crate::fleet::{self, config, scatter};
+use crate::fleet::{self, config, day};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
-
-fn day(count: i32) -> Timestamp {
-    "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
-}
 
 /// What a store of some records reads back.
 fn histories(rows: &[GapRecord]) -> Histories {
@@ -27,14 +23,7 @@ fn histories(rows: &[GapRecord]) -> Histories {
 /// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
 fn flown(days: i32) -> Vec<GapRecord> {
     let flight = |unit: i32, at: i32| {
-        let hours = HOURS_A_DAY * f64::from(at + 1);
-        let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter((unit, at));
-        let [tail, position] = [format!("T{unit:02}"), format!("place_{unit}")];
-        let [serial, flight] = [format!("S{unit:02}"), format!("{unit}-{at}")];
-        let names = [&tail, &position, "EMA-27-1040", &serial, &flight];
-        let mut record = fleet::record(names, day(at), HOURS_A_DAY, fleet::estimated(gap_um));
-        record.flight.tail_hours_end = Some(500.0 + hours);
-        record
+        fleet::worn(unit, at, &format!("place_{unit}"), [15.0 + f64::from(unit), HOURS_A_DAY, HOURS_A_DAY])
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
 }

@@ -448,28 +448,18 @@ fn of_common(
     let (from, size): (Vec<f64>, Vec<f64>) = step.members.iter().filter_map(levels).unzip();
     let (from, size) = (median(from), median(size));
     let change_se = member(first).fit.as_ref().map_or(f64::NAN, |fit| fit.steps[first.step].size_se);
-    let of_tail = step.scope == ChangeScope::Tail;
-    let members = step.members.iter().filter(|_| of_tail).map(member);
+    let units: Vec<&Subject<'_>> = step.members.iter().map(member).collect();
     let flight = facts
         .flight_id(member(first).name, step.departure_us)
         .map(|f| format!(", flight {f}"))
         .unwrap_or_default();
     let since_utc = utc(step.departure_us).unwrap_or_default();
     QuantityChange {
-        quantity: quantity.as_str(),
-        scope: step.scope.as_str(),
         kind: "step",
-        part_number: (!of_tail).then(|| step.name.clone()),
-        tail_number: of_tail.then(|| step.name.clone()),
-        serial_number: None,
-        positions: positions(members),
-        units: step.members.len() as i64,
-        units_able: step.able as i64,
         since_utc,
         from,
         to: from + size,
         change_se,
-        state: step.scope.state(),
         evidence: format!(
             "{} of {} units of {} stepped in {} by {} on {}{flight}: {}",
             step.members.len(),
@@ -480,14 +470,33 @@ fn of_common(
             day(since_utc),
             step.scope.cause(),
         ),
+        ..of_several(quantity, step.scope, &step.name, &units, step.able)
     }
 }
 
-/// The positions of some units, in order.
-fn positions<'s>(units: impl Iterator<Item = &'s Subject<'s>>) -> Vec<String> {
-    let mut positions: Vec<String> = units.filter_map(Subject::position).map(str::to_owned).collect();
+/// What several units of a tail or a part share of a change that they made.
+fn of_several(
+    quantity: Quantity,
+    scope: ChangeScope,
+    name: &str,
+    units: &[&Subject<'_>],
+    able: usize,
+) -> QuantityChange {
+    let is_tail = scope == ChangeScope::Tail;
+    let positions = units.iter().filter(|_| is_tail).filter_map(|unit| unit.position());
+    let mut positions: Vec<String> = positions.map(str::to_owned).collect();
     positions.sort();
-    positions
+    QuantityChange {
+        quantity: quantity.as_str(),
+        scope: scope.as_str(),
+        part_number: (!is_tail).then(|| name.to_owned()),
+        tail_number: is_tail.then(|| name.to_owned()),
+        positions,
+        units: units.len() as i64,
+        units_able: able as i64,
+        state: scope.state(),
+        ..QuantityChange::default()
+    }
 }
 
 /// A drift that the units of a tail share.
@@ -498,19 +507,13 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
     let (from, change) = (median(from), median(change));
     let shares: Vec<f64> = known.iter().map(|(s, f)| f.change / s.scale).collect();
     let middle = |values: &[QuantityValue]| values.get(values.len() / 2).and_then(|v| utc(v.departure_us));
+    let units: Vec<&Subject<'_>> = known.iter().map(|(subject, _)| *subject).collect();
     QuantityChange {
-        quantity: quantity.as_str(),
-        scope: ChangeScope::Tail.as_str(),
         kind: "drift",
-        tail_number: Some(tail.to_owned()),
-        positions: positions(known.iter().map(|(subject, _)| *subject)),
-        units: known.len() as i64,
-        units_able: known.len() as i64,
         since_utc: known.first().and_then(|(s, _)| middle(&s.values)).unwrap_or_default(),
         from,
         to: from + change,
         change_se: known.first().map_or(f64::NAN, |(_, f)| f.change_se),
-        state: ChangeScope::Tail.state(),
         evidence: format!(
             "{} units of {tail} drifted in {} by {}: {}",
             known.len(),
@@ -518,7 +521,7 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
             shown_range(quantity, &shares, known.first().map_or(1.0, |(s, _)| s.scale)),
             ChangeScope::Tail.cause(),
         ),
-        ..QuantityChange::default()
+        ..of_several(quantity, ChangeScope::Tail, tail, &units, known.len())
     }
 }
 
