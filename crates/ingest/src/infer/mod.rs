@@ -347,7 +347,8 @@ fn share_positions(guesses: &mut [(String, ParsedName)]) {
     }
 }
 
-/// The pattern of each channel that fits most columns, its redundant ones, and the positions that all of them know.
+/// The pattern of each channel that fits most columns; its redundant ones, and those of actuators whose columns are named
+/// otherwise; and the positions that all channels know.
 fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping {
     let mut patterns: BTreeMap<(Role, &str), Pattern<'_>> = BTreeMap::new();
     for guess in guesses {
@@ -356,7 +357,12 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
         (entry.1, entry.2) = (guess.unit, guess.sensor);
     }
     let mut found = InferredMapping::default();
-    let mut shared: Option<BTreeSet<&str>> = None;
+    let places_of = |role: Role| -> BTreeSet<&str> {
+        let of_role = patterns.iter().filter(|((of, _), _)| *of == role);
+        of_role.flat_map(|(_, (places, ..))| places).copied().collect()
+    };
+    let known = Role::NEEDED.map(places_of).into_iter().filter(|places| !places.is_empty());
+    let shared = known.reduce(|all, places| &all & &places).unwrap_or_default();
     for role in Role::ALL {
         let of_role = patterns.iter().filter(|((of, _), _)| *of == role);
         let mut ranked: Vec<(&str, &Pattern<'_>)> =
@@ -365,16 +371,20 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
         let Some((name, (places, unit, sensor))) = ranked.first().copied() else { continue };
         found.channels.insert(role, (name.to_owned(), *unit));
         let is_redundant = |other: &Pattern<'_>| sensor.is_some() && other.2.is_some() && other.0 == *places;
-        let others = ranked.iter().skip(1).filter(|(_, other)| is_redundant(other));
-        let others: Vec<_> = others.map(|(name, (_, unit, _))| ((*name).to_owned(), *unit)).collect();
+        let mut covered = places.clone();
+        let mut others = Vec::new();
+        for (name, other) in ranked.iter().skip(1) {
+            let is_of_others = other.0.is_disjoint(&covered) && !other.0.is_disjoint(&shared);
+            if is_of_others || is_redundant(other) {
+                covered.extend(&other.0);
+                others.push(((*name).to_owned(), other.1));
+            }
+        }
         if !others.is_empty() {
             found.alternatives.insert(role, others);
         }
-        if Role::NEEDED.contains(&role) {
-            shared.get_or_insert_with(|| places.clone()).retain(|place| places.contains(place));
-        }
     }
-    found.positions = shared.unwrap_or_default().into_iter().map(str::to_owned).collect();
+    found.positions = shared.into_iter().map(str::to_owned).collect();
     found
 }
 
@@ -435,6 +445,14 @@ mod tests {
         let found = of(&["ail_l.motor_angle", "ail_l.screw_pos", "ail_l.hinge_load", "ail_lh.load"]);
         assert_eq!(found.channels[&Role::Load].0, "{position}.hinge_load");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
+        // The elevator's screw is measured otherwise, and nothing but a load is known of the spoiler.
+        let names =
+            ["ail_motor_deg", "ail_screw_mm", "ail_load_n", "elv_motor_deg", "elv_screw_um", "elv_load_n"];
+        let found = of(&[&names[..], &["spoiler_load_kn"]].concat());
+        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
+        let other = ("{position}_screw_um".to_owned(), Some(Unit::Micrometre));
+        assert_eq!(found.alternatives, [(Role::Screw, vec![other])].into());
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail", "elv"]);
         let numbers = ["motor_1_deg", "motor_2_deg", "screw_1_mm", "screw_2_mm", "load_1_n", "load_2_n"];
         let found = of(&numbers);
         assert_eq!(found.channels[&Role::Load].0, "load_{position}_n");

@@ -428,8 +428,10 @@ impl Proposal {
         }
         let own_unit = offer.channels.get(&role).and_then(|(_, unit)| *unit);
         let other = |(column, unit): &(String, Option<Unit>)| {
+            let is_alike = unit.is_none() || *unit == own_unit;
             let unit = unit.or(own_unit).map_or(usual, |unit| unit.as_str());
-            let wraps = turn.map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
+            let wraps =
+                turn.filter(|_| is_alike).map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
             format!("{{ column = {}, unit = {unit:?}{wraps} }}", quoted(column))
         };
         if let Some(others) = offer.alternatives.get(&role) {
