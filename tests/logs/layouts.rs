@@ -651,20 +651,28 @@ fn a_second_piece_is_named_and_the_first_stays() {
     assert_eq!(numbers(&fleet).len(), 1 + 12 * 4);
 }
 
-/// Pieces that are not declared are two logs of one flight: `check` reports what `run` does, and both name the setting.
+/// Pieces that are not declared are two logs of one flight, also where one recorder numbers flights otherwise: `check`
+/// reports what `run` does, and both name the setting.
 #[test]
 fn check_finds_a_flight_in_two_logs_as_run_does() {
-    let fleet = one_tail();
-    let log = &logs(&fleet)[0];
-    let folder = fleet.path("pieces");
-    rewrite(log, &folder.join("a.parquet"), &facts(log), |_| true, |row| row < 4321);
-    rewrite(log, &folder.join("b.parquet"), &facts(log), |_| true, |row| row >= 4321);
-    fleet.configure("sample-data/logs/N412FP/*.parquet", "pieces/*.parquet");
-    for command in ["check", "run"] {
-        let result = fleet.freeplay(&[command]);
-        assert_eq!(result.code, Some(1), "{result:?}");
-        assert_eq!(result.err.matches("error[duplicate_flight]").count(), 1, "{}", result.err);
-        assert!(result.err.contains("logs.pieces = true"), "{}", result.err);
+    for is_numbered_otherwise in [false, true] {
+        let fleet = one_tail();
+        let log = &logs(&fleet)[0];
+        let folder = fleet.path("pieces");
+        let mut other = facts(log);
+        other
+            .iter_mut()
+            .filter(|fact| is_numbered_otherwise && fact.0 == "flight_id")
+            .for_each(|id| id.1 += "X");
+        rewrite(log, &folder.join("a.parquet"), &facts(log), |_| true, |row| row < 4321);
+        rewrite(log, &folder.join("b.parquet"), &other, |_| true, |row| row >= 4321);
+        fleet.configure("sample-data/logs/N412FP/*.parquet", "pieces/*.parquet");
+        for command in ["check", "run"] {
+            let result = fleet.freeplay(&[command]);
+            assert_eq!(result.code, Some(1), "{result:?}");
+            assert_eq!(result.err.matches("error[duplicate_flight]").count(), 1, "{}", result.err);
+            assert!(result.err.contains("logs.pieces = true"), "{}", result.err);
+        }
     }
 }
 

@@ -5,16 +5,14 @@ use std::collections::BTreeMap;
 use ingest::{ActuatorColumns, LogFiles};
 use job::Config;
 use job::flight_log::{FlightLog, duplicate_flight, may_be_pieces, pieces_undeclared, sample_digest};
-use records::{Diagnostic, Installations};
+use records::{Diagnostic, FlightId, Installations};
 
-/// Departure, tail, flight and position: what one log holds, no other may.
-pub(super) type FlightKey = (jiff::Timestamp, String, String, String);
+/// Departure, tail and position, as in the key of a record: what one log holds, no other may.
+pub(super) type FlightKey = (jiff::Timestamp, String, String);
 
 pub(super) fn flight_keys(opened: &FlightLog, installations: &Installations) -> Vec<FlightKey> {
     let id = &opened.identity;
-    let key = |at: &ActuatorColumns| {
-        (id.departure_utc, id.tail_number.to_string(), id.flight_id.to_string(), at.position.to_string())
-    };
+    let key = |at: &ActuatorColumns| (id.departure_utc, id.tail_number.to_string(), at.position.to_string());
     opened.actuators(installations).map(key).collect()
 }
 
@@ -23,6 +21,7 @@ pub(super) struct CheckedLog {
     pub(super) files: LogFiles,
     pub(super) name: String,
     pub(super) digest: String,
+    pub(super) flight_id: FlightId,
 }
 
 /// The log of each flight and position: another log of the same flight is an error in a run, too.
@@ -57,7 +56,8 @@ impl FlightOwners {
     /// An error for each log with the tail, flight id and position of another, and another departure close by.
     pub(super) fn undeclared_pieces(&self) -> Vec<Diagnostic> {
         let mut same_id: BTreeMap<_, Vec<(jiff::Timestamp, usize)>> = BTreeMap::new();
-        for ((departure, tail, flight, position), log) in &self.owners {
+        for ((departure, tail, position), log) in &self.owners {
+            let flight = &self.logs[*log].flight_id;
             same_id.entry((tail, flight, position)).or_default().push((*departure, *log));
         }
         let mut found = BTreeMap::new();

@@ -71,18 +71,17 @@ pub fn check_logs(
     let mut flights = FlightOwners::default();
     for (files, name) in logs {
         let (of_log, installed, shown) = (Arc::clone(config), Arc::clone(installations), name.clone());
-        let own_files = files.clone();
         let looked = within_time_limit(&name, config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
             let keys = flight_keys(&opened, &installed);
-            let digest = opened.digest.clone();
-            Ok((check_log(&opened, &shown, &of_log, &installed), keys, digest))
+            let (digest, flight_id) = (opened.digest.clone(), opened.identity.flight_id.clone());
+            let checked = check_log(&opened, &shown, &of_log, &installed);
+            Ok((checked, keys, CheckedLog { files, name: shown, digest, flight_id }))
         });
         match looked {
-            Ok((mut found, keys, digest)) => {
+            Ok((mut found, keys, log)) => {
                 seen.diagnostics.append(&mut found.diagnostics);
                 seen.logs.push(found);
-                let log = CheckedLog { files: own_files, name, digest };
                 seen.diagnostics.extend(flights.enter(log, keys, config, installations));
             }
             Err(diagnostic) => seen.diagnostics.push(diagnostic),
