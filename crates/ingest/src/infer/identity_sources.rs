@@ -62,17 +62,15 @@ pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
     rank_of(name).map(|(fact, _)| fact)
 }
 
-/// The name of each fact among some names, the best known one first; of a field of JSON (`flight.tail`), what follows the
-/// dot counts as the name where the whole is none.
+/// The source of each fact among names with their sources, such as columns or metadata keys; the best known name first.
 pub(super) fn facts_of<'n>(
-    names: impl DoubleEndedIterator<Item = &'n str>,
+    names: impl DoubleEndedIterator<Item = (&'n str, &'n str)>,
 ) -> BTreeMap<IdentityField, String> {
-    let field = |name: &'n str| name.rsplit_once('.').map(|(_, field)| field);
-    let rank = |name: &'n str| Some((rank_of(name).or_else(|| rank_of(field(name)?))?, name));
-    let mut ranked: Vec<_> = names.rev().filter_map(rank).collect();
+    let mut ranked: Vec<_> =
+        names.rev().filter_map(|(name, source)| Some((rank_of(name)?, source))).collect();
     // The last name of a fact is the one that remains: the best known, and of equal ones the first.
     ranked.sort_by_key(|((_, rank), _)| std::cmp::Reverse(*rank));
-    ranked.into_iter().map(|((fact, _), name)| (fact, name.to_owned())).collect()
+    ranked.into_iter().map(|((fact, _), source)| (fact, source.to_owned())).collect()
 }
 
 /// Whether a text is an instant of ISO 8601, with a time zone or without; a date alone is none.
@@ -132,9 +130,10 @@ const SURE_TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z]{3,4}|N\d{1,4}[A-Z]{1,2}|\d[A-Z]-[A
 /// (`AB-2026`) must not be one.
 const TAILS_IN_NAMES: [(char, &str); 3] =
     [('_', TAIL), (' ', TAIL), ('-', r"(?:[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})|\d[A-Z]-[A-Z]{3})")];
+/// What a type of aircraft looks like, which is no tail number.
+const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
 /// What may stand before a tail number: a type of aircraft (`A320_N412FP`), nothing, or the name of a recorder (`QAR-N412FP`).
 const BEFORE_TAIL: [&str; 3] = [AIRCRAFT_TYPE, "", "[A-Za-z]{3,}[_ -]"];
-const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
 /// Folders between that of the tail and the log, at most.
 const MOST_FOLDERS: usize = 4;
 
@@ -148,28 +147,13 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     let place_end = place_end();
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
     let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
-    let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
-    let known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
-    let days = path.parent().and_then(Path::to_str).unwrap_or_default();
-    let day = DAYS.iter().find(|(form, _)| fits(&format!("(?:^|/){form}$"), days));
-    let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
-    // The departure, its form, and the folders that it takes.
-    let (departure, format, taken) = if let Some((form, format)) = known(name) {
-        (format!(r"[^/]*?(?<departure_utc>{form}){end}"), Some((*format).to_owned()), 0)
-    } else if let Some(((day, days), (time, times))) = day.zip(time) {
-        let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet");
-        (parts, Some(format!("{days}T{times}")), 1 + day.matches('/').count())
-    } else if let Some((form, format)) = folder(1).and_then(known) {
-        (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}"), Some((*format).to_owned()), 1)
-    } else {
-        (end.to_owned(), None, 0)
-    };
+    let PathDeparture { expression: departure, format, folders: taken } = path_departure(path, name, end);
     // The folder of the tail: one that is surely none else, or the outermost, as folders of flights look alike.
     let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
     let tails = || (taken + 1..=taken + MOST_FOLDERS).filter(|up| is(*up, TAIL) && !is(*up, AIRCRAFT_TYPE));
     let tail_folder = tails().find(|up| is(*up, SURE_TAIL)).or_else(|| tails().next_back());
     let in_name = || {
-        let (form, _) = known(name)?;
+        let (form, _) = known_departure(name)?;
         let tails =
             BEFORE_TAIL.iter().flat_map(|before| TAILS_IN_NAMES.map(|(end, tail)| (before, tail, end)));
         let before = tails.map(|(before, tail, end)| format!("{before}(?<tail_number>{tail}){end}"));
@@ -203,6 +187,42 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     Some((format!("{expression}$"), format))
 }
 
+/// The end of a path from its departure on, if it seems to hold one.
+struct PathDeparture {
+    expression: String,
+    format: Option<String>,
+    /// Folders that the expression takes.
+    folders: usize,
+}
+
+/// The form of a departure that stands alone in a name: no digit is beside it.
+fn known_departure(name: &str) -> Option<&'static (&'static str, &'static str)> {
+    DEPARTURES.iter().find(|(form, _)| fits(&alone(form), name))
+}
+
+fn alone(form: &str) -> String {
+    format!(r"^(?:.*\D)?{form}(?:\D.*)?$")
+}
+
+/// The departure in the name of a log, in folders of a day and the name, or in the folder; `end` ends a name.
+fn path_departure(path: &Path, name: &str, end: &str) -> PathDeparture {
+    let folder = path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str());
+    let days = path.parent().and_then(Path::to_str).unwrap_or_default();
+    let day = DAYS.iter().find(|(form, _)| fits(&format!("(?:^|/){form}$"), days));
+    let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
+    let (expression, format, folders) = if let Some((form, format)) = known_departure(name) {
+        (format!(r"[^/]*?(?<departure_utc>{form}){end}"), Some((*format).to_owned()), 0)
+    } else if let Some(((day, days), (time, times))) = day.zip(time) {
+        let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet");
+        (parts, Some(format!("{days}T{times}")), 1 + day.matches('/').count())
+    } else if let Some((form, format)) = folder.and_then(known_departure) {
+        (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}"), Some((*format).to_owned()), 1)
+    } else {
+        (end.to_owned(), None, 0)
+    };
+    PathDeparture { expression, format, folders }
+}
+
 /// The tail number in a path of one of the forms that [`path_identity`] knows.
 pub fn path_tail(path: &Path) -> Option<String> {
     captured(&path_identity(path, false)?.0, path.to_str()?, "tail_number")
@@ -230,6 +250,7 @@ fn captured(expression: &str, text: &str, group: &str) -> Option<String> {
     Some(compiled(expression)?.captures(text)?.name(group)?.as_str().to_owned())
 }
 
+/// Whether an expression matches a part of a text.
 fn fits(expression: &str, text: &str) -> bool {
     compiled(expression).is_some_and(|regex| regex.is_match(text))
 }
@@ -305,8 +326,10 @@ mod tests {
 
     #[test]
     fn facts_are_known_by_their_usual_names() {
-        let names = ["Tail", "tail_number", "flight_duration_h", "attrs.tail_hours", "value"];
-        let found = facts_of(names.into_iter());
+        let names =
+            ["Tail", "tail_number", "flight_duration_h", "motor.position", "value"].map(|name| (name, name));
+        let found = facts_of(names.into_iter().chain([("tail_hours", "attrs.tail_hours")]));
+        assert_eq!(found.len(), 3, "a channel in a struct is no place of an actuator");
         assert_eq!(found[&IdentityField::TailNumber], "tail_number");
         assert_eq!(found[&IdentityField::FlightHours], "flight_duration_h");
         assert_eq!(found[&IdentityField::TailHoursEnd], "attrs.tail_hours");

@@ -78,8 +78,8 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     for leaf in leaves.iter_mut().filter(|leaf| file.holds_numbers(&leaf.name)) {
         leaf.kind = DataType::Float64;
     }
-    let metadata_keys = file.metadata_keys();
-    let mut metadata = facts_of(metadata_keys.iter().map(String::as_str));
+    let metadata_names = file.metadata_names();
+    let mut metadata = facts_of(metadata_names.iter().map(|(name, key)| (name.as_str(), key.as_str())));
     metadata.remove(&IdentityField::Position);
     let constant = |name: &str| table.constant(name, "fact").ok().flatten();
     let (columns, by_row) = identity_columns(&table, &metadata);
@@ -160,8 +160,8 @@ fn identity_columns(
 ) -> (BTreeMap<IdentityField, String>, bool) {
     let leaves = table.files[0].leaves();
     let is_constant = |name: &str| table.constant(name, "fact").is_ok_and(|text| text.is_some());
-    let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
-    let mut facts = facts_of(single.into_iter());
+    let single = leaves.iter().filter(|leaf| !leaf.is_listed).map(|leaf| leaf.name.as_str());
+    let mut facts = facts_of(single.map(|name| (name, name)));
     facts.retain(|fact, _| !metadata.contains_key(fact));
     let of_flight = |fact| matches!(fact, IdentityField::TailNumber | IdentityField::FlightId);
     let varies = |name: &str| !is_constant(name) && table.texts(name).is_ok_and(|texts| texts.len() > 1);

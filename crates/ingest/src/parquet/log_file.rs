@@ -228,22 +228,18 @@ impl LogFile {
             return Some(text.to_owned());
         }
         let (key, field) = key.rsplit_once('.')?;
-        let fields: BTreeMap<String, serde_json::Value> = serde_json::from_str(self.metadata(key)?).ok()?;
-        let value = fields.get(field).filter(|value| value.is_string() || value.is_number())?;
-        Some(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        json_fields(self.metadata(key)?).remove(field)
     }
 
-    /// The keys of that metadata, and those of the fields of values that are JSON.
-    pub(crate) fn metadata_keys(&self) -> Vec<String> {
+    /// Names in that metadata with the keys of their values: the keys themselves, and the fields of values that are JSON.
+    pub(crate) fn metadata_names(&self) -> Vec<(String, String)> {
         let pairs = self.footer.metadata().file_metadata().key_value_metadata();
-        let keys = |pair: &KeyValue| {
-            let value = pair.value.as_deref().filter(|value| value.starts_with('{'));
-            let fields = value.and_then(|json| serde_json::from_str(json).ok()).unwrap_or_default();
-            let fields: BTreeMap<String, serde_json::Value> = fields;
-            let fields = fields.into_keys().map(|field| format!("{}.{field}", pair.key));
-            once(pair.key.clone()).chain(fields).collect::<Vec<_>>()
+        let names = |KeyValue { key, value }: &KeyValue| {
+            let fields = json_fields(value.as_deref().unwrap_or_default()).into_keys();
+            let fields = fields.map(|field| (field.clone(), format!("{key}.{field}")));
+            once((key.clone(), key.clone())).chain(fields).collect::<Vec<_>>()
         };
-        pairs.into_iter().flatten().flat_map(keys).collect()
+        pairs.into_iter().flatten().flat_map(names).collect()
     }
 
     /// Passes the values of some leaves, batch by batch and aligned by sample, to `take`.
@@ -510,6 +506,17 @@ impl LogFile {
         self.flight_rows.iter().for_each(|(_, text)| digest.take_text(text));
         Ok(())
     }
+}
+
+/// The texts and numbers of a JSON object by name; none of any other text.
+fn json_fields(text: &str) -> BTreeMap<String, String> {
+    let fields: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
+    let text = |value: serde_json::Value| match value {
+        serde_json::Value::String(text) => Some(text),
+        serde_json::Value::Number(number) => Some(number.to_string()),
+        _ => None,
+    };
+    fields.into_iter().filter_map(|(name, value)| Some((name, text(value)?))).collect()
 }
 
 /// Bounds of the texts of a column in a row group.

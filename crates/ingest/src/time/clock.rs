@@ -197,8 +197,15 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let step_s = checked_step(seen_s, clock, &stamps.column)?;
     let breaks: Vec<usize> =
         (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
-    // After 041359.99 comes 041400.00.
-    let is_packed = |&i: &usize| ((step(i) - step_s) % 4000.0 - 40.0).abs() < step_s;
+    let first_s = match stamps.origin {
+        TimeOrigin::Counted(first_s) | TimeOrigin::OfDay(first_s) => first_s,
+        _ => f64::NAN,
+    };
+    // After 041359.99 comes 041400.00; a recorder may pause for 40 s, but not up to each full hundred.
+    let is_packed = |&i: &usize| {
+        ((step(i) - step_s) % 4000.0 - 40.0).abs() < step_s
+            && (first_s + at(i) + 0.5 * step_s).rem_euclid(100.0) < step_s
+    };
     if breaks.len() > 1 && breaks.iter().all(is_packed) {
         let found = "a clock that reads as HHMMSS: it leaps by 40 after each minute".to_owned();
         return Err(ErrorKind::TimeUnit { column: stamps.column.clone(), found });
@@ -463,6 +470,13 @@ mod tests {
         };
         let t: Vec<f64> = (0..4800).map(packed).collect();
         assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeUnit { .. })));
+    }
+
+    /// A recorder that rests for 40 s of each minute.
+    #[test]
+    fn pauses_of_forty_seconds_are_breaks() {
+        let t: Vec<f64> = (0..4000).map(|k| 60.0 * f64::from(k / 400) + 0.05 * f64::from(k % 400)).collect();
+        assert_eq!(line(&t, &usual()).unwrap().segments.len(), 10);
     }
 
     #[test]

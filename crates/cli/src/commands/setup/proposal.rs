@@ -574,6 +574,7 @@ fn needed_position(log: &Path, offer: &InferredMapping) -> Option<(String, Strin
     if needs_position(offer) { path_position(log) } else { None }
 }
 
+/// Comment of a proposal whose departures only the clock can give.
 const NO_DEPARTURE: &str = "# No departure was found: it is the first timestamp if the clock has a date.\n";
 
 fn identity(offer: &InferredMapping, log: &Path) -> String {
