@@ -1,4 +1,8 @@
 //! The gap statistic (equations 29–31).
+//!
+//! `multiversion` compiles its loops for each kind of vectors and chooses one when the program runs. Vectors change no result:
+//! each lane runs the same operations in the same order as scalar code, and no product is fused with a sum. So results are
+//! bitwise identical on every machine, and records do not hold the instruction set.
 
 #[cfg(feature = "std")]
 use multiversion::multiversion;
@@ -62,10 +66,6 @@ pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
     })
 }
 
-/// `multiversion` compiles the loops below for each kind of vectors and chooses one when the program runs. Vectors change no
-/// result: each lane runs the same operations in the same order as scalar code, and no product is fused with a sum. So
-/// results are bitwise identical on every machine, and records do not hold the instruction set.
-///
 /// Chains side by side: a sum waits for the addition before it, and eight wait at once. The order of additions is
 /// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
 const CHAINS: usize = 8;

@@ -95,9 +95,12 @@ impl TableFolders {
 
     fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> IsLog {
         if !self.tables.contains_key(root) {
-            let live = live_files(root, format);
-            self.tables.insert(root.to_owned(), live.as_ref().ok().cloned());
-            live.map_err(|diagnostic| (root.to_owned(), Box::new(diagnostic)))?;
+            let (live, fault) =
+                live_files(root, format).map_or_else(|e| (None, Some(e)), |live| (Some(live), None));
+            self.tables.insert(root.to_owned(), live);
+            if let Some(diagnostic) = fault {
+                return Err((root.to_owned(), Box::new(diagnostic)));
+            }
         }
         let live = self.tables.get(root).and_then(Option::as_ref);
         match live.and_then(|live| live.get(file)) {
