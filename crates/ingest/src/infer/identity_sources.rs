@@ -122,18 +122,15 @@ const DAYS: [(&str, &str); 3] =
 const TIMES: [(&str, &str); 4] =
     [(r"\d\d-\d\d-\d\d", "%H-%M-%S"), (r"\d{6}", "%H%M%S"), (r"\d\d-\d\d", "%H-%M"), (r"\d{4}", "%H%M")];
 
-/// What a tail number looks like: with a hyphen, with a digit after its first letters, or five letters.
-const TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z0-9]{2,6}|[A-Z]{1,2}\d[A-Z0-9]{0,5}|[A-Z]{5}|\d[A-Z]-[A-Z]{3}|\d\d-(?:[03-9]\d{3}|\d{5}))";
-/// The same where a flight number such as `TK1923` must not be one.
-const SURE_TAIL: &str = r"(?:[A-Z]{1,2}-[A-Z]{3,4}|N\d{1,4}[A-Z]{1,2}|\d[A-Z]-[A-Z]{3})";
-/// What ends a tail number before a departure, and what it looks like then: before a hyphen, a number of a recorder
-/// (`AB-2026`) must not be one.
-const TAILS_IN_NAMES: [(char, &str); 3] =
-    [('_', TAIL), (' ', TAIL), ('-', r"(?:[A-Z]{1,2}(?:-[A-Z]{3,4}|\d[A-Z0-9]{1,5})|\d[A-Z]-[A-Z]{3})")];
+/// Forms of tail numbers, the surest first: one that a flight number such as `TK1923` does not have, letters with digits,
+/// five letters.
+const TAILS: [&str; 3] = [
+    r"(?:[A-Z]{1,2}-[A-Z]{3,4}|N\d{1,4}[A-Z]{1,2}|\d[A-Z]-[A-Z]{3})",
+    r"(?:[A-Z]{1,2}-[A-Z0-9]{2,6}|[A-Z]{1,2}\d[A-Z0-9]{0,5}|\d\d-(?:[03-9]\d{3}|\d{5}))",
+    "[A-Z]{5}",
+];
 /// What a type of aircraft looks like, which is no tail number.
 const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
-/// What may stand before a tail number: a type of aircraft (`A320_N412FP`), nothing, or the name of a recorder (`QAR-N412FP`).
-const BEFORE_TAIL: [&str; 3] = [AIRCRAFT_TYPE, "", "[A-Za-z]{3,}[_ -]"];
 /// Folders between that of the tail and the log, at most.
 const MOST_FOLDERS: usize = 4;
 
@@ -148,43 +145,44 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
     let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
     let PathDeparture { expression: departure, format, folders: taken } = path_departure(path, name, end);
-    // The folder of the tail: one that is surely none else, or the outermost, as folders of flights look alike.
     let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
-    let tails = || (taken + 1..=taken + MOST_FOLDERS).filter(|up| is(*up, TAIL) && !is(*up, AIRCRAFT_TYPE));
-    let tail_folder = tails().find(|up| is(*up, SURE_TAIL)).or_else(|| tails().next_back());
-    let in_name = || {
-        let (form, _) = known_departure(name)?;
-        let tails =
-            BEFORE_TAIL.iter().flat_map(|before| TAILS_IN_NAMES.map(|(end, tail)| (before, tail, end)));
-        let before = tails.map(|(before, tail, end)| format!("{before}(?<tail_number>{tail}){end}"));
-        let sure = format!("(?:[^/]*[_ -])?(?<tail_number>{SURE_TAIL})[_ -]");
-        if let Some(tail) =
-            std::iter::once(sure).chain(before).find(|tail| fits(&format!("^{tail}[^/]*?{form}"), name))
-        {
-            return Some(format!("{tail}{departure}"));
-        }
-        let after = format!(
-            r"(?<departure_utc>{form})[^/]*?[_ -](?<tail_number>{SURE_TAIL})(?:[_ -][^/]*)?\.parquet"
-        );
-        fits(&format!("{after}$"), name).then_some(after)
+    let in_folder = |up: usize| {
+        let below = match up - taken - 1 {
+            1 if with_position && !is_place && taken == 0 => format!("(?<position>{PLACE})/"),
+            folders => "[^/]+/".repeat(folders),
+        };
+        format!("(?<tail_number>[^/=]+)/{below}{departure}")
     };
+    let tail = TAILS.iter().enumerate().find_map(|(rank, form)| {
+        let mut folders =
+            (taken + 1..=taken + MOST_FOLDERS).filter(|up| is(*up, form) && !is(*up, AIRCRAFT_TYPE));
+        // Folders of flights look like those of tails that are not sure, and lie in them.
+        let folder = if rank == 0 { folders.next() } else { folders.next_back() };
+        folder.map(in_folder).or_else(|| tail_in_name(name, form, rank == 0, &departure))
+    });
     // A name with a digit that is no date may be a tail too; `logs` is none.
     let may_be_tail =
         |text: &str| text.contains(|c: char| c.is_ascii_digit()) && !fits(r"(?:19|20)\d\d|^\d\d?$", text);
-    let tail = r"(?<tail_number>[^/=]+)/";
-    let below = |up: usize| "[^/]+/".repeat(up - taken - 1);
-    let expression = match (tail_folder, in_name()) {
-        (Some(up), _) if up == taken + 1 => format!("{tail}{departure}"),
-        (_, Some(whole)) => whole,
-        (Some(2), _) if with_position && !is_place && taken == 0 => {
-            format!("{tail}(?<position>{PLACE})/{departure}")
-        }
-        (Some(up), _) => format!("{tail}{}{departure}", below(up)),
-        (None, None) if format.is_none() => return None,
-        (None, None) if folder(taken + 1).is_some_and(may_be_tail) => format!("{tail}{departure}"),
-        (None, None) => departure,
+    let expression = match tail {
+        Some(expression) => expression,
+        None if format.is_none() => return None,
+        None if folder(taken + 1).is_some_and(may_be_tail) => in_folder(taken + 1),
+        None => departure,
     };
     Some((format!("{expression}$"), format))
+}
+
+/// An expression for names that hold a tail of this form and a departure, if this one does: the tail begins the name or
+/// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may stand anywhere.
+fn tail_in_name(name: &str, tail: &str, is_sure: bool, departure: &str) -> Option<String> {
+    let (form, _) = known_departure(name)?;
+    let others = if is_sure { "[^/]*[_ -]" } else { &format!("{AIRCRAFT_TYPE}|[A-Za-z]{{3,}}[_ -]") };
+    let before = format!("(?:{others})?(?<tail_number>{tail})[_ -]");
+    if fits(&format!("^{before}[^/]*?{form}"), name) {
+        return Some(format!("{before}{departure}"));
+    }
+    let after = format!(r"(?<departure_utc>{form})[^/]*?[_ -](?<tail_number>{tail})(?:[_ -][^/]*)?\.parquet");
+    (is_sure && fits(&format!("{after}$"), name)).then_some(after)
 }
 
 /// The end of a path from its departure on, if it seems to hold one.
@@ -239,7 +237,7 @@ fn place_end() -> String {
 /// The position in a path and the expression that finds it: the end of the file name, or the folder below that of the
 /// tail, if they have no digits.
 pub fn path_position(path: &Path) -> Option<(String, String)> {
-    let below_tail = format!(r"(?:^|/){TAIL}/(?<position>{PLACE})/[^/]*\.parquet$");
+    let below_tail = format!(r"(?:^|/)(?:{})/(?<position>{PLACE})/[^/]*\.parquet$", TAILS.join("|"));
     [format!("(?:^|/){}$", place_end()), below_tail]
         .into_iter()
         .find_map(|expression| Some((captured(&expression, path.to_str()?, "position")?, expression)))
@@ -295,6 +293,8 @@ mod tests {
             ("logs/20261119T041300Z_17.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/N412FP/2026/11/19/041300.parquet", "N412FP 2026/11/19 041300", "%Y/%m/%dT%H%M%S"),
             ("d/N412FP/F0017/x1.parquet", "N412FP", ""),
+            ("d/FLEET/N412FP_20261119-041300.parquet", "N412FP 20261119-041300", "%Y%m%d-%H%M%S"),
+            ("d/FLEET/JA8089-20261119T041300.parquet", "JA8089 20261119T041300", "%Y%m%dT%H%M%S"),
             ("d/A320/JA8089/TK1923/20261119T041300Z.parquet", "JA8089 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/tail=N412FP/20261119_041300/x1.parquet", "N412FP 20261119_041300", "%Y%m%d_%H%M%S"),
             (

@@ -435,8 +435,11 @@ impl Proposal {
             format!("{{ column = {}, unit = {unit:?}{wraps} }}", quoted(column))
         };
         if let Some(others) = offer.alternatives.get(&role) {
+            let is_guess = others.iter().any(|(_, unit)| unit.is_none());
+            let sure =
+                if is_guess { "   # low: a column that names no unit may have another one" } else { "" };
             let others: Vec<String> = others.iter().map(other).collect();
-            let _ = writeln!(text, "alternatives = [{}]", others.join(", "));
+            let _ = writeln!(text, "alternatives = [{}]{sure}", others.join(", "));
         }
         text
     }
