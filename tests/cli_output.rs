@@ -3,9 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::Read;
 
-use ingest::parquet::writer::Column;
-
-use crate::harness::{Table, TestFleet, rewrite};
+use crate::harness::{Table, TestFleet, rewrite, write_log};
 
 /// Each line of stderr is an object with a time, a level and an event; the answer stays what it is.
 #[test]
@@ -91,12 +89,11 @@ fn a_proposal_covers_every_tail_and_variant_of_the_columns() {
         _ => name.replace("time_s", "GMT_SEC"),
     };
     for (log, tail) in fleet.logs().iter().step_by(11).zip(["TC-JRA", "TC-JRB", "TC-JRC"]) {
-        let table = Table::read(log);
-        let column = |name: String| (named(&name, tail), Column::Real(table.numbers(&name)));
-        let columns: Vec<_> = table.names().into_iter().map(column).collect();
+        let mut columns = Table::read(log).columns();
+        columns.iter_mut().for_each(|(name, _)| *name = named(name, tail));
         for hour in ["0413", "1307"] {
             let file = fleet.path(&format!("qar/ac={tail}/FLT_2026-09-10_{hour}.parquet"));
-            ingest::parquet::writer::write_parquet(&file, &columns, &[]).unwrap();
+            write_log(&file, columns.clone(), &[]);
         }
     }
     std::fs::write(fleet.path("qar/ac=TC-JRA/FLT_2026-09-09_0413.parquet"), "PAR1").unwrap();

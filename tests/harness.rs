@@ -128,14 +128,7 @@ impl TestFleet {
     /// Every stored record as CSV, without what differs between two runs of the same logs.
     pub(crate) fn exported(&self) -> String {
         let all = self.run_ok(&["store", "export", "--format", "csv"]);
-        let header: Vec<&str> = all.lines().next().unwrap().split(',').collect();
-        let of_a_run = ["run_id", "processed_utc", "log_path"];
-        let kept: Vec<usize> = (0..header.len()).filter(|&i| !of_a_run.contains(&header[i])).collect();
-        let line = |line: &str| {
-            let cells: Vec<&str> = line.split(',').collect();
-            kept.iter().map(|&i| cells[i]).collect::<Vec<_>>().join(",")
-        };
-        all.lines().map(line).collect::<Vec<_>>().join("\n")
+        without(&all, &["run_id", "processed_utc", "log_path"])
     }
 
     /// Replaces text in the configuration.
@@ -153,6 +146,16 @@ impl TestFleet {
         logs.sort();
         logs
     }
+}
+
+/// Rows of comma-separated values without some of their columns.
+pub(crate) fn without(rows: &str, columns: &[&str]) -> String {
+    let header: Vec<&str> = rows.lines().next().unwrap_or_default().split(',').collect();
+    let kept = |line: &str| {
+        let cells = header.iter().zip(line.split(',')).filter(|(name, _)| !columns.contains(name));
+        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+    };
+    rows.lines().map(kept).collect::<Vec<_>>().join("\n")
 }
 
 pub(crate) fn copy(from: &Path, to: &Path) {
@@ -200,6 +203,11 @@ impl Table {
         real.as_primitive::<Float64Type>().iter().map(|value| value.unwrap_or(f64::NAN)).collect()
     }
 
+    /// All columns of numbers, by name.
+    pub(crate) fn columns(&self) -> Vec<(String, Vec<f64>)> {
+        self.names().into_iter().map(|name| (name.clone(), self.numbers(&name))).collect()
+    }
+
     /// One number for each flight and position.
     pub(crate) fn by_flight(&self, column: &str) -> BTreeMap<(String, String, String), f64> {
         let keys =
@@ -233,16 +241,18 @@ pub(crate) fn rewrite(
     columns: impl Fn(&str) -> bool,
     rows: impl Fn(usize) -> bool,
 ) {
-    use ingest::parquet::writer::{Column, write_parquet};
-    let Table(batch) = Table::read(from);
-    let mut kept: Vec<(String, Column)> = Vec::new();
-    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
-        if columns(field.name()) {
-            let real = cast(array, &DataType::Float64).unwrap();
-            let values = real.as_primitive::<Float64Type>().values();
-            let values = values.iter().enumerate().filter(|(row, _)| rows(*row)).map(|(_, v)| *v).collect();
-            kept.push((field.name().clone(), Column::Real(values)));
-        }
+    let mut kept = Table::read(from).columns();
+    kept.retain(|(name, _)| columns(name));
+    for (_, values) in &mut kept {
+        let mut row = 0..;
+        values.retain(|_| row.next().is_some_and(&rows));
     }
-    write_parquet(to, &kept, facts).unwrap();
+    write_log(to, kept, facts);
+}
+
+/// Writes a log of columns of doubles.
+pub(crate) fn write_log(to: &Path, columns: Vec<(String, Vec<f64>)>, facts: &[(String, String)]) {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let columns: Vec<_> = columns.into_iter().map(|(name, values)| (name, Column::Real(values))).collect();
+    write_parquet(to, &columns, facts).unwrap();
 }

@@ -5,7 +5,7 @@ mod operations;
 
 use std::process::Stdio;
 
-use crate::harness::{CommandResult, TestFleet};
+use crate::harness::{CommandResult, TestFleet, facts, write_log};
 
 /// The command under a limit of its address space, KiB. The GNU allocator otherwise reserves 64 MiB of it per thread.
 fn limited(fleet: &TestFleet, args: &str, kib: u64) -> CommandResult {
@@ -115,7 +115,7 @@ fn a_stored_flight_is_not_displaced_by_a_later_claim() {
     fleet.run_ok(&["run", "-q"]);
     let before = fleet.exported();
     let rival = logs[3].with_file_name("0_rival.parquet");
-    let claimed = crate::harness::facts(&logs[3]);
+    let claimed = facts(&logs[3]);
     crate::harness::rewrite(&logs[4], &rival, &claimed, |_| true, |_| true);
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
@@ -176,12 +176,10 @@ fn pipes_and_loops_are_named_and_the_logs_are_stored() {
 /// Thirty thousand columns of ten thousand positions, none of which is installed.
 #[test]
 fn a_log_of_ten_thousand_positions_costs_seconds() {
-    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
-    let column = |name: String| (name, Column::Real(vec![0.0, 1.0]));
-    let columns: Vec<_> = (0..10_000).map(|k| column(format!("p{k}_motor_deg"))).collect();
-    write_parquet(log, &columns, &crate::harness::facts(log)).unwrap();
+    let columns = (0..10_000).map(|k| (format!("p{k}_motor_deg"), vec![0.0, 1.0])).collect();
+    write_log(log, columns, &facts(log));
     let begun = std::time::Instant::now();
     assert_eq!(fleet.freeplay(&["check", &log.display().to_string()]).code, Some(1));
     assert!(begun.elapsed() < std::time::Duration::from_secs(20), "{:?}", begun.elapsed());

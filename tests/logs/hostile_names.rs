@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use ingest::parquet::writer::{Column, write_parquet};
-
-use crate::harness::{CommandResult, Table, TestFleet, facts};
+use crate::harness::{CommandResult, Table, TestFleet, facts, write_log};
 
 /// Clears a terminal, colours it, begins a line that looks like a message, and reverses the text that follows.
 const HOSTILE: &str = "\u{1b}[2J\u{1b}[31m\u{7}\nerror[forged]: x\u{202e}";
@@ -31,12 +29,9 @@ fn renamed(column: &str) -> String {
 /// A copy of a log whose file, columns, positions, tail, flight and metadata have hostile names.
 fn rename_log(log: &Path, to: &Path, tail: &str) {
     let table = Table::read(log);
-    let columns: Vec<(String, Column)> = table
-        .names()
-        .into_iter()
-        .map(|name| (renamed(&name), Column::Real(table.numbers(&name))))
-        .chain([(format!("unmapped{HOSTILE}"), Column::Real(vec![0.0; table.rows()]))])
-        .collect();
+    let mut columns = table.columns();
+    columns.iter_mut().for_each(|(name, _)| *name = renamed(name));
+    columns.push((format!("unmapped{HOSTILE}"), vec![0.0; table.rows()]));
     let mut known = facts(log);
     for (key, value) in &mut known {
         match key.as_str() {
@@ -46,7 +41,7 @@ fn rename_log(log: &Path, to: &Path, tail: &str) {
         }
     }
     known.push((format!("extra{HOSTILE}"), HOSTILE.to_owned()));
-    write_parquet(to, &columns, &known).unwrap();
+    write_log(to, columns, &known);
 }
 
 /// The first tail under hostile names: nine logs, one without loads, one with a departure that is none, one that is text.
@@ -63,10 +58,9 @@ fn fleet() -> TestFleet {
     let mut known = facts(log);
     known.iter_mut().filter(|(key, _)| key == "departure_utc").for_each(|(_, v)| HOSTILE.clone_into(v));
     let time = Table::read(log).numbers("time_s");
-    let other = ["time_s".to_owned(), format!("other{HOSTILE}")];
-    let columns = other.map(|name| (name, Column::Real(time.clone())));
-    write_parquet(&folder.join(format!("dated{HOSTILE}.parquet")), &columns, &known).unwrap();
-    write_parquet(&folder.join(format!("lacks{HOSTILE}.parquet")), &columns, &facts(log)).unwrap();
+    let columns = vec![("time_s".to_owned(), time.clone()), (format!("other{HOSTILE}"), time)];
+    write_log(&folder.join(format!("dated{HOSTILE}.parquet")), columns.clone(), &known);
+    write_log(&folder.join(format!("lacks{HOSTILE}.parquet")), columns, &facts(log));
     fleet.configure("sample-data/logs/**/*.parquet", "hostile/*.parquet");
     let table = std::fs::read_to_string(fleet.path("sample-data/installations.csv")).unwrap();
     let mut rows = table.lines();

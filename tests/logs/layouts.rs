@@ -2,21 +2,15 @@
 //! files, read by overrides.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-use crate::harness::{Table, TestFleet, facts, rewrite};
+use crate::harness::{Facts, Table, TestFleet, facts, rewrite, without, write_log};
 
 /// Every number of every record, without what names the log and the settings it was read by.
 fn numbers(fleet: &TestFleet) -> Vec<String> {
-    let all = fleet.exported();
-    let header: Vec<&str> = all.lines().next().unwrap().split(',').collect();
-    let of_a_log = ["log_digest", "config_digest"];
-    let kept: Vec<usize> = (0..header.len()).filter(|&i| !of_a_log.contains(&header[i])).collect();
-    let line = |line: &str| {
-        let cells: Vec<&str> = line.split(',').collect();
-        kept.iter().map(|&i| cells[i]).collect::<Vec<_>>().join(",")
-    };
-    let mut lines: Vec<String> = all.lines().map(line).collect();
+    let rows = without(&fleet.exported(), &["log_digest", "config_digest"]);
+    let mut lines: Vec<String> = rows.lines().map(str::to_owned).collect();
     lines.sort();
     lines
 }
@@ -28,10 +22,14 @@ fn one_tail() -> TestFleet {
     fleet
 }
 
+/// The numbers of that tail's logs as they are.
 fn plain() -> Vec<String> {
-    let fleet = one_tail();
-    fleet.run_ok(&["run"]);
-    numbers(&fleet)
+    static PLAIN: LazyLock<Vec<String>> = LazyLock::new(|| {
+        let fleet = one_tail();
+        fleet.run_ok(&["run"]);
+        numbers(&fleet)
+    });
+    PLAIN.clone()
 }
 
 fn logs(fleet: &TestFleet) -> Vec<PathBuf> {
@@ -134,64 +132,64 @@ fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
     );
 }
 
-/// Positions in one file, loads in another: the same numbers, also under a flight number that flies every day. Loads at half
-/// the rate: nearly so.
-#[test]
-fn loads_in_files_of_their_own_find_their_flights() {
-    for (every, number) in [(1, None), (1, Some("FP100")), (2, None)] {
-        let fleet = one_tail();
-        for log in logs(&fleet) {
-            let name = log.file_name().unwrap();
-            let loads = fleet.path("loads").join(name);
-            let is_load = |column: &str| column.ends_with("_load_n");
-            let mut identity = facts(&log);
-            identity.extend(number.map(|number| ("flight_id".to_owned(), number.to_owned())));
-            rewrite(&log, &loads, &identity, |c| is_load(c) || c == "time_s", |row| row % every == 0);
-            let positions = fleet.path("positions").join(name);
-            rewrite(&log, &positions, &identity, |c| !is_load(c), |_| true);
-        }
-        fleet.configure("sample-data/logs/N412FP/*.parquet", "positions/*.parquet");
-        fleet.configure(
-            "[channel.load]",
-            "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
-        );
-        fleet.run_ok(&["run"]);
-        if every == 1 {
-            // The fifth column is the flight id.
-            let unnamed = |line: String| {
-                let cells: Vec<&str> = line.split(',').collect();
-                [&cells[..4], &cells[5..]].concat().join(",")
-            };
-            let [found, expected] = [numbers(&fleet), plain()];
-            let [found, expected]: [Vec<String>; 2] =
-                [found, expected].map(|lines| lines.into_iter().map(unnamed).collect());
-            assert_eq!(found, expected);
-            continue;
-        }
-        fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "half.parquet"]);
-        let truth = Table::read(&fleet.path("sample-data/truth.parquet")).by_flight("gap_m");
-        let found = Table::read(&fleet.path("half.parquet")).by_flight("gap_m").into_iter();
-        let mut errors: Vec<f64> = found.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).collect();
-        errors.sort_by(f64::total_cmp);
-        let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
-        assert!(median < 0.008 && worst < 0.03, "a load at 50 Hz costs {median}, at most {worst}");
-    }
-}
-
-#[test]
-fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
+/// Positions in one file, loads in another: of these, one row of each `every`.
+fn loads_apart(every: usize, identity: impl Fn(&Path) -> Facts) -> TestFleet {
     let fleet = one_tail();
     for log in logs(&fleet) {
-        let name = log.file_name().unwrap();
-        let load = |c: &str| c.ends_with("_load_n");
-        rewrite(&log, &fleet.path("loads").join(name), &facts(&log), |c| load(c) || c == "time_s", |_| true);
-        rewrite(&log, &fleet.path("positions").join(name), &facts(&log), |c| !load(c), |_| true);
+        let [loads, positions] =
+            ["loads", "positions"].map(|to| fleet.path(to).join(log.file_name().unwrap()));
+        let is_load = |column: &str| column.ends_with("_load_n");
+        let own = identity(&log);
+        rewrite(&log, &loads, &own, |c| is_load(c) || c == "time_s", |row| row % every == 0);
+        rewrite(&log, &positions, &own, |c| !is_load(c), |_| true);
     }
     fleet.configure("sample-data/logs/N412FP/*.parquet", "positions/*.parquet");
     fleet.configure(
         "[channel.load]",
         "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
     );
+    fleet
+}
+
+/// The same numbers, also under a flight number that flies every day.
+#[test]
+fn loads_in_files_of_their_own_find_their_flights() {
+    let fleet = loads_apart(1, facts);
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet), plain());
+    let is_number = |fact: &&mut (String, String)| fact.0 == "flight_id";
+    let fleet = loads_apart(1, |log| {
+        let mut own = facts(log);
+        own.iter_mut().filter(is_number).for_each(|fact| fact.1 = "FP100".to_owned());
+        own
+    });
+    fleet.run_ok(&["run"]);
+    // The fifth column is the flight id.
+    let unnamed = |line: String| {
+        let cells: Vec<&str> = line.split(',').collect();
+        [&cells[..4], &cells[5..]].concat().join(",")
+    };
+    let [found, wanted] = [numbers(&fleet), plain()].map(|lines| lines.into_iter().map(unnamed));
+    assert!(found.eq(wanted));
+}
+
+/// Loads at half the rate: nearly the same numbers.
+#[test]
+fn loads_of_half_the_rate_give_nearly_the_same_gaps() {
+    let fleet = loads_apart(2, facts);
+    fleet.run_ok(&["run"]);
+    fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "half.parquet"]);
+    let truth = Table::read(&fleet.path("sample-data/truth.parquet")).by_flight("gap_m");
+    let found = Table::read(&fleet.path("half.parquet")).by_flight("gap_m").into_iter();
+    let mut errors: Vec<f64> = found.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
+    assert!(median < 0.008 && worst < 0.03, "a load at 50 Hz costs {median}, at most {worst}");
+}
+
+#[test]
+fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
+    let fleet = loads_apart(1, facts);
     let all = |folder: &str| {
         let found = glob::glob(fleet.path(&format!("{folder}/*.parquet")).to_str().unwrap()).unwrap();
         found.flatten().collect::<Vec<_>>()
@@ -280,18 +278,15 @@ fn a_flights_table_tells_what_the_logs_do_not() {
 /// A log of which a column selects a part gives the number of a log that is only this part.
 #[test]
 fn a_condition_selects_what_a_shorter_log_would_hold() {
-    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = TestFleet::of("flights");
     let whole = fleet.path("A_nominal.parquet");
     rewrite(&whole, &fleet.path("doubles.parquet"), &Vec::new(), |_| true, |_| true);
     let from = Table::read(&fleet.path("doubles.parquet"));
     let airborne = |row: usize| (6_000..30_000).contains(&row);
-    let mut columns: Vec<(String, Column)> = ["time_s", "motor_position_m", "screw_position_m", "load_n"]
-        .map(|name| (name.to_owned(), Column::Real(from.numbers(name))))
-        .into();
+    let mut columns = from.columns();
     let ground = (0..from.rows()).map(|row| f64::from(u8::from(!airborne(row)))).collect();
-    columns.push(("weight_on_wheels".to_owned(), Column::Real(ground)));
-    write_parquet(&fleet.path("whole.parquet"), &columns, &[]).unwrap();
+    columns.push(("weight_on_wheels".to_owned(), ground));
+    write_log(&fleet.path("whole.parquet"), columns, &[]);
     rewrite(&whole, &fleet.path("part.parquet"), &Vec::new(), |_| true, airborne);
     let estimate = |log: &str| {
         let out = fleet.run_ok(&["estimate", log, "--part", "A", "--json"]);
@@ -314,7 +309,7 @@ fn a_condition_selects_what_a_shorter_log_would_hold() {
 }
 
 /// The log of a Delta table, by the format's own specification: a version adds files, a later one removes one.
-pub(crate) fn delta_log(table: &std::path::Path, added: &[&str], removed: &[&str]) {
+pub(crate) fn delta_log(table: &Path, added: &[&str], removed: &[&str]) {
     let log = table.join("_delta_log");
     std::fs::create_dir_all(&log).unwrap();
     let schema = r#"{\"type\":\"struct\",\"fields\":[{\"name\":\"time_s\",\"type\":\"double\",\"nullable\":true,\"metadata\":{}}]}"#;
@@ -459,9 +454,9 @@ fn missing_rows_of_a_long_log_raise_no_flag() {
         for log in logs(&fleet) {
             let table = Table::read(&log);
             let time = table.numbers("time_s");
-            let channels = table.names().into_iter().filter_map(|name| {
+            let channels = table.columns().into_iter().filter_map(|(name, values)| {
                 let channel = CHANNELS.iter().position(|channel| name.ends_with(channel))?;
-                Some((channel, table.numbers(&name), name))
+                Some((channel, values, name))
             });
             let mut rows: Vec<(f64, String, f64)> = channels
                 .flat_map(|(channel, values, name)| {
@@ -489,19 +484,13 @@ fn missing_rows_of_a_long_log_raise_no_flag() {
 /// A screw position in every second row, and nothing between: `check` names the setting, and it gives the gaps.
 #[test]
 fn check_names_the_rate_of_a_slower_screw() {
-    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = one_tail();
     for log in logs(&fleet) {
-        let table = Table::read(&log);
-        let column = |name: String| {
-            let mut values = table.numbers(&name);
-            if name.ends_with("screw_mm") {
-                values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
-            }
-            (name, Column::Real(values))
-        };
-        let columns: Vec<_> = table.names().into_iter().map(column).collect();
-        write_parquet(&log, &columns, &facts(&log)).unwrap();
+        let mut columns = Table::read(&log).columns();
+        for (_, values) in columns.iter_mut().filter(|(name, _)| name.ends_with("screw_mm")) {
+            values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
+        }
+        write_log(&log, columns, &facts(&log));
     }
     let text = fleet.freeplay(&["check", "--limit", "1"]).out;
     assert!(text.contains("rate_hz = 50"), "{text}");
@@ -513,23 +502,14 @@ fn check_names_the_rate_of_a_slower_screw() {
 /// A motor position of one value throughout: `check` names the column that is read in its place.
 #[test]
 fn check_names_the_redundant_column_that_is_read() {
-    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = one_tail();
     let log = &logs(&fleet)[0];
-    let table = Table::read(log);
-    let is_copied = |name: &String| name == "aileron_left_motor_deg";
-    let copy = table
-        .names()
-        .into_iter()
-        .filter(is_copied)
-        .map(|name| ("aileron_left_motor_b".to_owned(), table.numbers(&name)));
-    let columns = table.names().into_iter().map(|name| {
-        let values = table.numbers(&name);
-        let values = if is_copied(&name) { vec![1.0; values.len()] } else { values };
-        (name, values)
-    });
-    let columns: Vec<_> = columns.chain(copy).map(|(name, values)| (name, Column::Real(values))).collect();
-    write_parquet(log, &columns, &facts(log)).unwrap();
+    let mut columns = Table::read(log).columns();
+    let motor = columns.iter_mut().find(|(name, _)| name == "aileron_left_motor_deg").unwrap();
+    let constant = vec![1.0; motor.1.len()];
+    let moving = std::mem::replace(&mut motor.1, constant);
+    columns.push(("aileron_left_motor_b".to_owned(), moving));
+    write_log(log, columns, &facts(log));
     let other = "unit = \"deg\"\nalternatives = [{ column = \"{position}_motor_b\", unit = \"deg\" }]";
     fleet.configure("unit = \"deg\"", other);
     let text = fleet.run_ok(&["check", log.to_str().unwrap()]);
@@ -539,22 +519,14 @@ fn check_names_the_redundant_column_that_is_read() {
 /// A clock that starts again: the error names both settings, and neither drops samples in silence.
 #[test]
 fn a_clock_that_restarts_names_its_settings() {
-    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = one_tail();
     let log = &logs(&fleet)[0];
-    let table = Table::read(log);
-    let column = |name: String| {
-        let mut values = table.numbers(&name);
-        if name == "time_s" {
-            let half = values.len() / 2;
-            let first = values[0];
-            let restart = values[half] - first;
-            values[half..].iter_mut().for_each(|time| *time -= restart);
-        }
-        (name, Column::Real(values))
-    };
-    let columns: Vec<_> = table.names().into_iter().map(column).collect();
-    write_parquet(log, &columns, &facts(log)).unwrap();
+    let mut columns = Table::read(log).columns();
+    let (_, times) = columns.iter_mut().find(|(name, _)| name == "time_s").unwrap();
+    let half = times.len() / 2;
+    let restart = times[half] - times[0];
+    times[half..].iter_mut().for_each(|time| *time -= restart);
+    write_log(log, columns, &facts(log));
     for command in ["check", "run"] {
         let result = fleet.freeplay(&[command]);
         assert_eq!(result.code, Some(1), "{result:?}");

@@ -4,7 +4,7 @@
 //! of the small fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
 //! run on another tail that was killed between the commits of its records and of their accounts.
 
-use crate::harness::{TestFleet, copy, top};
+use crate::harness::{TestFleet, copy, top, without};
 
 fn old() -> TestFleet {
     let fleet = TestFleet::sample();
@@ -40,16 +40,6 @@ fn a_run_on_an_older_store_ends_where_a_new_one_does() {
     fleet.run_ok(&["store", "compact"]);
     assert_eq!(numbers(&fleet), numbers(&plain));
     assert!(fleet.run_ok(&["run"]).contains("0 new or changed, 30 already processed"));
-}
-
-/// Rows without columns that name the release.
-fn without(rows: &str, columns: &[&str]) -> String {
-    let header: Vec<&str> = rows.lines().next().unwrap_or_default().split(',').collect();
-    let kept = |cells: Vec<&str>| {
-        let cells = header.iter().zip(cells).filter(|(name, _)| !columns.contains(name));
-        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
-    };
-    rows.lines().map(|line| kept(line.split(',').collect())).collect::<Vec<_>>().join("\n")
 }
 
 /// Half of the files know columns that came later, half do not: they are one table to us and to others.

@@ -60,7 +60,7 @@ fn assess(flown: &[GapRecord], as_of: Timestamp) -> Vec<TrendRow> {
 }
 
 #[test]
-fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_a_statement() {
+fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_an_assessment() {
     let known = assess(&flown(200), day(199));
     assert_eq!(assess(&flown(330), day(199)), known);
     let mut late = flown(330);
@@ -143,7 +143,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
 }
 
 #[test]
-fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
+fn a_fleet_without_a_failure_is_compared_with_the_levels_that_it_has_reached() {
     let past = backtest::of_histories(&config(), &Installations::default(), histories(&flown(700))).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
@@ -235,7 +235,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
 
 /// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
 #[test]
-fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
+fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
     let mut rows = flown(228);
     for row in rows.iter_mut().filter(|row| unit(row) == 5 && row.flight.departure_utc >= day(200)) {
         row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap - 12e-6);
@@ -286,7 +286,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
 
 /// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.
 #[test]
-fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
+fn flights_after_a_day_do_not_change_whether_its_step_is_tail_wide() {
     let mut rows = flown(228);
     for row in rows.iter_mut().filter(|row| unit(row) < 6) {
         let at = row.flight.departure_utc;
@@ -305,7 +305,7 @@ fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
 
 /// Four units of one tail rise by 8 µm with one flight, and so does one unit of another tail.
 #[test]
-fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
+fn a_step_of_all_units_of_a_tail_is_reported_as_one_of_its_sensors() {
     let mut rows = flown(228);
     for row in &mut rows {
         if unit(row) < 4 {

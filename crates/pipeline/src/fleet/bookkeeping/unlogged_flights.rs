@@ -33,9 +33,8 @@ impl<'a> UnloggedFlights<'a> {
         self.by_tail.contains_key(tail)
     }
 
-    /// Flights of a unit's installations for which it has no row, each with the index of its installation.
-    ///
-    /// Histories of which no row belongs to an installation are taken as they are.
+    /// Flights of a unit's installations for which it has no row, each with the index of its installation. None where no
+    /// row of the unit lies in an installation: then the table of installations says nothing about this history.
     pub(crate) fn of_unit(
         &self,
         history: &History,
