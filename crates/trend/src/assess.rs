@@ -6,7 +6,7 @@ use crate::math::distributions::{self, NORMAL_95};
 use crate::measured::exceedance::Exceedance;
 use crate::measured::level::Level;
 use crate::measured::rise::Rise;
-use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
+use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
@@ -38,16 +38,13 @@ pub fn assess(
     settings: &Settings,
     prior: Option<&FleetPrior>,
 ) -> Result<Assessment, Error> {
-    settings.check()?;
-    let uninformative = FleetPrior::uninformative(settings.limit_m);
-    let prior = prior.unwrap_or(&uninformative);
-    let flights = series.flights_until(as_of_us);
-    let unit = UnitFit::new(series, as_of_us, settings, prior);
+    let unit = UnitFit::new(series, as_of_us, settings, prior)?;
+    let flights = unit.data.flights;
     let utilization = utilization(flights);
     let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
     });
-    let mut found = with_forecast(&unit, flights, settings, elapsed_hours);
+    let mut found = with_forecast(&unit, settings, elapsed_hours);
     let earliest = found.crossing.and_then(|crossing| crossing.p05_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
     let growth_probability = rises.or(found.growth_probability).unwrap_or_default();
@@ -67,13 +64,13 @@ pub fn assess(
             .map(|(start, last)| start + last.hours),
         level: unit.measured.level,
         latest: unit.measured.latest,
-        installation_sd_m: prior.bias_sd_m,
+        installation_sd_m: unit.prior.bias_sd_m,
         law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, found.wear == WearStatus::Wearing)),
         elapsed_hours,
-        over_limit_probability: over_limit(unit.measured.level, prior.bias_sd_m, settings.limit_m)
+        over_limit_probability: over_limit(unit.measured.level, unit.prior.bias_sd_m, settings.limit_m)
             .map(|measured| measured.max(by_forecast)),
         utilization,
-        outliers_us: unit.outliers_us(flights),
+        outliers_us: unit.outliers_us(),
         noise_factor: unit.history.noise_factor,
         stale_days: last_us
             .map(|last_us| as_of_us.saturating_sub(last_us) as f64 / DAY_US as f64)
@@ -84,15 +81,10 @@ pub fn assess(
 }
 
 /// The part of an assessment that a forecast gives: by wear laws, else by the line through the last records.
-fn with_forecast(
-    unit: &UnitFit<'_>,
-    flights: &[Flight],
-    settings: &Settings,
-    elapsed_hours: f64,
-) -> Assessment {
-    let mut found = match (&unit.fit, unit.rise_now(flights)) {
+fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
+    let mut found = match (&unit.fit, unit.rise_now()) {
         (Some(fit), rise) => {
-            let mut found = by_laws(fit, unit, flights, settings, elapsed_hours);
+            let mut found = by_laws(fit, unit, settings, elapsed_hours);
             if let (Some(crossing), Some(rise)) = (&mut found.crossing, rise) {
                 // No earliest time lies after that of the line through the last records.
                 let by_line = rise.p05_hours;
@@ -126,14 +118,8 @@ fn with_forecast(
 }
 
 /// The same by the mixture of wear laws.
-fn by_laws(
-    fit: &Fit<'_>,
-    unit: &UnitFit<'_>,
-    flights: &[Flight],
-    settings: &Settings,
-    elapsed_hours: f64,
-) -> Assessment {
-    let ratio = hours_per_usage(flights, &fit.prior);
+fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
+    let ratio = fit.prior.hours_per_usage(unit.data.flights);
     // A rise that was taken off for the law is still there.
     let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
     let settings = &Settings { limit_m, ..*settings };

@@ -1,13 +1,13 @@
 //! Plotted forecast of an assessment: smoothed past levels, and quantiles of the future gap.
 
 use crate::data::bins::{self, BINS, Bin, Segment};
-use crate::data::series::{Flight, Series};
+use crate::data::series::Series;
 use crate::error::Error;
 use crate::inference::posterior::{Posterior, mean_growth};
 use crate::inference::segment_fit::process_variance;
 use crate::math::distributions::NORMAL_95;
 use crate::measured::record::Record;
-use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
+use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::crossing::gap_quantiles;
 use crate::unit_fit::{Fit, UnitFit};
@@ -48,50 +48,40 @@ pub fn forecast(
     prior: Option<&FleetPrior>,
     hours: impl IntoIterator<Item = f64>,
 ) -> Result<Forecast, Error> {
-    settings.check()?;
-    let uninformative = FleetPrior::uninformative(settings.limit_m);
-    let prior = prior.unwrap_or(&uninformative);
-    let flights = series.flights_until(as_of_us);
-    let unit = UnitFit::new(series, as_of_us, settings, prior);
+    let unit = UnitFit::new(series, as_of_us, settings, prior)?;
+    let flights = unit.data.flights;
     let mut past = Vec::new();
-    let segments: Vec<Segment<'_>> = unit.history.segments().collect();
-    for (segment, fitted) in segments.iter().zip(&unit.ended) {
-        past.extend(fitted.iter().flat_map(|posterior| levels(segment, posterior, prior)));
+    for (segment, fitted) in unit.history.segments().zip(&unit.ended) {
+        past.extend(fitted.iter().flat_map(|posterior| levels(&segment, posterior, &unit.prior)));
     }
     let Some(Fit { posterior, prior, .. }) = &unit.fit else {
-        return Ok(Forecast { past, ahead: line_ahead(&unit, flights, hours) });
+        return Ok(Forecast { past, ahead: line_ahead(&unit, hours) });
     };
-    let on_axis = unit.history.on_axis(flights, prior);
+    let on_axis = unit.history.clone().on_axis(flights, prior);
     past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
-    let ratio = hours_per_usage(flights, prior);
+    let ratio = prior.hours_per_usage(flights);
     let variance_m2 = unit.history.offset_m2 + prior.bias_sd_m.powi(2);
-    let steepest = unit.rise_now(flights).zip(unit.measured.level);
+    let steepest = unit.rise_now().zip(unit.measured.level);
     let after = |hours: f64| {
-        let [p05_m, m, p95_m] = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
-        let risen_m = unit.history.undone_m.max(0.0);
-        let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
+        let quantiles_m = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
+        let [p05_m, m, p95_m] = quantiles_m.map(|gap_m| gap_m + unit.history.undone_m.max(0.0));
         // As much wider as a crossing's interval.
-        let widened = |bound_m: f64| band.m + prior.interval_width * (bound_m - band.m);
-        let wide = Interval { p05_m: widened(band.p05_m), m: band.m, p95_m: widened(band.p95_m) };
-        let mut band = if hours > 0.0 { wide } else { band };
+        let widened =
+            |bound_m: f64| if hours > 0.0 { m + prior.interval_width * (bound_m - m) } else { bound_m };
         // The upper edge meets the limit no later than the line through the last records.
-        if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
-            let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
-            band.p95_m = band.p95_m.max(line_m);
-        }
-        (hours, band)
+        let line_m =
+            steepest.filter(|(rise, _)| rise.p05_hours > 0.0).map_or(f64::NEG_INFINITY, |(rise, level)| {
+                level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours
+            });
+        (hours, Interval { p05_m: widened(p05_m), m, p95_m: widened(p95_m).max(line_m) })
     };
     Ok(Forecast { past, ahead: hours.into_iter().map(after).collect() })
 }
 
 /// The line through the last records, with the bounds of its slope; empty where they do not rise.
-fn line_ahead(
-    unit: &UnitFit<'_>,
-    flights: &[Flight],
-    hours: impl IntoIterator<Item = f64>,
-) -> Vec<(f64, Interval)> {
+fn line_ahead(unit: &UnitFit<'_>, hours: impl IntoIterator<Item = f64>) -> Vec<(f64, Interval)> {
     let (Some(rise), Some(level)) = (unit.measured.rise, unit.measured.level) else { return Vec::new() };
-    let since = |record: &Record| flights.last().map_or(0.0, |last| last.hours - record.hours);
+    let since = |record: &Record| unit.data.flights.last().map_or(0.0, |last| last.hours - record.hours);
     let flown = unit.measured.sound.last().map_or(0.0, since);
     let after = |hours: f64| {
         let at =

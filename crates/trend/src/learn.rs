@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::data::bins::Segment;
-use crate::data::series::{Flight, MaintenanceEvent, Series};
+use crate::data::series::{Flight, Series, UnitData};
 use crate::data::steps::installation_steps;
 use crate::executor::Executor;
 use crate::inference::posterior::{Posterior, posterior};
@@ -79,7 +79,7 @@ impl FleetPrior {
 
 /// The units used, and their flights with influences other than wear, along hours.
 struct TrainingSet<'a> {
-    units: Vec<TrainingUnit<'a>>,
+    units: Vec<UnitData<'a>>,
     histories: Arc<[History]>,
 }
 
@@ -91,15 +91,11 @@ impl<'a> TrainingSet<'a> {
         executor: &impl Executor,
     ) -> Self {
         let uninformative = FleetPrior::uninformative(limit_m);
-        let units = sample(fleet.into_iter().map(|series| TrainingUnit {
-            flights: series.flights_until(as_of_us),
-            maintenance: series.maintenance_until(as_of_us),
-        }));
+        let units = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
         // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
         // their first hour on lead to a fleet prior without wear.
-        let training_set =
-            |u: &TrainingUnit<'_>| history::read_history(u.flights, u.maintenance, None, &uninformative);
-        let histories = executor.map(&units, training_set).into();
+        let read = |unit: &UnitData<'_>| history::read_history(*unit, None, &uninformative);
+        let histories = executor.map(&units, read).into();
         Self { units, histories }
     }
 
@@ -108,8 +104,8 @@ impl<'a> TrainingSet<'a> {
         if prior.axis == UsageAxis::Hours {
             return Arc::clone(&self.histories);
         }
-        let both: Vec<(&TrainingUnit<'_>, &History)> = self.units.iter().zip(&*self.histories).collect();
-        executor.map(&both, |(unit, history)| history.on_axis(unit.flights, prior)).into()
+        let both: Vec<(&UnitData<'_>, &History)> = self.units.iter().zip(&*self.histories).collect();
+        executor.map(&both, |(unit, history)| (*history).clone().on_axis(unit.flights, prior)).into()
     }
 }
 
@@ -130,16 +126,9 @@ fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior>
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
-/// What was known of a unit on a day.
-#[derive(Clone, Copy)]
-struct TrainingUnit<'a> {
-    flights: &'a [Flight],
-    maintenance: &'a [MaintenanceEvent],
-}
-
 /// Units in an order that does not depend on the input; of a large fleet an even sample.
-fn sample<'a>(fleet: impl Iterator<Item = TrainingUnit<'a>>) -> Vec<TrainingUnit<'a>> {
-    let mut fleet: Vec<TrainingUnit<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
+fn sample<'a>(fleet: impl Iterator<Item = UnitData<'a>>) -> Vec<UnitData<'a>> {
+    let mut fleet: Vec<UnitData<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
     fleet.sort_by_cached_key(|unit| identity(unit.flights));
     let count = fleet.len().min(MOST_UNITS);
     (0..count).map(|i| fleet[i * fleet.len() / count]).collect()

@@ -1,9 +1,8 @@
 //! Measured state and wear laws of one unit at a date.
 
-use std::borrow::Cow;
-
 use crate::data::bins::Segment;
-use crate::data::series::{Flight, MaintenanceEvent, Series};
+use crate::data::series::{Flight, Series, UnitData};
+use crate::error::Error;
 use crate::inference::consistency::agrees;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::measured::rise::Rise;
@@ -15,63 +14,70 @@ use crate::statement::level;
 use crate::statement::types::{ChangePoint, ChangePointKind, ForecastMethod, MIN_ESTIMATES};
 
 /// Wear laws that agree with the last records.
-pub(crate) struct Fit<'a> {
+pub(crate) struct Fit {
     pub(crate) posterior: Posterior,
-    pub(crate) prior: Cow<'a, FleetPrior>,
+    pub(crate) prior: FleetPrior,
     pub(crate) method: ForecastMethod,
 }
 
 /// What the flights of a unit show.
 pub(crate) struct UnitFit<'a> {
+    pub(crate) data: UnitData<'a>,
+    /// The prior of the unit's fleet.
+    pub(crate) prior: FleetPrior,
     pub(crate) measured: Measured,
     pub(crate) history: History,
     /// All changes, by departure.
     pub(crate) changes: Vec<ChangePoint>,
-    pub(crate) fit: Option<Fit<'a>>,
+    pub(crate) fit: Option<Fit>,
     /// Posteriors of the segments before the last one.
     pub(crate) ended: Vec<Option<Posterior>>,
 }
 
 impl<'a> UnitFit<'a> {
     /// Reads the flights until a date, with a prior learned from nothing later.
-    pub(crate) fn new(series: &Series, as_of_us: i64, settings: &Settings, prior: &'a FleetPrior) -> Self {
-        let flights = series.flights_until(as_of_us);
-        let maintenance = series.maintenance_until(as_of_us);
-        let measured = Measured::new(flights, maintenance, settings);
-        let history = history::read_history(flights, maintenance, series.usage.unit_hours_at_start, prior);
+    pub(crate) fn new(
+        series: &'a Series,
+        as_of_us: i64,
+        settings: &Settings,
+        prior: Option<&FleetPrior>,
+    ) -> Result<Self, Error> {
+        settings.check()?;
+        let prior = prior.cloned().unwrap_or_else(|| FleetPrior::uninformative(settings.limit_m));
+        let data = series.until(as_of_us);
+        let measured = Measured::new(data, settings);
+        let history = history::read_history(data, series.usage.unit_hours_at_start, &prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
-        changes
-            .extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, flights, maintenance)));
+        changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
         let (mut ended, mut fit) = (Vec::new(), None);
         if let Some((last, before)) = segments.split_last() {
             for segment in before {
-                let fitted = posterior(segment, prior);
-                changes.extend(fitted.as_ref().and_then(|p| onset(p, segment, flights, prior)));
+                let fitted = posterior(segment, &prior);
+                changes.extend(fitted.as_ref().and_then(|p| onset(p, segment, data.flights, &prior)));
                 ended.push(fitted);
             }
-            fit = consistent_fit(&measured, &history, last, flights, prior);
-            let onset_of = |fit: &Fit<'_>| onset(&fit.posterior, last, flights, &fit.prior);
-            let is_on_axis = |fit: &&Fit<'_>| fit.method == ForecastMethod::Fleet;
-            changes.extend(fit.as_ref().filter(is_on_axis).and_then(onset_of));
+            fit = consistent_fit(&measured, &history, data.flights, &prior);
+            let by_fleet = fit.as_ref().filter(|fit| fit.method == ForecastMethod::Fleet);
+            changes.extend(by_fleet.and_then(|fit| onset(&fit.posterior, last, data.flights, &prior)));
         }
         changes.sort_by_key(|change| change.departure_us);
-        Self { measured, history, changes, fit, ended }
+        Ok(Self { data, prior, measured, history, changes, fit, ended })
     }
 
     /// Departures of the outliers: records that later ones did not confirm.
-    pub(crate) fn outliers_us(&self, flights: &[Flight]) -> Vec<i64> {
+    pub(crate) fn outliers_us(&self) -> Vec<i64> {
         let level = self.measured.level.map_or(0, |level| level.records.min(2));
         let kept = self.measured.sound.iter().rev().take(level).map(|r| r.flight).min().unwrap_or(usize::MAX);
         let outliers = self.history.outliers.iter().filter(|flight| **flight < kept);
-        outliers.map(|flight| flights[*flight].departure_us).collect()
+        outliers.map(|flight| self.data.flights[*flight].departure_us).collect()
     }
 
     /// The rise of the last records, its hours counted from the last flight.
-    pub(crate) fn rise_now(&self, flights: &[Flight]) -> Option<Rise> {
+    pub(crate) fn rise_now(&self) -> Option<Rise> {
         let (rise, record) = (self.measured.rise?, self.measured.sound.last()?);
-        let flown = flights.last()?.hours - record.hours;
+        let flown = self.data.flights.last()?.hours - record.hours;
         let left = |hours: f64| (hours - flown).max(0.0);
         Some(Rise {
             p05_hours: left(rise.p05_hours),
@@ -83,55 +89,45 @@ impl<'a> UnitFit<'a> {
 }
 
 /// The wear laws of the last segment by the fleet's prior, or else by the unit's own, as the last records allow.
-fn consistent_fit<'a>(
+fn consistent_fit(
     measured: &Measured,
     history: &History,
-    last: &Segment<'_>,
     flights: &[Flight],
-    prior: &'a FleetPrior,
-) -> Option<Fit<'a>> {
+    fleet: &FleetPrior,
+) -> Option<Fit> {
     if history.estimates.len() < MIN_ESTIMATES {
         return None;
     }
-    let fitted = |segment: &Segment<'_>, prior: &FleetPrior| {
-        let posterior = posterior(segment, prior)?;
-        agrees(&posterior, segment.now, measured, history, flights, prior).then_some(posterior)
+    let fitted = |history: &History, prior: FleetPrior, method: ForecastMethod| {
+        let posterior = posterior(&history.segments().last()?, &prior)?;
+        agrees(&posterior, measured, history, flights, &prior).then_some(Fit { posterior, prior, method })
     };
-    let by_fleet = || {
-        let posterior = fitted(last, prior)?;
-        Some(Fit { posterior, prior: Cow::Borrowed(prior), method: ForecastMethod::Fleet })
-    };
+    let by_fleet = || fitted(history, fleet.clone(), ForecastMethod::Fleet);
     let by_unit = || {
         let own = match measured.rise {
-            Some(rise) => prior.of_fast_wear(rise.m_per_hour, last.estimates.first()?.gap_m),
-            None => prior.single_unit(),
+            Some(rise) => {
+                fleet.of_fast_wear(rise.m_per_hour, history.segments().last()?.estimates.first()?.gap_m)
+            }
+            None => fleet.single_unit(),
         };
-        let history = history.on_axis(flights, &own);
-        let posterior = fitted(&history.segments().last()?, &own)?;
-        Some(Fit { posterior, prior: Cow::Owned(own), method: ForecastMethod::SingleUnit })
+        fitted(&history.clone().on_axis(flights, &own), own, ForecastMethod::SingleUnit)
     };
     match measured.rise {
-        Some(rise) if prior.is_fast(rise.m_per_hour) => by_unit().or_else(by_fleet),
+        Some(rise) if fleet.is_fast(rise.m_per_hour) => by_unit().or_else(by_fleet),
         _ => by_fleet().or_else(by_unit),
     }
 }
 
 /// The jump of the level as a change point, unless the history has it already.
-fn jump_event(
-    jump: &Jump,
-    known: &[ChangePoint],
-    flights: &[Flight],
-    maintenance: &[MaintenanceEvent],
-) -> Option<ChangePoint> {
-    let at = flights.partition_point(|flight| flight.departure_us < jump.departure_us);
-    let near = flights.get(at.saturating_sub(history::RECORD_FLIGHTS))?.departure_us
-        ..=flights[(at + history::RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
+fn jump_event(jump: &Jump, known: &[ChangePoint], data: UnitData<'_>) -> Option<ChangePoint> {
+    let at = data.flights.partition_point(|flight| flight.departure_us < jump.departure_us);
+    let near = data.flights.get(at.saturating_sub(history::RECORD_FLIGHTS))?.departure_us
+        ..=data.flights[(at + history::RECORD_FLIGHTS).min(data.flights.len() - 1)].departure_us;
     if known.iter().any(|change| near.contains(&change.departure_us)) {
         return None;
     }
-    let is_recorded = history::is_recorded(flights, maintenance, at);
     let step_m = jump.after_m - jump.before_m;
-    let kind = match is_recorded {
+    let kind = match data.is_recorded(at) {
         true => ChangePointKind::Recorded,
         false if step_m < 0.0 => ChangePointKind::Reset,
         false => ChangePointKind::Step,

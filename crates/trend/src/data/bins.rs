@@ -9,9 +9,7 @@ pub(crate) struct Segment<'a> {
     /// Usage at its beginning and at the date of the assessment.
     pub(crate) begin: f64,
     pub(crate) now: f64,
-    /// New or just reset when it began.
-    pub(crate) fresh: bool,
-    /// Age when it began, if the books know it.
+    /// Age when it began, where that is known: zero of a unit that was just reset.
     pub(crate) known_age: Option<f64>,
 }
 

@@ -119,6 +119,13 @@ pub struct Series {
     pub faults: RowFaults,
 }
 
+/// Flights and maintenance of a unit until a date.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct UnitData<'a> {
+    pub(crate) flights: &'a [Flight],
+    pub(crate) maintenance: &'a [MaintenanceEvent],
+}
+
 /// Rows that cannot be right, by what was done about them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RowFaults {
@@ -158,6 +165,11 @@ impl Series {
         maintenance.sort_unstable_by_key(|entry| (entry.utc_us, entry.renews));
         self.maintenance = maintenance;
         self
+    }
+
+    /// All that may be known of the unit at a date.
+    pub(crate) fn until(&self, as_of_us: i64) -> UnitData<'_> {
+        UnitData { flights: self.flights_until(as_of_us), maintenance: self.maintenance_until(as_of_us) }
     }
 
     /// The recorded maintenance at or before a date.

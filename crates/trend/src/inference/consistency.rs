@@ -8,7 +8,7 @@ use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
 use crate::measured::level::measured_level;
 use crate::measured::record::Record;
-use crate::prior::fleet_prior::{FleetPrior, hours_per_usage};
+use crate::prior::fleet_prior::FleetPrior;
 use crate::statement::history::History;
 use crate::wear::component::Component;
 
@@ -30,7 +30,6 @@ const RATE_REACH: f64 = 2.0;
 /// The undone offset and the season are taken off the records first.
 pub(crate) fn agrees(
     posterior: &Posterior,
-    now: f64,
     measured: &Measured,
     history: &History,
     flights: &[Flight],
@@ -48,7 +47,7 @@ pub(crate) fn agrees(
     let scatter_m2 = mean(&|r| (adjusted_m(r) - gap_m).powi(2));
     let error_m2 =
         if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
-    let since = now - mean(&|r| prior.usage(&flights[r.flight]));
+    let since = history.now - mean(&|r| prior.usage(&flights[r.flight]));
     let then = |component: &Component| {
         let value = |age: f64| component.law.value(age);
         let grown = value(component.age_now) - value(component.age_now - since);
@@ -59,8 +58,7 @@ pub(crate) fn agrees(
     let has_level = (level_m - gap_m).abs() <= REACH * (error_m2 + systematic_m2).sqrt();
     let has_rate = measured.rise.is_none_or(|rise| {
         let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
-        let hours_per_usage = hours_per_usage(flights, prior);
-        let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / hours_per_usage;
+        let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / prior.hours_per_usage(flights);
         let within = RATE_REACH * rise.m_per_hour_se;
         m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
             && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within

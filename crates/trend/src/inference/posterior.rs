@@ -71,7 +71,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
     let is_tried = |law| prior.includes_law(law);
-    let bank = candidates(segment.fresh, segment.known_age, span, starts, is_tried);
+    let bank = candidates(segment.known_age, span, starts, is_tried);
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = linear_growth(&coarse);
     let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -232,7 +232,7 @@ fn try_lives(
     let age_now = candidate.age + fit.segment.now - fit.segment.begin;
     let height_now = candidate.law.value(age_now);
     let age_assumption = match candidate.law {
-        _ if fit.segment.fresh || fit.segment.known_age.is_some() => AgeAssumption::NotNeeded,
+        _ if fit.segment.known_age.is_some() => AgeAssumption::NotNeeded,
         WearLaw::Onset { .. } => AgeAssumption::NotNeeded,
         _ if candidate.age > 0.0 => AgeAssumption::Worn,
         _ => AgeAssumption::Fresh,

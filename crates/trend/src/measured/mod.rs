@@ -8,7 +8,7 @@ pub(crate) mod level;
 pub(crate) mod record;
 pub(crate) mod rise;
 
-use crate::data::series::{DAY_US, Flight, MaintenanceEvent};
+use crate::data::series::{DAY_US, UnitData};
 use crate::measured::exceedance::{Exceedance, exceedance};
 use crate::measured::level::{Level, measured_level};
 use crate::measured::record::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED, Record, records};
@@ -48,8 +48,8 @@ pub(crate) struct Measured {
 
 impl Measured {
     /// Reads the last records of a unit's present installation.
-    pub(crate) fn new(flights: &[Flight], maintenance: &[MaintenanceEvent], settings: &Settings) -> Self {
-        let (all, renewed_us) = records(flights, maintenance, settings.limit_m);
+    pub(crate) fn new(data: UnitData<'_>, settings: &Settings) -> Self {
+        let (all, renewed_us) = records(data, settings.limit_m);
         let Some(latest) = all.last().copied() else { return Self::default() };
         let sound: Vec<Record> = all.iter().copied().filter(|record| record.is_sound).collect();
         // Flagged records are better than none.

@@ -1,7 +1,7 @@
 //! Records of a unit in order, with the periods in which they can be compared.
 
 use crate::data::outliers::noise;
-use crate::data::series::{Flight, Gap, MaintenanceEvent};
+use crate::data::series::{Flight, Gap, UnitData};
 
 /// Number of last records that are read.
 const MOST: usize = 400;
@@ -40,17 +40,14 @@ pub struct Record {
 }
 
 /// The last records of a unit, and the renewing maintenance after the last of them.
-pub(crate) fn records(
-    flights: &[Flight],
-    maintenance: &[MaintenanceEvent],
-    limit_m: f64,
-) -> (Vec<Record>, Option<i64>) {
+pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<i64>) {
     let mut seen: Vec<(usize, &Flight, Gap)> =
-        flights.iter().enumerate().rev().filter_map(|(i, f)| Some((i, f, f.gap?))).take(MOST).collect();
+        data.flights.iter().enumerate().rev().filter_map(|(i, f)| Some((i, f, f.gap?))).take(MOST).collect();
     seen.reverse();
     let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
     let errors = noise(&gaps, limit_m).errors;
-    let mut renewals = maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
+    let mut renewals =
+        data.maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
     let (mut period, mut installation) = (0, None);
     let mut records = Vec::with_capacity(seen.len());
     for ((flight, flown, gap), error_m) in seen.into_iter().zip(errors) {

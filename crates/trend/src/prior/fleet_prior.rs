@@ -173,6 +173,20 @@ impl FleetPrior {
         self.axis.of(flight) * self.hours_per_unit
     }
 
+    /// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
+    /// flights while that is young.
+    pub(crate) fn hours_per_usage(&self, flights: &[Flight]) -> f64 {
+        /// Flights of the present installation below which it is young, and the last ones that show the use.
+        const YOUNG: usize = 20;
+        const LAST: usize = 300;
+        let Some(last) = flights.last() else { return 1.0 };
+        let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
+        let back = if here < YOUNG { LAST } else { here.min(LAST) };
+        let first = &flights[flights.len().saturating_sub(back)];
+        let ratio = (last.hours - first.hours) / (self.usage(last) - self.usage(first));
+        if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+    }
+
     /// Mid-quantiles of the exponential waiting time until an onset, hours' worth of usage.
     pub(crate) fn onset_wait_quantiles(&self) -> [f64; WAIT_QUANTILES] {
         std::array::from_fn(|i| -(1.0 - (i as f64 + 0.5) / WAIT_QUANTILES as f64).ln() / self.onsets_per_hour)
@@ -195,20 +209,6 @@ impl FleetPrior {
     pub(crate) fn includes_law(&self, law: WearLaw) -> bool {
         matches!(law, WearLaw::None | WearLaw::Onset { .. }) || self.shares[law.family()] >= RULED_OUT
     }
-}
-
-/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
-/// flights while that is young.
-pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
-    /// Flights of the present installation below which it is young, and the last ones that show the use.
-    const YOUNG: usize = 20;
-    const LAST: usize = 300;
-    let Some(last) = flights.last() else { return 1.0 };
-    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
-    let back = if here < YOUNG { LAST } else { here.min(LAST) };
-    let first = &flights[flights.len().saturating_sub(back)];
-    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
-    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }
 
 /// Log densities of a prior.

@@ -2,7 +2,7 @@
 
 use crate::data::bins::Segment;
 use crate::data::outliers::{WeightedGap, mark_outliers};
-use crate::data::series::{Flight, MaintenanceEvent};
+use crate::data::series::{Flight, MaintenanceEvent, UnitData};
 use crate::data::steps::{StepChange, detect_steps};
 use crate::math::distributions;
 use crate::prior::fleet_prior::FleetPrior;
@@ -25,30 +25,23 @@ pub(crate) struct History {
     pub(crate) changes: Vec<ChangePoint>,
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
-    begins: Vec<SegmentStart>,
+    starts: Vec<SegmentStart>,
     /// What has been taken off the last estimates, metres. The forecast adds a rise again: only the law is without it.
     pub(crate) undone_m: f64,
-    now: f64,
-    known_age: Option<f64>,
+    /// Usage at the last flight.
+    pub(crate) now: f64,
 }
 
 /// Where a segment begins.
 #[derive(Debug, Clone, Copy)]
 struct SegmentStart {
     estimate: usize,
-    usage: f64,
-    /// As good as new.
-    fresh: bool,
+    known_age: Option<f64>,
 }
 
-/// Reads the flights along the axis that wear follows.
-pub(crate) fn read_history(
-    flights: &[Flight],
-    maintenance: &[MaintenanceEvent],
-    known_age: Option<f64>,
-    prior: &FleetPrior,
-) -> History {
-    let (estimates, outliers, noise_factor) = mark_outliers(flights, prior.limit_m());
+/// Reads the flights along the axis that wear follows, of a unit whose age at its first flight may be known.
+pub(crate) fn read_history(data: UnitData<'_>, known_age: Option<f64>, prior: &FleetPrior) -> History {
+    let (estimates, outliers, noise_factor) = mark_outliers(data.flights, prior.limit_m());
     let found = detect_steps(&estimates, prior.limit_m());
     let mut history = History {
         estimates,
@@ -56,72 +49,62 @@ pub(crate) fn read_history(
         noise_factor,
         changes: Vec::new(),
         offset_m2: 0.0,
-        begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
+        starts: vec![SegmentStart { estimate: 0, known_age }],
         undone_m: 0.0,
         now: 0.0,
-        known_age,
     };
     for step in &found {
-        history.apply(step, flights, maintenance, prior);
+        history.apply(step, data, prior);
     }
-    history.changes.extend(events_without_step(flights, maintenance, &found, &history.estimates));
-    history.set_axis(flights, prior);
-    history
+    let with_step: Vec<&MaintenanceEvent> =
+        found.iter().flat_map(|step| data.maintenance_near(history.estimates[step.at].flight)).collect();
+    // Maintenance that no step shows counts at the first flight after it.
+    let without_step = data.maintenance.iter().filter(|entry| !with_step.contains(entry));
+    history.changes.extend(without_step.filter_map(|entry| {
+        let first = data.flights.get(data.flights.partition_point(|f| f.departure_us < entry.utc_us))?;
+        let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
+        Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
+    }));
+    history.on_axis(data.flights, prior)
 }
 
 impl History {
-    /// The same with the usage of another axis.
-    pub(crate) fn on_axis(&self, flights: &[Flight], prior: &FleetPrior) -> Self {
-        let mut history = self.clone();
-        history.set_axis(flights, prior);
-        history
-    }
-
-    /// Turns every usage to that of the prior's axis.
-    fn set_axis(&mut self, flights: &[Flight], prior: &FleetPrior) {
+    /// The same with the usage of the prior's axis.
+    pub(crate) fn on_axis(mut self, flights: &[Flight], prior: &FleetPrior) -> Self {
         for estimate in &mut self.estimates {
             estimate.usage = prior.usage(&flights[estimate.flight]);
         }
-        for begin in self.begins.iter_mut().skip(1) {
-            begin.usage = self.estimates[begin.estimate - 1].usage;
-        }
         self.now = flights.last().map_or(0.0, |f| prior.usage(f));
+        self
     }
 
     /// Names a step and undoes it, or begins a segment with it.
-    fn apply(
-        &mut self,
-        step: &StepChange,
-        flights: &[Flight],
-        maintenance: &[MaintenanceEvent],
-        prior: &FleetPrior,
-    ) {
+    fn apply(&mut self, step: &StepChange, data: UnitData<'_>, prior: &FleetPrior) {
         let flight = self.estimates[step.at].flight;
-        let kind = if is_recorded(flights, maintenance, flight) {
+        let kind = if data.is_recorded(flight) {
             ChangePointKind::Recorded
         } else if self.reset_probability(step, prior) > 0.5 {
             ChangePointKind::Reset
         } else {
             ChangePointKind::Step
         };
-        let departure_us = flights[flight].departure_us;
+        let departure_us = data.flights[flight].departure_us;
         let certainty = match kind {
             ChangePointKind::Recorded => 1.0,
             _ => distributions::cdf(step.step_m.abs() / step.se_m),
         };
-        let is_renewal = |entry: &MaintenanceEvent| entry.renews && is_near(entry, flights, flight);
-        let renewed = step.step_m < 0.0 && maintenance.iter().any(is_renewal);
+        let renewed = step.step_m < 0.0 && data.maintenance_near(flight).any(|entry| entry.renews);
         let begins_anew = kind == ChangePointKind::Reset || renewed;
         let (step_m, se_m) =
             if begins_anew { (step.jump_m, step.jump_se_m) } else { (step.step_m, step.se_m) };
         self.changes.push(ChangePoint { departure_us, kind, step_m, se_m, certainty });
         if begins_anew {
-            self.begin(step.at, true);
+            self.begin(step.at, Some(0.0));
         } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
             // To undo what may be damage would hide it.
             let hidden_m = std::mem::take(&mut self.undone_m);
             self.shift(step.at, hidden_m);
-            self.begin(step.at, false);
+            self.begin(step.at, None);
         } else {
             self.undone_m += step.step_m;
             self.shift(step.at, -step.step_m);
@@ -130,8 +113,8 @@ impl History {
     }
 
     /// Begins a segment, which knows nothing of what was undone before.
-    fn begin(&mut self, estimate: usize, fresh: bool) {
-        self.begins.push(SegmentStart { estimate, usage: self.estimates[estimate - 1].usage, fresh });
+    fn begin(&mut self, estimate: usize, known_age: Option<f64>) {
+        self.starts.push(SegmentStart { estimate, known_age });
         self.offset_m2 = 0.0;
     }
 
@@ -162,53 +145,38 @@ impl History {
 
     /// The segments, oldest first.
     pub(crate) fn segments(&self) -> impl Iterator<Item = Segment<'_>> {
-        self.begins.iter().enumerate().map(|(i, begin)| {
-            let next = self.begins.get(i + 1);
-            let end = next.map_or(self.estimates.len(), |next| next.estimate);
+        let usage_before = |estimate: usize| estimate.checked_sub(1).map_or(0.0, |k| self.estimates[k].usage);
+        self.starts.iter().enumerate().map(move |(i, start)| {
+            let next = self.starts.get(i + 1).map(|next| next.estimate);
             Segment {
-                estimates: &self.estimates[begin.estimate..end],
-                begin: begin.usage,
-                now: next.map_or(self.now, |next| next.usage),
-                fresh: begin.fresh,
-                known_age: self.known_age.filter(|_| i == 0),
+                estimates: &self.estimates[start.estimate..next.unwrap_or(self.estimates.len())],
+                begin: usage_before(start.estimate),
+                now: next.map_or(self.now, usage_before),
+                known_age: start.known_age,
             }
         })
     }
 }
 
-/// Whether installations or maintenance explain a change at a flight.
-pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], flight: usize) -> bool {
-    maintenance.iter().any(|entry| is_near(entry, flights, flight))
-        || flights[near(flights, flight)].windows(2).any(|pair| pair[0].installation != pair[1].installation)
-}
+impl<'a> UnitData<'a> {
+    /// Whether installations or maintenance explain a change at a flight.
+    pub(crate) fn is_recorded(self, flight: usize) -> bool {
+        let is_moved = |pair: &[Flight]| pair[0].installation != pair[1].installation;
+        self.maintenance_near(flight).next().is_some() || self.near(flight).windows(2).any(is_moved)
+    }
 
-/// Flights near a step: as far as a few measured flights before and after it. Flights without a record lie between them.
-fn near(flights: &[Flight], flight: usize) -> std::ops::RangeInclusive<usize> {
-    let is_measured = |at: &usize| flights[*at].gap.is_some();
-    let from = (0..flight).rev().filter(is_measured).nth(RECORD_FLIGHTS).unwrap_or(0);
-    let to = (flight..flights.len()).filter(is_measured).nth(RECORD_FLIGHTS).unwrap_or(flights.len() - 1);
-    from..=to
-}
+    /// Flights near a step: as far as a few measured flights before and after it. Flights without a record lie between them.
+    fn near(self, flight: usize) -> &'a [Flight] {
+        let is_measured = |at: &usize| self.flights[*at].gap.is_some();
+        let from = (0..flight).rev().filter(is_measured).nth(RECORD_FLIGHTS).unwrap_or(0);
+        let to = (flight..self.flights.len()).filter(is_measured).nth(RECORD_FLIGHTS);
+        &self.flights[from..=to.unwrap_or(self.flights.len() - 1)]
+    }
 
-/// Whether a maintenance entry lies within a few measured flights of a step.
-fn is_near(entry: &MaintenanceEvent, flights: &[Flight], flight: usize) -> bool {
-    let near = near(flights, flight);
-    (flights[*near.start()].departure_us..=flights[*near.end()].departure_us).contains(&entry.utc_us)
-}
-
-/// Maintenance entries without a step in the gap, at the first flight after each.
-fn events_without_step<'a>(
-    flights: &'a [Flight],
-    maintenance: &'a [MaintenanceEvent],
-    found: &'a [StepChange],
-    estimates: &'a [WeightedGap],
-) -> impl Iterator<Item = ChangePoint> + 'a {
-    let has_step = |entry: &MaintenanceEvent| {
-        found.iter().any(|step| is_near(entry, flights, estimates[step.at].flight))
-    };
-    maintenance.iter().filter(move |entry| !has_step(entry)).filter_map(|entry| {
-        let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
-        let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
-        Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
-    })
+    /// Maintenance within a few measured flights of a step.
+    fn maintenance_near(self, flight: usize) -> impl Iterator<Item = &'a MaintenanceEvent> {
+        let near = self.near(flight);
+        let dates_us = near[0].departure_us..=near[near.len() - 1].departure_us;
+        self.maintenance.iter().filter(move |entry| dates_us.contains(&entry.utc_us))
+    }
 }

@@ -261,13 +261,11 @@ impl Candidate {
     }
 }
 
-/// The curves tried on a unit seen from `fresh` (new, or just reset) over `span_hours` of usage: of all laws those that
-/// are to be tried.
+/// The curves tried on a unit over `span_hours` of usage: of all laws those that are to be tried.
 ///
-/// A unit that may have worn before gets every age of the grid; onsets lie on a grid of starts within the observed usage.
+/// A unit whose age at first sight is not known gets every age of the grid; onsets lie on a grid of starts within the observed usage.
 /// Later starts are handled by the forecast.
 pub(crate) fn candidates(
-    fresh: bool,
     known_age: Option<f64>,
     span_hours: f64,
     starts: usize,
@@ -287,8 +285,9 @@ pub(crate) fn candidates(
     let mut candidates: Vec<Candidate> = std::iter::once(none).chain((0..starts).map(onset)).collect();
     let mut add = |of: &[Candidate]| candidates.extend(of.iter().filter(|candidate| is_tried(candidate.law)));
     match known_age {
+        // Most known ages are those of units that were just reset.
+        Some(0.0) => add(&FRESH),
         Some(age) => add(&at_ages(&[(age, 0.0)])),
-        None if fresh => add(&FRESH),
         None => add(&WORN),
     }
     candidates
@@ -324,7 +323,7 @@ mod tests {
         /// The derivative is that of the value, by central differences; the inverse leads back to the age.
         #[test]
         fn derivative_and_inverse_are_those_of_the_value(age in 50.0..3000.0_f64) {
-            for Candidate { law, .. } in candidates(true, None, 2000.0, 3, |_| true) {
+            for Candidate { law, .. } in candidates(Some(0.0), 2000.0, 3, |_| true) {
                 let step = 1e-4 * age;
                 let (low, high) = (law.value(age - step), law.value(age + step));
                 let slope = (high - low) / (2.0 * step);
