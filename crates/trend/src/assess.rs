@@ -39,7 +39,7 @@ pub fn assess(
     prior: Option<&FleetPrior>,
 ) -> Result<Assessment, Error> {
     let unit = UnitFit::new(series, as_of_us, settings, prior)?;
-    let flights = unit.data.flights;
+    let flights = unit.history.data.flights;
     let utilization = utilization(flights);
     let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
@@ -119,7 +119,7 @@ fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) ->
 
 /// The same by the mixture of wear laws.
 fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
-    let ratio = fit.prior.hours_per_usage(unit.data.flights);
+    let ratio = fit.prior.hours_per_usage(unit.history.data.flights);
     // A rise that was taken off for the law is still there.
     let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
     let settings = &Settings { limit_m, ..*settings };

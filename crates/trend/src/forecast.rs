@@ -49,7 +49,6 @@ pub fn forecast(
     hours: impl IntoIterator<Item = f64>,
 ) -> Result<Forecast, Error> {
     let unit = UnitFit::new(series, as_of_us, settings, prior)?;
-    let flights = unit.data.flights;
     let mut past = Vec::new();
     for (segment, fitted) in unit.history.segments().zip(&unit.ended) {
         past.extend(fitted.iter().flat_map(|posterior| levels(&segment, posterior, &unit.prior)));
@@ -57,9 +56,9 @@ pub fn forecast(
     let Some(Fit { posterior, prior, .. }) = &unit.fit else {
         return Ok(Forecast { past, ahead: line_ahead(&unit, hours) });
     };
-    let on_axis = unit.history.clone().on_axis(flights, prior);
+    let on_axis = unit.history.clone().on_axis(prior);
     past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
-    let ratio = prior.hours_per_usage(flights);
+    let ratio = prior.hours_per_usage(unit.history.data.flights);
     let variance_m2 = unit.history.offset_m2 + prior.bias_sd_m.powi(2);
     let steepest = unit.rise_now().zip(unit.measured.level);
     let after = |hours: f64| {
@@ -81,7 +80,8 @@ pub fn forecast(
 /// The line through the last records, with the bounds of its slope; empty where they do not rise.
 fn line_ahead(unit: &UnitFit<'_>, hours: impl IntoIterator<Item = f64>) -> Vec<(f64, Interval)> {
     let (Some(rise), Some(level)) = (unit.measured.rise, unit.measured.level) else { return Vec::new() };
-    let since = |record: &Record| unit.data.flights.last().map_or(0.0, |last| last.hours - record.hours);
+    let since =
+        |record: &Record| unit.history.data.flights.last().map_or(0.0, |last| last.hours - record.hours);
     let flown = unit.measured.sound.last().map_or(0.0, since);
     let after = |hours: f64| {
         let at =

@@ -9,7 +9,7 @@ use crate::executor::Executor;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
 use crate::prior::fleet_prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
-use crate::statement::history::{self, History};
+use crate::statement::history::History;
 use crate::wear::bank::WearLaw;
 use crate::wear::component::AgeAssumption;
 
@@ -51,9 +51,9 @@ impl FleetPrior {
         axis: Option<UsageAxis>,
         executor: &impl Executor,
     ) -> Self {
-        let training_set = TrainingSet::of(fleet, as_of_us, limit_m, executor);
-        let assumed = assumed(&training_set, limit_m, executor);
-        let on_axis = |axis| AxisPrior::on_axis(&training_set, axis, &assumed, executor);
+        let histories = read_fleet(fleet, as_of_us, limit_m, executor);
+        let assumed = assumed(&histories, limit_m, executor);
+        let on_axis = |axis| AxisPrior::on_axis(&histories, axis, &assumed, executor);
         let axis_prior = axis
             .and_then(on_axis)
             .or_else(|| argmax_evidence(UsageAxis::ALL.into_iter().filter_map(on_axis)));
@@ -70,59 +70,41 @@ impl FleetPrior {
         limit_m: f64,
         executor: &impl Executor,
     ) -> f64 {
-        let training_set = TrainingSet::of(fleet, as_of_us, limit_m, executor);
-        let assumed = assumed(&training_set, limit_m, executor);
-        let axis_prior = AxisPrior::on_axis(&training_set, UsageAxis::Hours, &assumed, executor);
+        let histories = read_fleet(fleet, as_of_us, limit_m, executor);
+        let assumed = assumed(&histories, limit_m, executor);
+        let axis_prior = AxisPrior::on_axis(&histories, UsageAxis::Hours, &assumed, executor);
         axis_prior.map_or(assumed, |axis_prior| axis_prior.learned).median_life_hours()
     }
 }
 
-/// The units used, and their flights with influences other than wear, along hours.
-struct TrainingSet<'a> {
-    units: Vec<UnitData<'a>>,
-    histories: Arc<[History]>,
-}
-
-impl<'a> TrainingSet<'a> {
-    fn of(
-        fleet: impl IntoIterator<Item = &'a Series>,
-        as_of_us: i64,
-        limit_m: f64,
-        executor: &impl Executor,
-    ) -> Self {
-        let uninformative = FleetPrior::uninformative(limit_m);
-        let units = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
-        // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
-        // their first hour on lead to a fleet prior without wear.
-        let read = |unit: &UnitData<'_>| history::read_history(*unit, None, &uninformative);
-        let histories = executor.map(&units, read).into();
-        Self { units, histories }
-    }
-
-    /// What the flights show along the axis of a prior.
-    fn on_axis(&self, prior: &FleetPrior, executor: &impl Executor) -> Arc<[History]> {
-        if prior.axis == UsageAxis::Hours {
-            return Arc::clone(&self.histories);
-        }
-        let both: Vec<(&UnitData<'_>, &History)> = self.units.iter().zip(&*self.histories).collect();
-        executor.map(&both, |(unit, history)| (*history).clone().on_axis(unit.flights, prior)).into()
-    }
+/// What the flights of the units used show until a day, along hours.
+fn read_fleet<'a>(
+    fleet: impl IntoIterator<Item = &'a Series>,
+    as_of_us: i64,
+    limit_m: f64,
+    executor: &impl Executor,
+) -> Vec<History<'a>> {
+    let uninformative = FleetPrior::uninformative(limit_m);
+    let units = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
+    // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
+    // their first hour on lead to a fleet prior without wear.
+    executor.map(&units, |unit| History::read(*unit, None, &uninformative))
 }
 
 /// Assumptions before the shares of the laws are learned: the effect of an installation, and the season, which
 /// are of the measurement whatever wear follows.
-fn assumed(training_set: &TrainingSet<'_>, limit_m: f64, executor: &impl Executor) -> FleetPrior {
+fn assumed(histories: &[History<'_>], limit_m: f64, executor: &impl Executor) -> FleetPrior {
     let mut assumed = FleetPrior::uninformative(limit_m);
-    assumed.bias_sd_m = bias(&training_set.histories, assumed.bias_sd_m, limit_m);
+    assumed.bias_sd_m = bias(histories, assumed.bias_sd_m, limit_m);
     let of_segment = |s: &Segment<'_>| seasonal_fit(s, &assumed, &posterior(s, &assumed)?);
-    let seasonal_fits = executor.map(&segments(&training_set.histories), of_segment);
+    let seasonal_fits = executor.map(&segments(histories), of_segment);
     let seasonal_fits: Vec<SeasonalFit> = seasonal_fits.into_iter().flatten().collect();
     assumed.season = learn_season(&seasonal_fits, limit_m);
     assumed
 }
 
 /// The axis prior with the largest evidence, the first of equals.
-fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
+fn argmax_evidence<'a>(priors: impl Iterator<Item = AxisPrior<'a>>) -> Option<AxisPrior<'a>> {
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
@@ -143,8 +125,8 @@ fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
 
 /// Prior learned along one axis.
 #[derive(Clone)]
-struct AxisPrior {
-    histories: Arc<[History]>,
+struct AxisPrior<'a> {
+    histories: Arc<[History<'a>]>,
     /// Before learning, and after.
     assumed: FleetPrior,
     learned: FleetPrior,
@@ -152,23 +134,23 @@ struct AxisPrior {
     evidence: f64,
 }
 
-impl AxisPrior {
+impl<'a> AxisPrior<'a> {
     /// Nothing along an axis without usage.
     fn on_axis(
-        training_set: &TrainingSet<'_>,
+        histories: &[History<'a>],
         axis: UsageAxis,
         assumed: &FleetPrior,
         executor: &impl Executor,
     ) -> Option<Self> {
         let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
-            training_set.units.iter().filter_map(|unit| unit.flights.last()).map(of).sum()
+            histories.iter().filter_map(|history| history.data.flights.last()).map(of).sum()
         };
         let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
         if !hours_per_unit.is_finite() {
             return None;
         }
         let assumed = FleetPrior { axis, hours_per_unit, ..assumed.clone() };
-        let histories = training_set.on_axis(&assumed, executor);
+        let histories = executor.map(histories, |history| history.clone().on_axis(&assumed)).into();
         let learned = assumed.clone();
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))
     }
@@ -201,12 +183,12 @@ impl AxisPrior {
 }
 
 /// The segments of all units.
-fn segments(histories: &[History]) -> Vec<Segment<'_>> {
+fn segments<'a>(histories: &'a [History<'_>]) -> Vec<Segment<'a>> {
     histories.iter().flat_map(History::segments).collect()
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.
-fn bias(histories: &[History], assumed_m: f64, limit_m: f64) -> f64 {
+fn bias(histories: &[History<'_>], assumed_m: f64, limit_m: f64) -> f64 {
     let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
     let (squares, count) = histories
         .iter()

@@ -22,11 +22,10 @@ pub(crate) struct Fit {
 
 /// What the flights of a unit show.
 pub(crate) struct UnitFit<'a> {
-    pub(crate) data: UnitData<'a>,
     /// The prior of the unit's fleet.
     pub(crate) prior: FleetPrior,
     pub(crate) measured: Measured,
-    pub(crate) history: History,
+    pub(crate) history: History<'a>,
     /// All changes, by departure.
     pub(crate) changes: Vec<ChangePoint>,
     pub(crate) fit: Option<Fit>,
@@ -46,7 +45,7 @@ impl<'a> UnitFit<'a> {
         let prior = prior.cloned().unwrap_or_else(|| FleetPrior::uninformative(settings.limit_m));
         let data = series.until(as_of_us);
         let measured = Measured::new(data, settings);
-        let history = history::read_history(data, series.usage.unit_hours_at_start, &prior);
+        let history = History::read(data, series.usage.unit_hours_at_start, &prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
         changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));
@@ -58,12 +57,12 @@ impl<'a> UnitFit<'a> {
                 changes.extend(fitted.as_ref().and_then(|p| onset(p, segment, data.flights, &prior)));
                 ended.push(fitted);
             }
-            fit = consistent_fit(&measured, &history, data.flights, &prior);
+            fit = consistent_fit(&measured, &history, &prior);
             let by_fleet = fit.as_ref().filter(|fit| fit.method == ForecastMethod::Fleet);
             changes.extend(by_fleet.and_then(|fit| onset(&fit.posterior, last, data.flights, &prior)));
         }
         changes.sort_by_key(|change| change.departure_us);
-        Ok(Self { data, prior, measured, history, changes, fit, ended })
+        Ok(Self { prior, measured, history, changes, fit, ended })
     }
 
     /// Departures of the outliers: records that later ones did not confirm.
@@ -71,13 +70,13 @@ impl<'a> UnitFit<'a> {
         let level = self.measured.level.map_or(0, |level| level.records.min(2));
         let kept = self.measured.sound.iter().rev().take(level).map(|r| r.flight).min().unwrap_or(usize::MAX);
         let outliers = self.history.outliers.iter().filter(|flight| **flight < kept);
-        outliers.map(|flight| self.data.flights[*flight].departure_us).collect()
+        outliers.map(|flight| self.history.data.flights[*flight].departure_us).collect()
     }
 
     /// The rise of the last records, its hours counted from the last flight.
     pub(crate) fn rise_now(&self) -> Option<Rise> {
         let (rise, record) = (self.measured.rise?, self.measured.sound.last()?);
-        let flown = self.data.flights.last()?.hours - record.hours;
+        let flown = self.history.data.flights.last()?.hours - record.hours;
         let left = |hours: f64| (hours - flown).max(0.0);
         Some(Rise {
             p05_hours: left(rise.p05_hours),
@@ -89,18 +88,13 @@ impl<'a> UnitFit<'a> {
 }
 
 /// The wear laws of the last segment by the fleet's prior, or else by the unit's own, as the last records allow.
-fn consistent_fit(
-    measured: &Measured,
-    history: &History,
-    flights: &[Flight],
-    fleet: &FleetPrior,
-) -> Option<Fit> {
+fn consistent_fit(measured: &Measured, history: &History<'_>, fleet: &FleetPrior) -> Option<Fit> {
     if history.estimates.len() < MIN_ESTIMATES {
         return None;
     }
-    let fitted = |history: &History, prior: FleetPrior, method: ForecastMethod| {
+    let fitted = |history: &History<'_>, prior: FleetPrior, method: ForecastMethod| {
         let posterior = posterior(&history.segments().last()?, &prior)?;
-        agrees(&posterior, measured, history, flights, &prior).then_some(Fit { posterior, prior, method })
+        agrees(&posterior, measured, history, &prior).then_some(Fit { posterior, prior, method })
     };
     let by_fleet = || fitted(history, fleet.clone(), ForecastMethod::Fleet);
     let by_unit = || {
@@ -110,7 +104,7 @@ fn consistent_fit(
             }
             None => fleet.single_unit(),
         };
-        fitted(&history.clone().on_axis(flights, &own), own, ForecastMethod::SingleUnit)
+        fitted(&history.clone().on_axis(&own), own, ForecastMethod::SingleUnit)
     };
     match measured.rise {
         Some(rise) if fleet.is_fast(rise.m_per_hour) => by_unit().or_else(by_fleet),

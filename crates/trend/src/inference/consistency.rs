@@ -3,7 +3,6 @@
 //! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps, leaves no candidate
 //! for a unit near its limit. Such a posterior gives no forecast; the measured state stays.
 
-use crate::data::series::Flight;
 use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
 use crate::measured::level::measured_level;
@@ -31,8 +30,7 @@ const RATE_REACH: f64 = 2.0;
 pub(crate) fn agrees(
     posterior: &Posterior,
     measured: &Measured,
-    history: &History,
-    flights: &[Flight],
+    history: &History<'_>,
     prior: &FleetPrior,
 ) -> bool {
     let Some(records) = last_records(measured, prior.limit_m()) else { return false };
@@ -47,7 +45,7 @@ pub(crate) fn agrees(
     let scatter_m2 = mean(&|r| (adjusted_m(r) - gap_m).powi(2));
     let error_m2 =
         if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
-    let since = history.now - mean(&|r| prior.usage(&flights[r.flight]));
+    let since = history.now - mean(&|r| prior.usage(&history.data.flights[r.flight]));
     let then = |component: &Component| {
         let value = |age: f64| component.law.value(age);
         let grown = value(component.age_now) - value(component.age_now - since);
@@ -58,7 +56,8 @@ pub(crate) fn agrees(
     let has_level = (level_m - gap_m).abs() <= REACH * (error_m2 + systematic_m2).sqrt();
     let has_rate = measured.rise.is_none_or(|rise| {
         let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
-        let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / prior.hours_per_usage(flights);
+        let m_per_hour =
+            posterior.components.iter().map(rate).sum::<f64>() / prior.hours_per_usage(history.data.flights);
         let within = RATE_REACH * rise.m_per_hour_se;
         m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
             && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within

@@ -17,7 +17,8 @@ pub(crate) const RECORD_FLIGHTS: usize = 3;
 
 /// What a unit's flights show, apart from wear.
 #[derive(Debug, Clone)]
-pub(crate) struct History {
+pub(crate) struct History<'a> {
+    pub(crate) data: UnitData<'a>,
     pub(crate) estimates: Vec<WeightedGap>,
     pub(crate) outliers: Vec<usize>,
     /// Variance found between flights over the variance stated.
@@ -39,38 +40,40 @@ struct SegmentStart {
     known_age: Option<f64>,
 }
 
-/// Reads the flights along the axis that wear follows, of a unit whose age at its first flight may be known.
-pub(crate) fn read_history(data: UnitData<'_>, known_age: Option<f64>, prior: &FleetPrior) -> History {
-    let (estimates, outliers, noise_factor) = mark_outliers(data.flights, prior.limit_m());
-    let found = detect_steps(&estimates, prior.limit_m());
-    let mut history = History {
-        estimates,
-        outliers,
-        noise_factor,
-        changes: Vec::new(),
-        offset_m2: 0.0,
-        starts: vec![SegmentStart { estimate: 0, known_age }],
-        undone_m: 0.0,
-        now: 0.0,
-    };
-    for step in &found {
-        history.apply(step, data, prior);
+impl<'a> History<'a> {
+    /// Reads the flights along the axis that wear follows, of a unit whose age at its first flight may be known.
+    pub(crate) fn read(data: UnitData<'a>, known_age: Option<f64>, prior: &FleetPrior) -> Self {
+        let (estimates, outliers, noise_factor) = mark_outliers(data.flights, prior.limit_m());
+        let found = detect_steps(&estimates, prior.limit_m());
+        let mut history = Self {
+            data,
+            estimates,
+            outliers,
+            noise_factor,
+            changes: Vec::new(),
+            offset_m2: 0.0,
+            starts: vec![SegmentStart { estimate: 0, known_age }],
+            undone_m: 0.0,
+            now: 0.0,
+        };
+        for step in &found {
+            history.apply(step, prior);
+        }
+        let with_step: Vec<&MaintenanceEvent> =
+            found.iter().flat_map(|step| data.maintenance_near(history.estimates[step.at].flight)).collect();
+        // Maintenance that no step shows counts at the first flight after it.
+        let without_step = data.maintenance.iter().filter(|entry| !with_step.contains(entry));
+        history.changes.extend(without_step.filter_map(|entry| {
+            let first = data.flights.get(data.flights.partition_point(|f| f.departure_us < entry.utc_us))?;
+            let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
+            Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
+        }));
+        history.on_axis(prior)
     }
-    let with_step: Vec<&MaintenanceEvent> =
-        found.iter().flat_map(|step| data.maintenance_near(history.estimates[step.at].flight)).collect();
-    // Maintenance that no step shows counts at the first flight after it.
-    let without_step = data.maintenance.iter().filter(|entry| !with_step.contains(entry));
-    history.changes.extend(without_step.filter_map(|entry| {
-        let first = data.flights.get(data.flights.partition_point(|f| f.departure_us < entry.utc_us))?;
-        let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
-        Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
-    }));
-    history.on_axis(data.flights, prior)
-}
 
-impl History {
     /// The same with the usage of the prior's axis.
-    pub(crate) fn on_axis(mut self, flights: &[Flight], prior: &FleetPrior) -> Self {
+    pub(crate) fn on_axis(mut self, prior: &FleetPrior) -> Self {
+        let flights = self.data.flights;
         for estimate in &mut self.estimates {
             estimate.usage = prior.usage(&flights[estimate.flight]);
         }
@@ -79,8 +82,8 @@ impl History {
     }
 
     /// Names a step and undoes it, or begins a segment with it.
-    fn apply(&mut self, step: &StepChange, data: UnitData<'_>, prior: &FleetPrior) {
-        let flight = self.estimates[step.at].flight;
+    fn apply(&mut self, step: &StepChange, prior: &FleetPrior) {
+        let (data, flight) = (self.data, self.estimates[step.at].flight);
         let kind = if data.is_recorded(flight) {
             ChangePointKind::Recorded
         } else if self.reset_probability(step, prior) > 0.5 {
