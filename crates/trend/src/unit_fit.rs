@@ -50,17 +50,14 @@ impl<'a> UnitFit<'a> {
         changes.extend(&measured.events);
         changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
-        let (mut ended, mut fit) = (Vec::new(), None);
-        if let Some((last, before)) = segments.split_last() {
-            for segment in before {
-                let fitted = posterior(segment, &prior);
-                changes.extend(fitted.as_ref().and_then(|p| onset(p, segment, data.flights, &prior)));
-                ended.push(fitted);
-            }
-            fit = consistent_fit(&measured, &history, &prior);
-            let by_fleet = fit.as_ref().filter(|fit| fit.method == ForecastMethod::Fleet);
-            changes.extend(by_fleet.and_then(|fit| onset(&fit.posterior, last, data.flights, &prior)));
-        }
+        let ended: Vec<Option<Posterior>> =
+            segments[..segments.len() - 1].iter().map(|segment| posterior(segment, &prior)).collect();
+        let fit = consistent_fit(&measured, &history, &prior);
+        let by_fleet = fit.as_ref().filter(|fit| fit.method == ForecastMethod::Fleet);
+        let fitted = ended.iter().map(Option::as_ref).chain([by_fleet.map(|fit| &fit.posterior)]);
+        changes.extend(
+            segments.iter().zip(fitted).filter_map(|(s, fitted)| onset(fitted?, s, data.flights, &prior)),
+        );
         changes.sort_by_key(|change| change.departure_us);
         Ok(Self { prior, measured, history, changes, fit, ended })
     }

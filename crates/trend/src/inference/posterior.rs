@@ -71,7 +71,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
     let is_tried = |law| prior.includes_law(law);
-    let bank = candidates(segment.known_age, span, starts, is_tried);
+    let mut bank = candidates(segment.known_age, span, starts, is_tried);
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = linear_growth(&coarse);
     let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -83,20 +83,22 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     if believed.is_empty() {
         return None;
     }
-    let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
-    kept.dedup();
-    let bank: Vec<Candidate> = kept.into_iter().map(|index| bank[index]).collect();
-    let likely = likeliest(&believed);
+    // Components are in the order of the bank.
+    let mut kept = believed.iter().peekable();
+    bank.retain(|c| {
+        std::iter::from_fn(|| kept.next_if(|n| (n.law, n.age_begin) == (c.law, c.age))).count() > 0
+    });
+    let likely = likeliest(believed);
     let fine = bins::bin(segment.estimates, bins::BINS);
     let second = SegmentFit::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
     finish(&second, components(&second, &bank, THOROUGH))
 }
 
 /// The posterior; none where the gaps are so far from every curve that no likelihood is a number.
-fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option<Posterior> {
-    let log_sum = normalise(&mut believed);
-    (!believed.is_empty()).then(|| Posterior {
-        components: believed.into_iter().map(|(_, component)| component).collect(),
+fn finish(fit: &SegmentFit<'_>, mut components: Vec<Component>) -> Option<Posterior> {
+    let log_sum = normalise(&mut components);
+    (!components.is_empty()).then(|| Posterior {
+        components,
         level_m2: fit.level_m2(),
         growth_m2: fit.filter.end_m2 + fit.filter.start_m2,
         log_evidence: log_sum + fit.shared_log_likelihood(),
@@ -104,9 +106,8 @@ fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option
 }
 
 /// The likeliest components, with weights that add up to one: enough for a mean.
-fn likeliest(believed: &[(usize, Component)]) -> Vec<Component> {
+fn likeliest(mut components: Vec<Component>) -> Vec<Component> {
     const FEW: usize = 10;
-    let mut components: Vec<Component> = believed.iter().map(|(_, component)| *component).collect();
     if FEW < components.len() {
         components.select_nth_unstable_by(FEW, |a, b| b.weight.total_cmp(&a.weight));
         components.truncate(FEW);
@@ -126,27 +127,22 @@ pub(crate) fn mean_growth(components: &[Component], usage: f64) -> f64 {
 
 /// Turns log weights into weights that add up to one, drops negligible ones, and returns the log
 /// of their sum.
-fn normalise(believed: &mut Vec<(usize, Component)>) -> f64 {
-    let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
+fn normalise(components: &mut Vec<Component>) -> f64 {
+    let best = components.iter().map(|n| n.weight).fold(f64::NEG_INFINITY, f64::max);
     if !best.is_finite() {
-        believed.clear();
+        components.clear();
         return f64::NEG_INFINITY;
     }
-    believed.retain(|(_, n)| n.weight > best - DROP);
-    let mut sum = 0.0;
-    for (_, component) in believed.iter_mut() {
-        component.weight = (component.weight - best).exp();
-        sum += component.weight;
-    }
-    for (_, component) in believed.iter_mut() {
-        component.weight /= sum;
-    }
+    components.retain(|n| n.weight > best - DROP);
+    components.iter_mut().for_each(|n| n.weight = (n.weight - best).exp());
+    let sum: f64 = components.iter().map(|n| n.weight).sum();
+    components.iter_mut().for_each(|n| n.weight /= sum);
     best + sum.ln()
 }
 
 /// A curve's regression, the amplitude it fits best, and a bound on its log weight.
-struct ScoredCandidate {
-    index: usize,
+struct ScoredCandidate<'a> {
+    candidate: &'a Candidate,
     pass: Regression,
     best_m: f64,
     information: f64,
@@ -158,7 +154,7 @@ struct ScoredCandidate {
 const LANES: usize = 4;
 
 /// Every curve of the bank against the bins.
-fn scored_candidates(fit: &SegmentFit<'_>, bank: &[Candidate]) -> Vec<ScoredCandidate> {
+fn scored_candidates<'a>(fit: &SegmentFit<'_>, bank: &'a [Candidate]) -> Vec<ScoredCandidate<'a>> {
     let usages: Vec<f64> = fit.bins.iter().map(|bin| bin.usage - fit.segment.begin).collect();
     let mut scored = Vec::with_capacity(bank.len());
     for of_lanes in bank.chunks(LANES) {
@@ -168,19 +164,18 @@ fn scored_candidates(fit: &SegmentFit<'_>, bank: &[Candidate]) -> Vec<ScoredCand
         };
         let heights: Vec<[f64; LANES]> = usages.iter().map(height).collect();
         let passes = fit.filter.regress_lanes(&fit.gaps, &fit.wave, &heights);
-        for (candidate, pass) in of_lanes.iter().zip(passes) {
-            scored.push(scored_candidate(fit, scored.len(), candidate, fit.with_season(pass)));
-        }
+        let of = |(candidate, pass)| scored_candidate(fit, candidate, fit.with_season(pass));
+        scored.extend(of_lanes.iter().zip(passes).map(of));
     }
     scored
 }
 
 /// Components, with log weights, of every curve that can matter.
-fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: (usize, f64)) -> Vec<(usize, Component)> {
+fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: (usize, f64)) -> Vec<Component> {
     let scored_candidates = scored_candidates(fit, bank);
-    let of = |scored: &ScoredCandidate| match &bank[scored.index] {
-        Candidate { law: WearLaw::None, .. } => flat(fit).to_vec(),
-        candidate => try_lives(fit, candidate, scored, tried),
+    let of = |scored: &ScoredCandidate<'_>| match scored.candidate.law {
+        WearLaw::None => flat(fit).to_vec(),
+        _ => try_lives(fit, scored, tried),
     };
     let Some(top) = scored_candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else {
         return Vec::new();
@@ -188,18 +183,16 @@ fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: (usize, f64)) -> 
     let best = of(top).iter().map(|component| component.weight).fold(f64::NEG_INFINITY, f64::max);
     // Where the prior excludes the best fit, its bound does not bound the others.
     let floor = top.bound.min(best + USUAL) - DROP - SLACK;
-    let matters = |c: &&ScoredCandidate| c.bound > floor || bank[c.index].law == WearLaw::None;
-    let with_index = |c| of(c).into_iter().map(|component| (c.index, component));
-    scored_candidates.iter().filter(matters).flat_map(with_index).collect()
+    let matters = |c: &&ScoredCandidate<'_>| c.bound > floor || c.candidate.law == WearLaw::None;
+    scored_candidates.iter().filter(matters).flat_map(of).collect()
 }
 
 /// The amplitude that fits the gaps and a new unit's gap best, were amplitudes free.
-fn scored_candidate(
+fn scored_candidate<'a>(
     fit: &SegmentFit<'_>,
-    index: usize,
-    candidate: &Candidate,
+    candidate: &'a Candidate,
     pass: Regression,
-) -> ScoredCandidate {
+) -> ScoredCandidate<'a> {
     let spread = fit.new_m2;
     let off_m = fit.gaps.start - fit.prior.new_m;
     let information = pass.sff + pass.start * pass.start / spread;
@@ -212,17 +205,16 @@ fn scored_candidate(
     let new_m2 = spread + (best_m * candidate.age_spread).powi(2);
     let bound = log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2
         + fit.logs.share(candidate.law.family());
-    ScoredCandidate { index, pass, best_m, information, bound }
+    ScoredCandidate { candidate, pass, best_m, information, bound }
 }
 
 /// Components of one curve over the lives its amplitude may have, with log weights.
 fn try_lives(
     fit: &SegmentFit<'_>,
-    candidate: &Candidate,
-    scored_candidate: &ScoredCandidate,
+    scored_candidate: &ScoredCandidate<'_>,
     (count, reach): (usize, f64),
 ) -> Vec<Component> {
-    let ScoredCandidate { pass, best_m, information, .. } = scored_candidate;
+    let ScoredCandidate { candidate, pass, best_m, information, .. } = scored_candidate;
     let (prior, spread) = (fit.prior, fit.new_m2);
     let reach_m = reach / information.sqrt();
     let Some((low, high)) = life_range(prior, candidate.law, best_m - reach_m, best_m + reach_m) else {
