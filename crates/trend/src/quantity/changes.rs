@@ -13,8 +13,10 @@ use crate::data::noise::{Assumed, Noise, inflation};
 
 /// Most steps of one unit.
 const MAX_STEPS: usize = 4;
-/// Most regressors: one, the drift, the steps.
-const COLUMNS: usize = 2 + MAX_STEPS;
+/// Regressors: one, the drift, the steps. Where one is not selected, its column is zero.
+const COLUMNS: usize = FIRST_STEP + MAX_STEPS;
+const DRIFT: usize = 1;
+const FIRST_STEP: usize = 2;
 /// Fewest flights before the first step, and from each step to the next or to the end.
 const LEAST_BEFORE: usize = 5;
 const LEAST_AFTER: usize = 3;
@@ -109,9 +111,9 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
     let variance = |x: &Row| (x.transpose() * covariance * x)[(0, 0)].max(0.0);
     let moved = x_last - x_first;
     let steps = model.steps.iter().enumerate().map(|(k, &at)| {
-        let column = model.first_step() + k;
+        let (column, departure_us) = (FIRST_STEP + k, sound[at].departure_us);
         QuantityStep {
-            departure_us: sound[at].departure_us,
+            departure_us,
             size: beta[column],
             size_se: covariance[(column, column)].max(0.0).sqrt(),
         }
@@ -148,24 +150,16 @@ impl<'a> Model<'a> {
         Self { values, weights, usage_hours, has_drift: false, steps: Vec::new() }
     }
 
-    fn first_step(&self) -> usize {
-        1 + usize::from(self.has_drift)
-    }
-
-    fn columns(&self) -> usize {
-        self.first_step() + self.steps.len()
-    }
-
     /// Regressors of a value.
     fn row(&self, index: usize, value: &QuantityValue) -> Row {
         let (middle, half) = self.usage_hours;
         let mut row = Row::zeros();
         row[0] = 1.0;
         if self.has_drift {
-            row[1] = (value.usage_hours - middle) / half;
+            row[DRIFT] = (value.usage_hours - middle) / half;
         }
         for (k, &step) in self.steps.iter().enumerate() {
-            row[self.first_step() + k] = f64::from(u8::from(index >= step));
+            row[FIRST_STEP + k] = f64::from(u8::from(index >= step));
         }
         row
     }
@@ -179,7 +173,10 @@ impl<'a> Model<'a> {
             sums.1.axpy(weight * value.value, &row, 1.0);
         }
         // Regressors that are not selected have coefficient zero.
-        (self.columns()..COLUMNS).for_each(|column| sums.0[(column, column)] = 1.0);
+        if !self.has_drift {
+            sums.0[(DRIFT, DRIFT)] = 1.0;
+        }
+        (FIRST_STEP + self.steps.len()..COLUMNS).for_each(|column| sums.0[(column, column)] = 1.0);
         sums
     }
 
@@ -221,7 +218,8 @@ impl<'a> Model<'a> {
 
     /// Squared t-value of a drift in addition to the present regressors.
     fn drift_gain(&self) -> f64 {
-        self.solve_with_drift().map_or(0.0, |(beta, covariance)| beta[1] * beta[1] / covariance[(1, 1)])
+        self.solve_with_drift()
+            .map_or(0.0, |(beta, covariance)| beta[DRIFT].powi(2) / covariance[(DRIFT, DRIFT)])
     }
 
     /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.
@@ -256,8 +254,8 @@ impl<'a> Model<'a> {
     fn remove_worst(&mut self) -> bool {
         let Some((beta, covariance)) = self.solve() else { return false };
         let gain = |column: usize| beta[column] * beta[column] / covariance[(column, column)];
-        let drift = self.has_drift.then(|| (gain(1) / DRIFT_GAIN, None));
-        let steps = (0..self.steps.len()).map(|k| (gain(self.first_step() + k) / STEP_GAIN, Some(k)));
+        let drift = self.has_drift.then(|| (gain(DRIFT) / DRIFT_GAIN, None));
+        let steps = (0..self.steps.len()).map(|k| (gain(FIRST_STEP + k) / STEP_GAIN, Some(k)));
         match drift.into_iter().chain(steps).min_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((gain, which)) if gain < 1.0 => {
                 match which {
@@ -276,6 +274,7 @@ impl<'a> Model<'a> {
             return None;
         }
         let (beta, covariance) = self.solve_with_drift()?;
-        Some((beta[1] / self.usage_hours.1, covariance[(1, 1)].max(0.0).sqrt() / self.usage_hours.1))
+        let (rate, se) = (beta[DRIFT], covariance[(DRIFT, DRIFT)].max(0.0).sqrt());
+        Some((rate / self.usage_hours.1, se / self.usage_hours.1))
     }
 }

@@ -57,11 +57,6 @@ impl CommonCurve {
         let near = before.into_iter().chain(after).min_by_key(|(other, _)| other.abs_diff(week));
         near.map_or(0.0, |(_, deviation)| *deviation)
     }
-
-    /// Deviations by the µs since 1970 UTC at which their week begins.
-    pub fn weeks(&self) -> impl Iterator<Item = (i64, f64)> {
-        self.weeks.iter().map(|(week, value)| (week * WEEK_US, *value))
-    }
 }
 
 fn cells(unit: usize, tail: usize, values: &[QuantityValue]) -> impl Iterator<Item = Cell> {

@@ -92,87 +92,82 @@ fn um(m: f64) -> String {
     format!("{:.1} µm", 1e6 * m)
 }
 
-/// Text of records above the limit that nothing has confirmed.
-fn unconfirmed(gap_m: f64, limit_m: f64, before_m: Option<f64>, count: usize) -> String {
-    let which = match count {
-        0 | 1 => format!("1 record of {} is", um(gap_m)),
-        _ => format!("{} with quality flags, up to {}, are", records(count), um(gap_m)),
-    };
-    let before = before_m.map_or_else(
-        || "no record of this installation before".to_owned(),
-        |before_m| format!("the records before read {}", um(before_m)),
-    );
-    format!("{which} above the limit of {}, not confirmed yet; {before}", um(limit_m))
-}
-
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = match *self {
-            Self::NoRecord { flagged: 0 } => "no record of a gap".to_owned(),
+        let below = |limit_m: f64| um(HYSTERESIS * limit_m);
+        match *self {
+            Self::NoRecord { flagged: 0 } => f.write_str("no record of a gap"),
             Self::NoRecord { flagged } => {
-                format!("no sound record of this installation: {} with a quality flag", records(flagged))
+                write!(f, "no sound record of this installation: {} with a quality flag", records(flagged))
             }
-            Self::NoLimit => "no limit is configured".to_owned(),
+            Self::NoLimit => f.write_str("no limit is configured"),
             Self::Stale { days, gap_m } => {
-                format!("no sound record for {days:.0} days; the gap was {} then", um(gap_m))
+                write!(f, "no sound record for {days:.0} days; the gap was {} then", um(gap_m))
             }
-            Self::Renewed { days } => format!("no record since the maintenance {days:.0} days ago"),
+            Self::Renewed { days } => write!(f, "no record since the maintenance {days:.0} days ago"),
             Self::AboveLimit { gap_m, limit_m, records: count } => {
                 let (gap, limit) = (um(gap_m), um(limit_m));
-                format!("gap {gap} is at or above the limit of {limit}, by the last {}", records(count))
+                write!(f, "gap {gap} is at or above the limit of {limit}, by the last {}", records(count))
             }
-            Self::LimitHeld { gap_m, limit_m, latest_m } => {
-                let (gap, limit, latest) = (um(gap_m), um(limit_m), um(latest_m));
-                let below = um(HYSTERESIS * limit_m);
-                format!(
-                    "was at the limit of {limit}; gap {gap}, latest record {latest}: `act` holds until two records are below {below}"
-                )
+            Self::LimitHeld { gap_m, limit_m, latest_m } => write!(
+                f,
+                "was at the limit of {}; gap {}, latest record {}: `act` holds until two records are below {}",
+                um(limit_m),
+                um(gap_m),
+                um(latest_m),
+                below(limit_m)
+            ),
+            Self::Unconfirmed { gap_m, limit_m, before_m, records: count } => {
+                match count {
+                    0 | 1 => write!(f, "1 record of {} is", um(gap_m))?,
+                    _ => write!(f, "{} with quality flags, up to {}, are", records(count), um(gap_m))?,
+                }
+                write!(f, " above the limit of {}, not confirmed yet; ", um(limit_m))?;
+                match before_m {
+                    Some(before_m) => write!(f, "the records before read {}", um(before_m)),
+                    None => f.write_str("no record of this installation before"),
+                }
             }
-            Self::Unconfirmed { gap_m, limit_m, before_m, records } => {
-                unconfirmed(gap_m, limit_m, before_m, records)
+            Self::CrossesSoon { p05_hours: ..0.5, planning_horizon_hours: horizon } => {
+                write!(f, "may already be at the limit (5 % point); planning horizon {horizon:.0} FH")
             }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours: horizon } if p05_hours < 0.5 => {
-                format!("may already be at the limit (5 % point); planning horizon {horizon:.0} FH")
-            }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours: horizon } => {
-                format!(
-                    "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {horizon:.0} FH"
-                )
-            }
-            Self::RisesToLimit { p05_hours, planning_horizon_hours, records: count, m_per_hour } => {
-                let end = match p05_hours {
-                    ..0.5 => "may be at the limit with the next flight".to_owned(),
-                    _ => format!(
-                        "could reach the limit within {p05_hours:.0} FH; planning horizon {planning_horizon_hours:.0} FH"
-                    ),
-                };
-                format!("rises {:.2} µm/FH over the last {} and {end}", 1e6 * m_per_hour, records(count))
+            Self::CrossesSoon { p05_hours: hours, planning_horizon_hours: horizon } => write!(
+                f,
+                "could reach the limit within {hours:.0} FH (5 % point); planning horizon {horizon:.0} FH"
+            ),
+            Self::RisesToLimit { p05_hours, planning_horizon_hours: horizon, records: count, m_per_hour } => {
+                write!(f, "rises {:.2} µm/FH over the last {} and ", 1e6 * m_per_hour, records(count))?;
+                match p05_hours {
+                    ..0.5 => f.write_str("may be at the limit with the next flight"),
+                    hours => {
+                        write!(
+                            f,
+                            "could reach the limit within {hours:.0} FH; planning horizon {horizon:.0} FH"
+                        )
+                    }
+                }
             }
             Self::AtWatch { gap_m, watch_m, .. } if gap_m < watch_m => {
-                let (gap, watch, below) = (um(gap_m), um(watch_m), um(HYSTERESIS * watch_m));
-                format!(
+                let (gap, watch, below) = (um(gap_m), um(watch_m), below(watch_m));
+                write!(
+                    f,
                     "gap {gap} was above the watch limit of {watch}; `watch` holds until it is below {below}"
                 )
             }
             Self::AtWatch { gap_m, watch_m, records: count } => {
                 let (gap, watch) = (um(gap_m), um(watch_m));
-                format!("gap {gap} is above the watch limit of {watch}, by the last {}", records(count))
+                write!(f, "gap {gap} is above the watch limit of {watch}, by the last {}", records(count))
             }
             Self::Jumped { before_m, after_m, records: count } => {
-                format!(
-                    "gap rose at once from {:.1} to {}, {} ago",
-                    1e6 * before_m,
-                    um(after_m),
-                    records(count)
-                )
+                let (before_um, after) = (1e6 * before_m, um(after_m));
+                write!(f, "gap rose at once from {before_um:.1} to {after}, {} ago", records(count))
             }
             Self::Changed { kind: ChangePointKind::Onset, days } => {
-                format!("wear began or sped up {days:.0} days ago")
+                write!(f, "wear began or sped up {days:.0} days ago")
             }
-            Self::Changed { kind, days } => format!("{kind} {days:.0} days ago, not on record"),
-            Self::Clear { records: count } => format!("below all limits, by the last {}", records(count)),
-        };
-        f.write_str(&text)
+            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
+            Self::Clear { records: count } => write!(f, "below all limits, by the last {}", records(count)),
+        }
     }
 }
 
