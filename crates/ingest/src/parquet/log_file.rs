@@ -5,18 +5,16 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
-use arrow::error::ArrowError;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ColumnChunkMetaData, KeyValue, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{Error, ErrorKind};
@@ -32,7 +30,7 @@ use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
-use crate::parquet::raw_footer::{self, Footer, not_parquet};
+use crate::parquet::raw_footer::{self, Claims, Footer, caught, not_parquet};
 use crate::parquet::row_selection::RowSelection;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
@@ -44,20 +42,15 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
     let mut head = [0; foreign_format::HEAD_BYTES];
     let fetched = source.want(once(0..head.len() as u64));
     let length = fetched.ok().and_then(|()| read_at::read_at(source.file(), &mut head, 0).ok());
-    let head = &head[..length.unwrap_or(0)];
-    if head.starts_with(b"PARE") {
-        return ErrorKind::Encrypted { column: None };
-    }
-    if head.starts_with(b"PAR1") {
-        if let Some(encoding) = raw_footer::unknown_encoding(source.file()) {
-            return ErrorKind::EncodingUnsupported { encoding };
+    match &head[..length.unwrap_or(0)] {
+        [b'P', b'A', b'R', b'E', ..] => ErrorKind::Encrypted { column: None },
+        [b'P', b'A', b'R', b'1', ..] => {
+            not_parquet(format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: ")))
         }
-        let detail = format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "));
-        return not_parquet(detail);
-    }
-    match foreign_format::of(head) {
-        Some(format) => ErrorKind::ForeignFormat { format },
-        None => not_parquet("not a Parquet file"),
+        head => match foreign_format::of(head) {
+            Some(format) => ErrorKind::ForeignFormat { format },
+            None => not_parquet("not a Parquet file"),
+        },
     }
 }
 
@@ -70,6 +63,7 @@ pub(crate) struct LogFile {
     source: ByteSource,
     footer: ArrowReaderMetadata,
     footer_start: u64,
+    claims: Claims,
     /// The same footer, by which text columns are read as the codes of their dictionary; none where the reader refuses it.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
     /// The schema that Arrow's writers note in the footer, once it was asked for; none where it is missing or damaged.
@@ -111,14 +105,12 @@ impl LogFile {
             return Err(ErrorKind::Empty);
         }
         let read = raw_footer::read(file, |range| source.want(once(range)));
-        let Footer { metadata, start } = read.map_err(|error| footer_error(&source, error))?;
+        let Footer { metadata, start: footer_start, claims } =
+            read.map_err(|error| footer_error(&source, error))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer =
             ArrowReaderMetadata::try_new(metadata, options).map_err(|e| not_parquet(e.to_string()))?;
-        if footer.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns).any(is_before_start) {
-            return Err(not_parquet("its footer has an offset below zero"));
-        }
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let mut by_name: HashMap<String, Vec<usize>> = HashMap::with_capacity(leaves.len());
         for (place, leaf) in leaves.iter().enumerate() {
@@ -127,7 +119,7 @@ impl LogFile {
         let (coded, noted) = (OnceLock::new(), OnceLock::new());
         let (path, flight_rows) = (path.to_owned(), Vec::new());
         let opened =
-            Self { path, flight_rows, source, footer, footer_start: start, coded, noted, leaves, by_name };
+            Self { path, flight_rows, source, footer, footer_start, claims, coded, noted, leaves, by_name };
         if opened.rows() == 0 { Err(ErrorKind::Empty) } else { Ok(opened) }
     }
 
@@ -209,9 +201,7 @@ impl LogFile {
             self.metadata("ARROW:schema")?;
             let file = self.footer.metadata().file_metadata();
             // The decoder of that note panics on some damage.
-            catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()))
-                .ok()?
-                .ok()
+            caught(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata())).ok()
         };
         self.noted.get_or_init(noted).as_ref()?.fields().get(leaf.root).map(Arc::as_ref)
     }
@@ -363,14 +353,9 @@ impl LogFile {
         loop {
             let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
             for (reader, leaf) in columns.iter_mut().zip(leaves) {
-                // On some inconsistent pages the parquet crate panics instead of returning an error.
-                let next = catch_unwind(AssertUnwindSafe(|| reader.next()));
-                let panicked = |_| Some(Err(ArrowError::ParquetError("its pages are inconsistent".into())));
-                match next.unwrap_or_else(panicked) {
-                    Some(Ok(found)) => batch.push(Arc::clone(found.column(0))),
-                    Some(Err(e)) => return Err(self.decode(leaf, group, e.to_string())),
-                    None => {}
-                }
+                let next = caught(|| reader.next().transpose());
+                let next = next.map_err(|detail| self.decode(leaf, group, detail))?;
+                batch.extend(next.map(|found| Arc::clone(found.column(0))));
             }
             let Some(first) = batch.first() else { return Ok(rows) };
             if batch.len() < leaves.len() || batch.iter().any(|a| a.len() != first.len()) {
@@ -468,19 +453,15 @@ impl LogFile {
     }
 
     fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
-        // Before the footer is read again, which would succeed.
-        if let Some(source) = transient::take_failed_read() {
-            return self.error(source.into());
-        }
-        if let Some(column) = raw_footer::encrypted(self.source.file(), leaf.index) {
-            let column = column.then(|| leaf.name.clone());
-            return self.error(ErrorKind::Encrypted { column });
-        }
-        if let Some(encoding) = raw_footer::unknown_encoding(self.source.file()) {
-            return self.error(ErrorKind::EncodingUnsupported { encoding });
-        }
-        let row_group = Some(group as u64);
-        self.error(ErrorKind::Decode { column: leaf.name.clone(), row_group, detail })
+        let (column, row_group) = (leaf.name.clone(), Some(group as u64));
+        let is_own = |chunk: &u64| chunk % self.leaves.len() as u64 == leaf.index as u64;
+        self.error(if self.claims.encrypted_chunks.iter().any(is_own) {
+            ErrorKind::Encrypted { column: Some(column) }
+        } else if self.claims.is_encrypted {
+            ErrorKind::Encrypted { column: None }
+        } else {
+            ErrorKind::Decode { column, row_group, detail }
+        })
     }
 
     /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a digest.
@@ -556,12 +537,6 @@ pub(crate) fn with_codes(
     let schema = Schema::new(footer.schema().fields().iter().map(field).collect::<Vec<_>>());
     let options = ArrowReaderOptions::new().with_schema(Arc::new(schema));
     ArrowReaderMetadata::try_new(Arc::clone(footer.metadata()), options)
-}
-
-/// Whether an offset or a length of a chunk is negative, on which the parquet crate panics.
-fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {
-    let dictionary = chunk.dictionary_page_offset().unwrap_or(0);
-    [chunk.data_page_offset(), chunk.compressed_size(), dictionary].iter().any(|offset| *offset < 0)
 }
 
 /// Where a chunk's pages lie, as its footer has it.

@@ -8,34 +8,27 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
-use polars_parquet_format::FileMetaData;
-use polars_parquet_format::thrift::protocol::TCompactInputProtocol;
+use polars_parquet_format::thrift::varint::VarInt;
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
 use crate::error::ErrorKind;
 use crate::io::read_at;
 
 /// The highest encoding that is read: byte stream split.
-const HIGHEST_ENCODING: i32 = 9;
+const HIGHEST_ENCODING: i64 = 9;
 /// Adaptive lossless floating point, the encoding that follows it.
-const ALP: i32 = 10;
+const ALP: i64 = 10;
 /// Structs and lists inside each other in a footer; the format has seven levels.
 const THRIFT_DEPTH: usize = 32;
-
-/// Types of Thrift's compact protocol.
-const STOP: u8 = 0;
-const I32: u8 = 5;
-const I64: u8 = 6;
-const LIST: u8 = 9;
-const STRUCT: u8 = 12;
 
 /// Bytes of an object's end that are fetched at first: most footers are shorter.
 const USUAL_FOOTER: u64 = 64 << 10;
 
-/// A footer, and where in its file it begins.
+/// A footer, where in its file it begins, and what it claims.
 pub(crate) struct Footer {
     pub(crate) metadata: Arc<ParquetMetaData>,
     pub(crate) start: u64,
+    pub(crate) claims: Claims,
 }
 
 /// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
@@ -44,9 +37,33 @@ pub(crate) fn read(
     file: &File,
     want: impl Fn(Range<u64>) -> Result<(), ErrorKind>,
 ) -> Result<Footer, ErrorKind> {
-    let (start, bytes) = raw(file, want)?;
-    let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&bytes)).map_err(not_parquet)?;
-    Ok(Footer { metadata: Arc::new(metadata), start })
+    let corrupt = || not_parquet("Invalid Parquet file. Corrupt footer");
+    let length = read_at::file_length(file)?;
+    want(length.saturating_sub(USUAL_FOOTER)..length)?;
+    let end = length.checked_sub(8).ok_or_else(corrupt)?;
+    let mut trailer = [0; 8];
+    read_at::read_exact(file, &mut trailer, end)?;
+    let [a, b, c, d, magic @ ..] = trailer;
+    let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
+    let start = end.checked_sub(bytes).filter(|_| magic == *b"PAR1").ok_or_else(corrupt)?;
+    bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
+    want(start..length)?;
+    let mut footer = vec![0; bytes as usize];
+    read_at::read_exact(file, &mut footer, start)?;
+    let damaged = "its footer is damaged: it claims more than it holds, or an offset below zero";
+    let mut thrift = Thrift { rest: &footer, ..Thrift::default() };
+    thrift.fields().ok_or_else(|| not_parquet(damaged))?;
+    let claims = thrift.claims;
+    bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
+    bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
+    bounds::check_rows("rows", claims.rows, length)?;
+    if claims.encoding > HIGHEST_ENCODING {
+        let number = claims.encoding;
+        let encoding = if number == ALP { "ALP".to_owned() } else { format!("number {number}") };
+        return Err(ErrorKind::EncodingUnsupported { encoding });
+    }
+    let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&footer)).map_err(not_parquet)?;
+    Ok(Footer { metadata: Arc::new(metadata), start, claims })
 }
 
 /// A result of the parquet crate, which panics on some damaged bytes.
@@ -62,141 +79,124 @@ pub(crate) fn not_parquet(detail: impl Into<String>) -> ErrorKind {
     ErrorKind::NotParquet { detail: detail.into() }
 }
 
-/// Start and bytes of a footer whose claims can be.
-fn raw(file: &File, want: impl Fn(Range<u64>) -> Result<(), ErrorKind>) -> Result<(u64, Vec<u8>), ErrorKind> {
-    let corrupt = || not_parquet("Invalid Parquet file. Corrupt footer");
-    let length = read_at::file_length(file)?;
-    want(length.saturating_sub(USUAL_FOOTER)..length)?;
-    let end = length.checked_sub(8).ok_or_else(corrupt)?;
-    let mut trailer = [0; 8];
-    read_at::read_exact(file, &mut trailer, end)?;
-    let [a, b, c, d, magic @ ..] = trailer;
-    let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
-    let start = end.checked_sub(bytes).filter(|_| magic == *b"PAR1").ok_or_else(corrupt)?;
-    bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
-    want(start..length)?;
-    let mut footer = vec![0; bytes as usize];
-    read_at::read_exact(file, &mut footer, start)?;
-    let damaged = || not_parquet("its footer is damaged: it claims more than it holds");
-    let claims = Thrift { rest: &footer }.file_claims().ok_or_else(damaged)?;
-    bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
-    bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
-    bounds::check_rows("rows", claims.rows, length)?;
-    Ok((start, footer))
-}
-
 /// What a footer claims.
 #[derive(Debug, Default)]
-struct Claims {
+pub(crate) struct Claims {
+    /// Groups inside each other in the schema.
     depth: usize,
+    /// Column chunks of all row groups.
     chunks: u64,
     rows: u64,
+    /// The highest number of an encoding.
+    encoding: i64,
+    /// Whether the whole file is encrypted.
+    pub(crate) is_encrypted: bool,
+    /// The chunks that are encrypted by a key of their column, counted over all row groups.
+    pub(crate) encrypted_chunks: Vec<u64>,
 }
 
-/// Walks through Thrift's compact protocol and takes no memory. `None` where it is not whole.
+/// The step into an element of a list.
+const ELEMENT: i64 = 0;
+
+/// Walks through Thrift's compact protocol and takes no memory for what a list or a text claims to hold. Its functions
+/// return `None` where the bytes are not whole.
+#[derive(Default)]
 struct Thrift<'b> {
     rest: &'b [u8],
+    /// The way to the present value: numbers of fields, and [`ELEMENT`] for each list.
+    path: Vec<i64>,
+    /// Children of the present element of the schema.
+    children: i64,
+    /// Children of each open group of the schema that are still to come.
+    open: Vec<i64>,
+    claims: Claims,
 }
 
 impl Thrift<'_> {
-    fn file_claims(&mut self) -> Option<Claims> {
-        let mut claims = Claims::default();
-        self.fields(&mut |thrift, field, kind| match (field, kind) {
-            (2, LIST) => {
-                // Children of each open group that are still to come.
-                let mut open: Vec<i64> = Vec::new();
-                thrift.elements(&mut |thrift| {
-                    let mut children = 0;
-                    thrift.fields(&mut |thrift, field, kind| match (field, kind) {
-                        (5, I32) => thrift.signed().map(|count| children = count),
-                        _ => thrift.skip(kind, THRIFT_DEPTH),
-                    })?;
-                    open.last_mut().into_iter().for_each(|left| *left -= 1);
-                    if children > 0 {
-                        open.push(children);
-                        claims.depth = claims.depth.max(open.len());
-                    }
-                    while open.last().is_some_and(|left| *left <= 0) {
-                        open.pop();
-                    }
-                    (children <= thrift.rest.len() as i64).then_some(())
-                })
-            }
-            (3, I64) => thrift.signed().map(|rows| claims.rows = u64::try_from(rows).unwrap_or(0)),
-            (4, LIST) => thrift.elements(&mut |thrift| {
-                thrift.fields(&mut |thrift, field, kind| match (field, kind) {
-                    (1, LIST) => thrift.elements(&mut |thrift| {
-                        claims.chunks += 1;
-                        thrift.skip(STRUCT, THRIFT_DEPTH)
-                    }),
-                    _ => thrift.skip(kind, THRIFT_DEPTH),
-                })
-            }),
-            _ => thrift.skip(kind, THRIFT_DEPTH),
-        })?;
-        Some(claims)
-    }
-
-    /// Passes each field of a struct, by number and type, to `take`, which must read its value.
-    fn fields(&mut self, take: &mut dyn FnMut(&mut Self, i64, u8) -> Option<()>) -> Option<()> {
-        let mut number = 0;
-        loop {
-            let head = self.byte()?;
-            if head == STOP {
-                return Some(());
-            }
-            number = if head >> 4 == 0 { self.signed()? } else { number + i64::from(head >> 4) };
-            take(self, number, head & 0x0f)?;
-        }
-    }
-
-    /// Calls `take` for each struct of a list.
-    fn elements(&mut self, take: &mut dyn FnMut(&mut Self) -> Option<()>) -> Option<()> {
-        let (kind, count) = self.list()?;
-        if count > 0 && kind != STRUCT {
-            return None;
-        }
-        (0..count).try_for_each(|_| take(self))
-    }
-
-    /// Type and number of a list's elements, each of which takes a byte at least.
-    fn list(&mut self) -> Option<(u8, u64)> {
-        let head = self.byte()?;
-        let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
-        (count <= self.rest.len() as u64).then_some((head & 0x0f, count))
-    }
-
-    fn skip(&mut self, kind: u8, depth: usize) -> Option<()> {
-        let depth = depth.checked_sub(1)?;
+    fn value(&mut self, kind: u8) -> Option<()> {
         match kind {
-            1 | 2 => Some(()),
-            3 => self.byte().map(drop),
-            4..=6 => self.varint().map(drop),
+            // A truth value takes a byte in a list, and none as a field.
+            1 | 2 => self.pass(u64::from(self.path.last() == Some(&ELEMENT))),
+            3 => self.pass(1),
+            4..=6 => {
+                let number = self.varint()?;
+                self.number(number)
+            }
             7 => self.pass(8),
             8 => {
                 let bytes = self.varint()?;
                 self.pass(bytes)
             }
-            9 | 10 => {
-                let (kind, count) = self.list()?;
-                (0..count).try_for_each(|_| self.skip_element(kind, depth))
-            }
-            11 => {
-                let count = self.varint()?;
-                let kinds = if count == 0 { 0 } else { self.byte()? };
-                (0..count).try_for_each(|_| {
-                    self.skip_element(kinds >> 4, depth)?;
-                    self.skip_element(kinds & 0x0f, depth)
-                })
-            }
-            STRUCT => self.fields(&mut |thrift, _, kind| thrift.skip(kind, depth)),
+            9 | 10 => self.list(),
+            12 => self.fields(),
+            // Maps, which the format does not use.
             _ => None,
         }
     }
 
-    /// A truth value takes a byte in a list, and none as a field.
-    fn skip_element(&mut self, kind: u8, depth: usize) -> Option<()> {
-        if matches!(kind, 1 | 2) { self.byte().map(drop) } else { self.skip(kind, depth) }
+    /// Notes a number, where the memory of a parser depends on it. Numbers of fields are those of `parquet.thrift`.
+    fn number(&mut self, number: i64) -> Option<()> {
+        match self.path[..] {
+            [2, ELEMENT, 5] => self.children = number,
+            [3] => self.claims.rows = u64::try_from(number).unwrap_or(0),
+            [4, ELEMENT, 1, ELEMENT, 3, 2, ELEMENT] => {
+                self.claims.encoding = self.claims.encoding.max(number);
+            }
+            // The parquet crate panics on a size or an offset of pages below zero.
+            [4, ELEMENT, 1, ELEMENT, 3, 7 | 9 | 11] => return (number >= 0).then_some(()),
+            _ => {}
+        }
+        Some(())
+    }
+
+    /// A list, each element of which takes a byte at least.
+    fn list(&mut self) -> Option<()> {
+        let head = self.byte()?;
+        let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
+        (count <= self.rest.len() as u64 && self.path.len() < THRIFT_DEPTH).then_some(())?;
+        self.path.push(ELEMENT);
+        (0..count).try_for_each(|_| self.value(head & 0x0f))?;
+        self.path.pop().map(drop)
+    }
+
+    /// A struct.
+    fn fields(&mut self) -> Option<()> {
+        (self.path.len() < THRIFT_DEPTH).then_some(())?;
+        self.path.push(0);
+        let mut number = 0_i64;
+        loop {
+            let head = self.byte()?;
+            if head == 0 {
+                break;
+            }
+            let step = i64::from(head >> 4);
+            number = if step == 0 { self.varint()? } else { number.saturating_add(step) };
+            *self.path.last_mut()? = number;
+            self.value(head & 0x0f)?;
+        }
+        self.path.pop();
+        match self.path[..] {
+            [2, ELEMENT] => return self.schema_element(),
+            [4, ELEMENT, 1, ELEMENT] => self.claims.chunks += 1,
+            [4, ELEMENT, 1, ELEMENT, 8] => self.claims.encrypted_chunks.push(self.claims.chunks),
+            [8] => self.claims.is_encrypted = true,
+            _ => {}
+        }
+        Some(())
+    }
+
+    /// Counts the groups about an element of the schema that was passed.
+    fn schema_element(&mut self) -> Option<()> {
+        let children = std::mem::take(&mut self.children);
+        self.open.last_mut().into_iter().for_each(|left| *left -= 1);
+        if children > 0 {
+            self.open.push(children);
+            self.claims.depth = self.claims.depth.max(self.open.len());
+        }
+        while self.open.last().is_some_and(|left| *left <= 0) {
+            self.open.pop();
+        }
+        (children <= self.rest.len() as i64).then_some(())
     }
 
     fn byte(&mut self) -> Option<u8> {
@@ -210,45 +210,9 @@ impl Thrift<'_> {
         Some(())
     }
 
-    fn varint(&mut self) -> Option<u64> {
-        let mut number = 0_u64;
-        for shift in (0..70).step_by(7) {
-            let byte = self.byte()?;
-            number |= u64::from(byte & 0x7f).checked_shl(shift).unwrap_or(0);
-            if byte & 0x80 == 0 {
-                return Some(number);
-            }
-        }
-        None
+    fn varint<V: VarInt>(&mut self) -> Option<V> {
+        let (number, bytes) = V::decode_var(self.rest)?;
+        self.pass(bytes as u64)?;
+        Some(number)
     }
-
-    fn signed(&mut self) -> Option<i64> {
-        self.varint().map(|number| (number >> 1) as i64 ^ -((number & 1) as i64))
-    }
-}
-
-/// The footer as the format's own types, for messages.
-fn parsed(file: &File) -> Option<FileMetaData> {
-    let (_, footer) = raw(file, |_| Ok(())).ok()?;
-    let mut protocol = TCompactInputProtocol::new(footer.as_slice(), FOOTER_BYTES as usize);
-    FileMetaData::read_from_in_protocol(&mut protocol).ok()
-}
-
-/// Whether a file with a readable footer is encrypted, and this leaf by its own key or with the rest.
-pub(crate) fn encrypted(file: &File, leaf: usize) -> Option<bool> {
-    let footer = parsed(file)?;
-    let is_column = footer
-        .row_groups
-        .iter()
-        .any(|group| group.columns.get(leaf).is_some_and(|chunk| chunk.crypto_metadata.is_some()));
-    (is_column || footer.encryption_algorithm.is_some()).then_some(is_column)
-}
-
-/// The name of an encoding that is not read, if the file uses one.
-pub(crate) fn unknown_encoding(file: &File) -> Option<String> {
-    let footer = parsed(file)?;
-    let chunks = footer.row_groups.iter().flat_map(|group| &group.columns);
-    let encodings = chunks.filter_map(|chunk| chunk.meta_data.as_ref()).flat_map(|meta| &meta.encodings);
-    let unknown = encodings.map(|encoding| encoding.0).find(|number| *number > HIGHEST_ENCODING)?;
-    Some(if unknown == ALP { "ALP".to_owned() } else { format!("number {unknown}") })
 }
