@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use object_io::{Address, ObjectFile};
 
@@ -15,32 +16,26 @@ use crate::io::transient;
 
 /// An open file or object.
 #[derive(Debug)]
-pub(crate) enum ByteSource {
-    Local(File),
-    Object(Box<ObjectFile>),
+pub(crate) struct ByteSource {
+    /// The local file, or the mirror of the object.
+    pub(crate) file: Arc<File>,
+    object: Option<ObjectFile>,
 }
 
 impl ByteSource {
     pub(crate) fn open(path: &Path) -> Result<Self, ErrorKind> {
-        match Address::parse(path)? {
-            Some(address) => Ok(Self::Object(Box::new(ObjectFile::open(&address)?))),
-            None => Ok(Self::Local(open_local(path)?)),
-        }
-    }
-
-    pub(crate) fn file(&self) -> &File {
-        match self {
-            Self::Local(file) => file,
-            Self::Object(spool) => spool.file(),
-        }
+        let address = Address::parse(path)?;
+        let object = address.map(|address| ObjectFile::open(&address)).transpose()?;
+        let file = match &object {
+            Some(object) => transient::with_retry(|| object.file().try_clone())?,
+            None => open_local(path)?,
+        };
+        Ok(Self { file: Arc::new(file), object })
     }
 
     /// Fetches these bytes: a local file has them all.
     pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), ErrorKind> {
-        match self {
-            Self::Local(_) => Ok(()),
-            Self::Object(spool) => Ok(spool.ensure_range(ranges)?),
-        }
+        Ok(self.object.as_ref().map_or(Ok(()), |object| object.ensure_range(ranges))?)
     }
 }
 

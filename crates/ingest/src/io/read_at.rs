@@ -1,18 +1,11 @@
 //! Reading at a position: workers that share a file share no cursor.
 //!
-//! Copies of a `File` have one cursor between them: two actuators of one log, read at a time by it, would get each
-//! other's bytes.
+//! A `File` has one cursor: two actuators of one log, read at a time by it, would get each other's bytes.
 
 use std::fs::File;
 use std::io;
-use std::sync::Arc;
 
 use crate::io::transient;
-
-/// A handle of its own on a file, for readers that outlive a borrow.
-pub(crate) fn handle(file: &File) -> io::Result<Arc<File>> {
-    transient::with_retry(|| file.try_clone()).map(Arc::new)
-}
 
 /// Length of a file, bytes; a transient error is retried.
 pub(crate) fn file_length(file: &File) -> io::Result<u64> {

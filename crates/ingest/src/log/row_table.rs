@@ -303,7 +303,7 @@ impl RowTable {
         if is_every_row && self.files.iter().any(lists) {
             return self.burst_stamps(samples, column, ticks);
         }
-        if is_every_row && ticks.is_real() && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
+        if is_every_row && !ticks.is_whole && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
             let mut reals = ColumnBuilder::with_capacity(self.rows().min(1 << 26), None);
             self.files
                 .iter()

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -41,7 +40,7 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
     let ErrorKind::NotParquet { detail } = error else { return error };
     let mut head = [0; foreign_format::HEAD_BYTES];
     let fetched = source.want(once(0..head.len() as u64));
-    let length = fetched.ok().and_then(|()| read_at::read_at(source.file(), &mut head, 0).ok());
+    let length = fetched.ok().and_then(|()| read_at::read_at(&source.file, &mut head, 0).ok());
     match &head[..length.unwrap_or(0)] {
         [b'P', b'A', b'R', b'E', ..] => ErrorKind::Encrypted { column: None },
         [b'P', b'A', b'R', b'1', ..] => {
@@ -96,7 +95,7 @@ impl LogFile {
 
     fn read_footer(path: &Path) -> Result<Self, ErrorKind> {
         let source = ByteSource::open(path)?;
-        let file = source.file();
+        let file = &source.file;
         let length = transient::with_retry(|| file.metadata())?;
         if length.is_dir() {
             return Err(std::io::Error::from(std::io::ErrorKind::IsADirectory).into());
@@ -316,7 +315,7 @@ impl LogFile {
             }
             let (pages, before, chunk) = (self.pages(group, leaf)?, into.len(), self.chunk(group, leaf));
             if column_numbers::is_plain(chunk) {
-                let pages = Pages::new(self.handle()?, chunk, pages, BATCH_ROWS);
+                let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
                 column_numbers::append(pages, chunk, wanted, into)
                     .map_err(|detail| self.decode(leaf, group, detail))?;
                 rows += into.len() - before;
@@ -379,16 +378,17 @@ impl LogFile {
         let schema = footer.parquet_schema();
         let mask = ProjectionMask::leaves(schema, [leaf.index]);
         let hint = is_coded.then(|| footer.schema().fields());
-        let groups = BoundedGroups::new(self.handle()?, footer.metadata(), vec![group], scan.batch_rows);
+        let groups = BoundedGroups::new(
+            Arc::clone(&self.source.file),
+            footer.metadata(),
+            vec![group],
+            scan.batch_rows,
+        );
         parquet_to_arrow_field_levels(schema, mask, hint)
             .and_then(|levels| {
                 ParquetRecordBatchReader::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
             })
             .map_err(|e| self.decode(leaf, group, e.to_string()))
-    }
-
-    fn handle(&self) -> Result<Arc<File>, Error> {
-        read_at::handle(self.source.file()).map_err(|source| self.error(source.into()))
     }
 
     /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
@@ -423,7 +423,7 @@ impl LogFile {
     /// The pages of a chunk, none of which claims what cannot be.
     fn pages(&self, group: usize, leaf: &LeafColumn) -> Result<Vec<Page>, Error> {
         let rows = self.footer.metadata().row_group(group).num_rows();
-        page_header::bounded(self.source.file(), self.chunk(group, leaf), rows)
+        page_header::bounded(&self.source.file, self.chunk(group, leaf), rows)
             .map_err(|detail| self.decode(leaf, group, detail))
     }
 
@@ -470,7 +470,7 @@ impl LogFile {
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source: std::io::Error| self.error(source.into());
-        let file = self.source.file();
+        let file = &self.source.file;
         let length = read_at::file_length(file).map_err(unreadable)?;
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =

@@ -8,14 +8,13 @@ use std::io::{BufWriter, Write};
 
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{
-    ColumnChunkMetaData, ParquetMetaData, ParquetMetaDataBuilder, ParquetMetaDataReader,
-    ParquetMetaDataWriter, RowGroupMetaData,
+    ColumnChunkMetaData, ParquetMetaDataBuilder, ParquetMetaDataReader, ParquetMetaDataWriter,
 };
 use parquet::file::writer::TrackedWrite;
 use polars_parquet_format::thrift::protocol::TCompactOutputProtocol;
 
 use crate::io::read_at;
-use crate::parquet::page_header::Pages;
+use crate::parquet::page_header;
 
 const MAGIC: &[u8; 4] = b"PAR1";
 
@@ -26,59 +25,46 @@ pub(crate) fn copy(from: &File, to: &mut File) -> Result<(), ParquetError> {
     sink.write_all(MAGIC)?;
     let mut groups = Vec::with_capacity(footer.num_row_groups());
     for group in footer.row_groups() {
-        let columns = group.columns().iter().map(|chunk| copy_chunk(from, &mut sink, chunk));
-        groups.push(rebuilt(group, columns.collect::<Result<_, _>>()?)?);
+        let start = sink.bytes_written() as i64;
+        let columns =
+            group.columns().iter().map(|chunk| copy_chunk(from, &mut sink, chunk, group.num_rows()));
+        let columns = columns.collect::<Result<_, _>>()?;
+        groups
+            .push(group.clone().into_builder().set_column_metadata(columns).set_file_offset(start).build()?);
     }
-    let footer: ParquetMetaData =
-        ParquetMetaDataBuilder::new(footer.file_metadata().clone()).set_row_groups(groups).build();
+    let footer = ParquetMetaDataBuilder::new(footer.file_metadata().clone()).set_row_groups(groups).build();
     ParquetMetaDataWriter::new(&mut sink, &footer).finish()?;
     Ok(sink.flush()?)
-}
-
-fn rebuilt(
-    group: &RowGroupMetaData,
-    columns: Vec<ColumnChunkMetaData>,
-) -> Result<RowGroupMetaData, ParquetError> {
-    let first = columns.first().map(|chunk| chunk.byte_range().0 as i64);
-    let builder = group.clone().into_builder().set_column_metadata(columns);
-    match first {
-        Some(first) if group.file_offset().is_some() => builder.set_file_offset(first).build(),
-        _ => builder.build(),
-    }
 }
 
 fn copy_chunk(
     from: &File,
     sink: &mut TrackedWrite<impl Write>,
     chunk: &ColumnChunkMetaData,
+    rows: i64,
 ) -> Result<ColumnChunkMetaData, ParquetError> {
-    let (start, bytes) = chunk.byte_range();
     let began = sink.bytes_written() as i64;
-    let (mut pages, mut header_growth, mut first_data) = (Pages::of(from, start, bytes), 0, None);
-    while let Some(mut page) = pages.next().map_err(ParquetError::General)? {
+    let mut first_data = None;
+    for mut page in page_header::bounded(from, chunk, rows).map_err(ParquetError::General)? {
         let mut body = vec![0; page.header.compressed_page_size as usize];
         read_at::read_exact(from, &mut body, page.body_start)?;
-        if page.header.dictionary_page_header.is_none() {
+        if !page.is_dictionary() {
             first_data.get_or_insert(sink.bytes_written() as i64);
         }
         page.header.crc = Some(crc32fast::hash(&body) as i32);
-        let header_start = sink.bytes_written();
         let mut protocol = TCompactOutputProtocol::new(&mut *sink);
         page.header.write_to_out_protocol(&mut protocol).map_err(|e| ParquetError::General(e.to_string()))?;
-        header_growth += (sink.bytes_written() - header_start) as i64 - page.header_bytes as i64;
         sink.write_all(&body)?;
     }
+    let bytes = sink.bytes_written() as i64 - began;
     chunk
         .clone()
         .into_builder()
         .set_data_page_offset(first_data.unwrap_or(began))
         .set_dictionary_page_offset(chunk.dictionary_page_offset().map(|_| began))
-        .set_total_compressed_size(sink.bytes_written() as i64 - began)
-        .set_total_uncompressed_size(chunk.uncompressed_size() + header_growth)
-        .set_offset_index_offset(None)
-        .set_offset_index_length(None)
-        .set_column_index_offset(None)
-        .set_column_index_length(None)
+        .set_total_compressed_size(bytes)
+        // Both sizes count the headers, which alone have grown.
+        .set_total_uncompressed_size(chunk.uncompressed_size() + bytes - chunk.compressed_size())
         .build()
 }
 

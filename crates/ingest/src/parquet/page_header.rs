@@ -5,6 +5,7 @@
 //! its chunk, its values must fit the page, and no page is larger than any writer makes.
 
 use std::fs::File;
+use std::ops::Range;
 
 use parquet::basic::Type;
 use parquet::file::metadata::ColumnChunkMetaData;
@@ -20,59 +21,36 @@ const USUAL_HEADER: u64 = 256;
 /// What levels, dictionaries' indices and unfinished blocks may add to a page beyond its values.
 const SLACK_BYTES: i64 = 1 << 16;
 
-/// Walks the pages of one column chunk.
-pub(crate) struct Pages<'f> {
-    file: &'f File,
-    at: u64,
-    end: u64,
-    buffer: Vec<u8>,
-}
-
 /// A page's header and where its body lies.
 #[derive(Debug)]
 pub(crate) struct Page {
     pub(crate) header: PageHeader,
-    /// Bytes of the header as written.
-    pub(crate) header_bytes: u64,
     /// First byte of the body.
     pub(crate) body_start: u64,
+    /// Values, nulls included.
+    pub(crate) values: u32,
 }
 
-impl<'f> Pages<'f> {
-    /// Starts at the first page of a chunk.
-    pub(crate) fn of(file: &'f File, start: u64, bytes: u64) -> Self {
-        Self { file, at: start, end: start + bytes, buffer: Vec::new() }
+impl Page {
+    pub(crate) fn is_dictionary(&self) -> bool {
+        self.header.type_ == PageType::DICTIONARY_PAGE
     }
+}
 
-    /// The next page; its body is passed over.
-    pub(crate) fn next(&mut self) -> Result<Option<Page>, String> {
-        if self.at >= self.end {
-            return Ok(None);
-        }
-        let (header, header_bytes) = self.header()?;
-        let body_start = self.at + header_bytes;
-        let (size, left) = (i64::from(header.compressed_page_size), self.end.saturating_sub(body_start));
-        if size < 0 || size as u64 > left {
-            return Err(format!("a page claims {size} bytes where its chunk has {left} left"));
-        }
-        self.at = body_start + size as u64;
-        Ok(Some(Page { header, header_bytes, body_start }))
-    }
-
-    /// Most headers are under a hundred bytes; one with long statistics is read again in full.
-    fn header(&mut self) -> Result<(PageHeader, u64), String> {
-        let left = (self.end - self.at).min(LARGEST_HEADER);
-        let mut wanted = USUAL_HEADER.min(left);
-        loop {
-            self.buffer.resize(wanted as usize, 0);
-            read_at::read_exact(self.file, &mut self.buffer, self.at).map_err(|e| e.to_string())?;
-            let mut rest = self.buffer.as_slice();
-            let mut protocol = TCompactInputProtocol::new(&mut rest, LARGEST_HEADER as usize);
-            match PageHeader::read_from_in_protocol(&mut protocol) {
-                Ok(header) => return Ok((header, wanted - rest.len() as u64)),
-                Err(_) if wanted < left => wanted = left,
-                Err(e) => return Err(format!("a page header cannot be read: {e}")),
-            }
+/// Reads a header into `buffer`, and returns it with its length. Most headers are under a hundred bytes; one with long
+/// statistics is read again in full.
+fn read_header(file: &File, place: Range<u64>, buffer: &mut Vec<u8>) -> Result<(PageHeader, u64), String> {
+    let left = (place.end - place.start).min(LARGEST_HEADER);
+    let mut wanted = USUAL_HEADER.min(left);
+    loop {
+        buffer.resize(wanted as usize, 0);
+        read_at::read_exact(file, buffer, place.start).map_err(|e| e.to_string())?;
+        let mut rest = buffer.as_slice();
+        let mut protocol = TCompactInputProtocol::new(&mut rest, LARGEST_HEADER as usize);
+        match PageHeader::read_from_in_protocol(&mut protocol) {
+            Ok(header) => return Ok((header, wanted - rest.len() as u64)),
+            Err(_) if wanted < left => wanted = left,
+            Err(e) => return Err(format!("a page header cannot be read: {e}")),
         }
     }
 }
@@ -87,13 +65,20 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
     let values = u64::try_from(chunk.num_values()).unwrap_or(u64::MAX);
     bounds::check_rows("values of a column", values, length).map_err(|excess| excess.to_string())?;
     let is_flat = chunk.column_descr().max_rep_level() == 0;
-    let (mut values, mut found) = (0_i64, Vec::new());
-    let mut pages = Pages::of(file, start, bytes);
-    while let Some(page) = pages.next()? {
-        let count = claimed(&page.header)?;
-        check_size(&page.header, chunk, count)?;
-        if page.header.type_ != PageType::DICTIONARY_PAGE {
-            values = values.saturating_add(count);
+    let (mut at, end) = (start, start + bytes);
+    let (mut values, mut found, mut buffer) = (0_i64, Vec::new(), Vec::new());
+    while at < end {
+        let (header, header_bytes) = read_header(file, at..end, &mut buffer)?;
+        let body_start = at + header_bytes;
+        let (size, left) = (i64::from(header.compressed_page_size), end.saturating_sub(body_start));
+        if size < 0 || size as u64 > left {
+            return Err(format!("a page claims {size} bytes where its chunk has {left} left"));
+        }
+        at = body_start + size as u64;
+        let page = Page { values: claimed(&header)?, header, body_start };
+        check_size(&page.header, chunk, page.values.into())?;
+        if !page.is_dictionary() {
+            values = values.saturating_add(page.values.into());
         }
         found.push(page);
     }
@@ -105,12 +90,12 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
 }
 
 /// The number of values that a page claims.
-fn claimed(header: &PageHeader) -> Result<i64, String> {
+fn claimed(header: &PageHeader) -> Result<u32, String> {
     let v1 = header.data_page_header.as_ref().map(|h| h.num_values);
     let v2 = header.data_page_header_v2.as_ref().map(|h| h.num_values);
     let dictionary = header.dictionary_page_header.as_ref().map(|h| h.num_values);
     let count = v1.or(v2).or(dictionary).unwrap_or(0);
-    if count < 0 { Err(format!("a page claims {count} values")) } else { Ok(i64::from(count)) }
+    u32::try_from(count).map_err(|_| format!("a page claims {count} values"))
 }
 
 fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData, count: i64) -> Result<(), String> {

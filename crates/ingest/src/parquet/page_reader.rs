@@ -114,11 +114,10 @@ impl PageReader for Pages {
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
         let Some(page) = self.pages.as_slice().first() else { return Ok(None) };
-        let v2 = &page.header.data_page_header_v2;
-        let count = |number: Option<i32>| number.and_then(|n| usize::try_from(n).ok());
-        let is_dict = page.header.type_ == PageType::DICTIONARY_PAGE;
-        let num_rows = count(v2.as_ref().map(|h| h.num_rows));
-        Ok(Some(PageMetadata { num_rows, num_levels: count(levels(page)), is_dict }))
+        let v2 = page.header.data_page_header_v2.as_ref();
+        let num_rows = v2.and_then(|header| usize::try_from(header.num_rows).ok());
+        let num_levels = Some(page.values as usize);
+        Ok(Some(PageMetadata { num_rows, num_levels, is_dict: page.is_dictionary() }))
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
@@ -149,9 +148,8 @@ impl Pages {
 
     /// Values of each data page, nulls included.
     pub(crate) fn values(&self) -> Vec<usize> {
-        let pages =
-            self.pages.as_slice().iter().filter(|page| page.header.type_ != PageType::DICTIONARY_PAGE);
-        pages.map(|page| usize::try_from(levels(page).unwrap_or(0)).unwrap_or(0)).collect()
+        let pages = self.pages.as_slice().iter().filter(|page| !page.is_dictionary());
+        pages.map(|page| page.values as usize).collect()
     }
 
     fn read(&mut self, page: &RawPage) -> Result<Page> {
@@ -194,10 +192,10 @@ impl Pages {
 
     fn page(&self, page: &RawPage, buf: Bytes) -> Result<Page> {
         let missing = || ParquetError::General("a page has no header of its kind".into());
+        let num_values = page.values;
         match page.header.type_ {
             PageType::DICTIONARY_PAGE => {
                 let header = page.header.dictionary_page_header.as_ref().ok_or_else(missing)?;
-                let num_values = u32::try_from(header.num_values)?;
                 self.check_texts(&buf)?;
                 let is_sorted = header.is_sorted.unwrap_or(false);
                 Ok(Page::DictionaryPage { buf, num_values, encoding: encoding(header.encoding)?, is_sorted })
@@ -206,7 +204,7 @@ impl Pages {
                 let header = page.header.data_page_header.as_ref().ok_or_else(missing)?;
                 Ok(Page::DataPage {
                     buf,
-                    num_values: u32::try_from(header.num_values)?,
+                    num_values,
                     encoding: encoding(header.encoding)?,
                     def_level_encoding: encoding(header.definition_level_encoding)?,
                     rep_level_encoding: encoding(header.repetition_level_encoding)?,
@@ -217,7 +215,7 @@ impl Pages {
                 let header = page.header.data_page_header_v2.as_ref().ok_or_else(missing)?;
                 Ok(Page::DataPageV2 {
                     buf,
-                    num_values: u32::try_from(header.num_values)?,
+                    num_values,
                     encoding: encoding(header.encoding)?,
                     num_nulls: u32::try_from(header.num_nulls)?,
                     num_rows: u32::try_from(header.num_rows)?,
@@ -254,12 +252,6 @@ impl Pages {
         }
         fail(format!("its dictionary holds a text of {longest} bytes, more than the limit of {most}"))
     }
-}
-
-/// Values of a data page, nulls included.
-fn levels(page: &RawPage) -> Option<i32> {
-    let v1 = page.header.data_page_header.as_ref().map(|header| header.num_values);
-    v1.or(page.header.data_page_header_v2.as_ref().map(|header| header.num_values))
 }
 
 /// Rows of a batch of a column of which these are the pages. Texts that share beginnings may each be as long as a page.

@@ -41,23 +41,3 @@ impl<'a> RowSelection<'a> {
         stretches.get(next).is_some_and(|stretch| stretch.start < end)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_are_wanted_where_a_stretch_touches_them() {
-        let stretches = [10..20, 30..31];
-        let wanted = RowSelection::of(&stretches);
-        let found =
-            [0..10, 0..11, 19..30, 20..30, 25..31, 31..99, 12..13].map(|rows| wanted.intersects(rows));
-        assert_eq!(found, [false, true, true, false, true, false, true]);
-        assert!(
-            wanted.offset(5).offset(5).intersects(0..1)
-                && !wanted.offset(20).intersects(0..10)
-                && RowSelection::ALL.intersects(0..1)
-        );
-        assert!(!RowSelection::of(&[]).intersects(0..100));
-    }
-}

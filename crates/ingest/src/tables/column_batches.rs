@@ -22,7 +22,6 @@ use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
 use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::whole;
-use crate::io::read_at;
 use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
@@ -177,7 +176,7 @@ pub fn batches(
 pub struct TableSplits {
     file: PathBuf,
     /// For Parquet: the file, its metadata with the requested schema, and the columns.
-    parquet: Option<(File, ArrowReaderMetadata, ProjectionMask)>,
+    parquet: Option<(Arc<File>, ArrowReaderMetadata, ProjectionMask)>,
 }
 
 impl TableSplits {
@@ -231,7 +230,7 @@ fn parquet(
     file: &Path,
     wanted: Option<&[&str]>,
     coded: &[&str],
-) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
+) -> Result<(Arc<File>, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
     let opened = whole(file)?;
     let metadata = raw_footer::read(&opened, |_| Ok(()))?.metadata;
     let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()));
@@ -242,7 +241,7 @@ fn parquet(
     let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
     let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
     let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
-    Ok((opened, footer, mask))
+    Ok((Arc::new(opened), footer, mask))
 }
 
 /// Rows of an open table, in batches.
@@ -255,16 +254,15 @@ struct Rows {
 
 /// The rows of some row groups.
 fn groups(
-    file: &File,
+    file: &Arc<File>,
     footer: &ArrowReaderMetadata,
     mask: ProjectionMask,
     groups: Range<usize>,
 ) -> Result<Rows, ErrorKind> {
-    let input = read_at::handle(file)?;
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
-    let rows = BoundedGroups::new(input, footer.metadata(), groups.collect(), ROWS);
+    let rows = BoundedGroups::new(Arc::clone(file), footer.metadata(), groups.collect(), ROWS);
     let mut reader = caught(|| {
         let hint = Some(footer.schema().fields());
         let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;

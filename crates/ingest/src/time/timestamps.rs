@@ -22,6 +22,7 @@ pub(crate) enum TickEpoch {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TickFormat {
     pub(crate) per_second: f64,
+    /// Whether they have no fraction; texts are read as whole nanoseconds.
     pub(crate) is_whole: bool,
     pub(crate) is_text: bool,
     pub(crate) origin: TickEpoch,
@@ -51,11 +52,6 @@ impl TickFormat {
             ArrowTimeUnit::Nanosecond => 1e9,
         };
         Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, zero_s: 0, wraps_at: None }
-    }
-
-    /// Whether they are numbers with a fraction.
-    pub(crate) fn is_real(self) -> bool {
-        !self.is_text && !self.is_whole
     }
 
     /// ISO 8601 text; an offset in it is taken, and without one the time is local. Where `may_be_of_day`, a text may be
@@ -162,7 +158,7 @@ impl<'a> TimestampParser<'a> {
     }
 
     pub(crate) fn stamps(mut self) -> Timestamps {
-        if self.ticks.is_real() {
+        if !self.ticks.is_whole {
             self.convert_reals();
         }
         let per_second = self.ticks.per_second;

@@ -1,6 +1,5 @@
 //! A load that is recorded more slowly than the positions stands until the next one comes.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A load is held over so many of its own steps, or so many seconds if that is more.
@@ -59,19 +58,19 @@ pub(crate) fn median_sample_interval(load_n: &[f64]) -> usize {
     if !load_n.iter().any(|f| f.is_nan()) {
         return 1;
     }
-    let (mut intervals, mut count, mut last) = (BTreeMap::<usize, usize>::new(), 0, None);
+    let (mut counts, mut last) = (Vec::<usize>::new(), None);
     for i in (0..load_n.len()).filter(|&i| !load_n[i].is_nan()) {
         if let Some(last) = last.replace(i) {
-            *intervals.entry(i - last).or_default() += 1;
-            count += 1;
+            counts.resize(counts.len().max(i - last + 1), 0);
+            counts[i - last] += 1;
         }
     }
-    let mut shorter = 0;
-    let is_middle = |(_, samples): &(&usize, &usize)| {
-        shorter += **samples;
-        shorter > count / 2
+    let (half, mut shorter) = (counts.iter().sum::<usize>() / 2, 0);
+    let is_middle = |count: &usize| {
+        shorter += count;
+        shorter > half
     };
-    intervals.iter().find(is_middle).map_or(1, |(interval, _)| *interval)
+    counts.iter().position(is_middle).unwrap_or(1)
 }
 
 #[cfg(test)]
