@@ -94,14 +94,21 @@ fn resolution(values: &[f64], seen: &ChannelStats) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// Stretches of at least so many samples that repeat one value.
+/// Stretches of at least so many samples, but not all, that repeat one value while another position travels further than
+/// `travel_m`.
 #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
-fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
+fn still_runs(
+    values: &[f64],
+    partner_m: &[f64],
+    least: usize,
+    travel_m: f64,
+) -> impl Iterator<Item = Range<usize>> {
     let mut end = 0;
     values.chunk_by(|a, b| a == b).filter_map(move |run| {
         let start = end;
         end += run.len();
-        (run.len() >= least).then_some(start..end)
+        let is_part = run.len() >= least && run.len() < values.len();
+        (is_part && range(&partner_m[start..end]) > travel_m).then_some(start..end)
     })
 }
 
@@ -317,11 +324,8 @@ fn frozen_ranges(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usi
     const LEAST_TRAVEL_M: f64 = 1e-3;
     const LEAST_SHARE: f64 = 0.05;
     let travel_m = (LEAST_SHARE * range(partner)).max(LEAST_TRAVEL_M);
-    runs(values, least)
-        .filter(|run| run.len() < values.len() && range(&partner[run.clone()]) > travel_m)
-        // The first of the repeated values was measured.
-        .map(|run| run.start + 1..run.end)
-        .collect()
+    // The first of the repeated values was measured.
+    still_runs(values, partner, least, travel_m).map(|run| run.start + 1..run.end).collect()
 }
 
 /// Whether the load was constant for ten seconds in which the actuator moved a fifth of its range.
@@ -338,8 +342,8 @@ pub(crate) fn load_frozen(
         return None;
     }
     let travel_m = LEAST_SHARE * range(motor_m);
-    let froze = |run: Range<usize>| run.len() < load_n.len() && range(&motor_m[run]) > travel_m;
-    runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
+    let mut frozen = still_runs(load_n, motor_m, least, travel_m);
+    frozen.next().map(|_| format!("{}_frozen", Role::Load.as_str()))
 }
 
 #[cfg(test)]

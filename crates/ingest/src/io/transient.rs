@@ -12,10 +12,8 @@ use std::time::Duration;
 const DELAYS: [Duration; 3] =
     [Duration::from_millis(10), Duration::from_millis(40), Duration::from_millis(160)];
 
-/// `EIO`, which [`io::ErrorKind`] does not know.
-const INPUT_OUTPUT_ERROR: i32 = 5;
-/// `EREMOTEIO` of Linux.
-const REMOTE_INPUT_OUTPUT_ERROR: i32 = 121;
+/// `EIO`, which [`io::ErrorKind`] does not know, and `EREMOTEIO` of Linux.
+const INPUT_OUTPUT_ERRORS: [i32; 2] = [5, 121];
 /// `ENFILE` and `EMFILE`: the system, or the process, has as many files open as it may.
 const TOO_MANY_OPEN_FILES: [i32; 2] = [23, 24];
 
@@ -41,13 +39,16 @@ pub(crate) fn is_transient(error: &io::Error) -> bool {
             | Kind::NotConnected
             | Kind::OutOfMemory
     );
-    let by_number = [INPUT_OUTPUT_ERROR, REMOTE_INPUT_OUTPUT_ERROR].map(Some).contains(&error.raw_os_error());
-    by_kind || (cfg!(unix) && by_number) || is_file_limit(error)
+    by_kind || is_one_of(error, INPUT_OUTPUT_ERRORS) || is_file_limit(error)
 }
 
 /// Whether too many files are open.
 pub(crate) fn is_file_limit(error: &io::Error) -> bool {
-    cfg!(unix) && TOO_MANY_OPEN_FILES.map(Some).contains(&error.raw_os_error())
+    is_one_of(error, TOO_MANY_OPEN_FILES)
+}
+
+fn is_one_of(error: &io::Error, numbers: [i32; 2]) -> bool {
+    cfg!(unix) && error.raw_os_error().is_some_and(|number| numbers.contains(&number))
 }
 
 /// Repeats an operation while its error is transient, and remembers the error of this thread, since it is no finding about
@@ -67,7 +68,9 @@ pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io:
             None => {
                 let is_of_system = error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound;
                 if is_transient(&error) || is_of_system {
-                    FAILED_READ.set(Some(copy(&error)));
+                    let number = error.raw_os_error();
+                    let copy = number.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
+                    FAILED_READ.set(Some(copy));
                 }
                 return Err(error);
             }
@@ -78,10 +81,6 @@ pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io:
 /// The error that the latest read of this thread ended with; it is forgotten.
 pub(crate) fn take_failed_read() -> Option<io::Error> {
     FAILED_READ.take()
-}
-
-fn copy(error: &io::Error) -> io::Error {
-    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
 }
 
 #[cfg(test)]
@@ -109,7 +108,7 @@ mod tests {
         let mut tries = 0;
         let once = with_retry(|| {
             tries += 1;
-            if tries == 1 { Err(io::Error::from_raw_os_error(INPUT_OUTPUT_ERROR)) } else { Ok(tries) }
+            if tries == 1 { Err(io::Error::from_raw_os_error(INPUT_OUTPUT_ERRORS[0])) } else { Ok(tries) }
         });
         assert_eq!((once.unwrap(), take_failed_read().is_none()), (2, true));
         with_retry(|| Err::<(), _>(io::ErrorKind::TimedOut.into())).unwrap_err();

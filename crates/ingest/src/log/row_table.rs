@@ -123,7 +123,7 @@ impl RowTable {
             // In a list a row is no sample.
             let wanted = if self.is_listed(&samples.leaf) { RowSelection::ALL } else { wanted };
             for file in &self.files {
-                file.append_numbers(&samples.leaf, wanted.offset(values.len()), &mut values)?;
+                file.append_numbers(&samples.leaf, wanted, &mut values)?;
             }
         } else {
             self.each(samples, &samples.leaf, |array| append(&samples.leaf, array, &mut values))?;

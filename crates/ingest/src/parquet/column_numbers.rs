@@ -31,8 +31,8 @@ pub(crate) fn append(
     into: &mut ColumnBuilder,
 ) -> std::result::Result<(), String> {
     caught(|| match chunk.column_type() {
-        Type::DOUBLE => append_typed::<DoubleType>(pages, chunk, wanted, into, |value| value),
-        _ => append_typed::<FloatType>(pages, chunk, wanted, into, f64::from),
+        Type::DOUBLE => append_typed::<DoubleType>(pages, chunk, wanted, into),
+        _ => append_typed::<FloatType>(pages, chunk, wanted, into),
     })
 }
 
@@ -41,17 +41,16 @@ fn append_typed<T: DataType>(
     chunk: &ColumnChunkMetaData,
     wanted: RowSelection<'_>,
     into: &mut ColumnBuilder,
-    number: impl Fn(T::T) -> f64,
 ) -> Result<()>
 where
-    T::T: Copy,
+    T::T: Copy + Into<f64>,
 {
     let column = chunk.column_descr_ptr();
     let is_nullable = column.max_def_level() == 1;
     let counts = pages.values();
     let mut reader = ColumnReaderImpl::<T>::new(column, Box::new(pages) as Box<dyn PageReader>);
     let (mut values, mut levels) = (Vec::with_capacity(BATCH), Vec::with_capacity(BATCH));
-    let (mut row, mut unwanted) = (0, 0);
+    let (mut row, mut unwanted) = (into.len(), 0);
     for count in counts {
         let end = row + count;
         if !wanted.intersects(row..end) {
@@ -68,12 +67,12 @@ where
                 return Ok(());
             }
             if levels.is_empty() || values.len() == levels.len() {
-                into.extend(values.iter().map(|value| number(*value)));
+                into.extend(values.iter().map(|value| (*value).into()));
             } else {
                 let mut present = values.iter();
                 let value = |level: &i16| (*level > 0).then(|| present.next()).flatten();
                 let value = levels.iter().map(value);
-                into.extend(value.map(|value| value.map_or(f64::NAN, |value| number(*value))));
+                into.extend(value.map(|value| value.map_or(f64::NAN, |value| (*value).into())));
             }
             row += read;
         }

@@ -6,9 +6,8 @@
 
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray, OffsetSizeTrait, UInt64Array, make_array};
-use arrow::buffer::{NullBuffer, OffsetBuffer};
-use arrow::compute::take;
+use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, UInt64Array};
+use arrow::compute::{nullif, take};
 use arrow::datatypes::{DataType, Field, Fields};
 
 use crate::error::ErrorKind;
@@ -51,10 +50,9 @@ fn walk(field: &Field, path: LeafColumn, found: &mut Vec<LeafColumn>) {
                 walk(field, LeafColumn { name, is_field: true, ..path.clone() }, found);
             }
         }
-        DataType::List(inner)
-        | DataType::LargeList(inner)
-        | DataType::FixedSizeList(inner, _)
-        | DataType::Map(inner, _) => walk(inner, LeafColumn { is_listed: true, ..path }, found),
+        DataType::List(inner) | DataType::Map(inner, _) => {
+            walk(inner, LeafColumn { is_listed: true, ..path }, found);
+        }
         kind => found.push(LeafColumn { index: found.len(), kind: kind.clone(), ..path }),
     }
 }
@@ -73,7 +71,7 @@ pub(crate) fn flatten(column: &ArrayRef) -> FlatLeaf {
     loop {
         values = match values.data_type() {
             DataType::Struct(_) => field_of(&values),
-            DataType::List(_) | DataType::LargeList(_) | DataType::FixedSizeList(..) | DataType::Map(..) => {
+            DataType::List(_) | DataType::Map(..) => {
                 let (inner, counts) = list_values(&values);
                 lengths = Some(lengths_per_outer_row(lengths, &counts));
                 inner
@@ -87,33 +85,20 @@ pub(crate) fn flatten(column: &ArrayRef) -> FlatLeaf {
 fn field_of(array: &ArrayRef) -> ArrayRef {
     let record = array.as_struct();
     let inner = record.column(0);
-    match NullBuffer::union(record.nulls(), inner.nulls()) {
-        None => Arc::clone(inner),
-        nulls => match inner.to_data().into_builder().nulls(nulls).build() {
-            Ok(data) => make_array(data),
-            Err(_) => Arc::clone(inner),
-        },
-    }
+    let hidden =
+        record.nulls().and_then(|nulls| nullif(inner, &BooleanArray::new(!nulls.inner(), None)).ok());
+    hidden.unwrap_or_else(|| Arc::clone(inner))
 }
 
-/// The values of all lists of an array, and how many each list holds.
+/// The values of all lists of an array, and how many each list holds. Without the Arrow schema of its writer, every list of
+/// a file is read as one of 32-bit offsets.
 fn list_values(array: &ArrayRef) -> (ArrayRef, Vec<usize>) {
-    if let Some(list) = array.as_list_opt::<i32>() {
-        between(list.offsets(), list.values())
-    } else if let Some(list) = array.as_list_opt::<i64>() {
-        between(list.offsets(), list.values())
-    } else if let Some(map) = array.as_map_opt() {
-        between(map.offsets(), map.entries())
-    } else {
-        let list = array.as_fixed_size_list();
-        let each = list.value_length() as usize;
-        (Arc::clone(list.values()), vec![each; list.len()])
-    }
-}
-
-fn between<O: OffsetSizeTrait>(offsets: &OffsetBuffer<O>, values: &dyn Array) -> (ArrayRef, Vec<usize>) {
+    let (offsets, values): (_, &dyn Array) = match array.as_map_opt() {
+        Some(map) => (map.offsets(), map.entries()),
+        None => (array.as_list::<i32>().offsets(), array.as_list::<i32>().values()),
+    };
     let lengths: Vec<usize> = offsets.lengths().collect();
-    (values.slice(offsets[0].as_usize(), lengths.iter().sum()), lengths)
+    (values.slice(offsets[0] as usize, lengths.iter().sum()), lengths)
 }
 
 /// Values for each outer row, when each of its inner rows holds so many.
@@ -153,6 +138,7 @@ pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<
 #[cfg(test)]
 mod tests {
     use arrow::array::{Float64Array, Int32Array, ListArray, StructArray};
+    use arrow::buffer::NullBuffer;
     use arrow::datatypes::{Float64Type, Int32Type};
 
     use super::*;

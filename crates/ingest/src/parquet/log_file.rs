@@ -21,7 +21,6 @@ use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
 use crate::io::foreign_format;
 use crate::io::read_at;
-use crate::io::transient;
 use crate::mapping::column_pattern::{composed, nearest};
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers;
@@ -95,15 +94,10 @@ impl LogFile {
 
     fn read_footer(path: &Path) -> Result<Self, ErrorKind> {
         let source = ByteSource::open(path)?;
-        let file = &source.file;
-        let length = transient::with_retry(|| file.metadata())?;
-        if length.is_dir() {
-            return Err(std::io::Error::from(std::io::ErrorKind::IsADirectory).into());
-        }
-        if length.len() == 0 {
+        if read_at::file_length(&source.file)? == 0 {
             return Err(ErrorKind::Empty);
         }
-        let read = raw_footer::read(file, |range| source.want(once(range)));
+        let read = raw_footer::read(&source.file, |range| source.want(once(range)));
         let Footer { metadata, start: footer_start, claims } =
             read.map_err(|error| footer_error(&source, error))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
@@ -304,8 +298,8 @@ impl LogFile {
         self.want(&[leaf], |_| true)?;
         let mut rows = 0;
         for group in self.groups() {
-            let (declared, wanted) = (self.rows_of(group), wanted.offset(rows));
-            if !wanted.intersects(0..declared) {
+            let declared = self.rows_of(group);
+            if !wanted.intersects(into.len()..into.len().saturating_add(declared)) {
                 if declared > self.rows().saturating_sub(rows) {
                     return self.all_rows(rows.saturating_add(declared), name);
                 }

@@ -80,7 +80,9 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
         if !page.is_dictionary() {
             values = values.saturating_add(page.values.into());
         }
-        found.push(page);
+        if page.header.type_ != PageType::INDEX_PAGE {
+            found.push(page);
+        }
     }
     if values != chunk.num_values() || (is_flat && values != rows) {
         let declared = if is_flat { rows } else { chunk.num_values() };

@@ -139,10 +139,9 @@ impl Pages {
     pub(crate) fn new(
         file: Arc<File>,
         chunk: &ColumnChunkMetaData,
-        mut pages: Vec<RawPage>,
+        pages: Vec<RawPage>,
         batch_rows: usize,
     ) -> Self {
-        pages.retain(|page| page.header.type_ != PageType::INDEX_PAGE);
         Self { file, chunk: chunk.clone(), pages: pages.into_iter(), batch_rows, stored: Vec::new() }
     }
 
@@ -274,66 +273,68 @@ fn encoding(raw: RawEncoding) -> Result<Encoding> {
 /// Appends what `packed` unpacks to until `into` holds one byte more than the page claims.
 fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) -> Result<()> {
     let left = size - into.len();
-    let mut stream = |stream: &mut dyn Read| stream.take(left as u64 + 1).read_to_end(into).map(drop);
-    match codec {
-        Compression::GZIP(_) => stream(&mut MultiGzDecoder::new(packed))?,
+    let unpacked = match codec {
+        Compression::GZIP(_) => stream(left, into, MultiGzDecoder::new(packed)),
         Compression::BROTLI(_) => {
-            stream(&mut brotli::Decompressor::new(packed, left.clamp(1, 1 << 16)))?;
+            stream(left, into, brotli::Decompressor::new(packed, left.clamp(1, 1 << 16)))
         }
-        Compression::LZ4 => {
-            let mut blocks = vec![0; left];
-            if hadoop_blocks(packed, &mut blocks).is_some() {
-                into.append(&mut blocks);
-            } else if stream(&mut frame::FrameDecoder::new(packed)).is_err() {
-                into.truncate(size - left);
-                fixed(left, into, |out| block::decompress_into(packed, out).ok())?;
-            }
-        }
-        Compression::LZ4_RAW => fixed(left, into, |out| block::decompress_into(packed, out).ok())?,
+        Compression::LZ4 => fixed(left, into, |out| hadoop_blocks(packed, out))
+            .or_else(|| stream(left, into, frame::FrameDecoder::new(packed)))
+            .or_else(|| fixed(left, into, |out| block::decompress_into(packed, out).ok())),
+        Compression::LZ4_RAW => fixed(left, into, |out| block::decompress_into(packed, out).ok()),
         Compression::SNAPPY => {
-            fixed(left, into, |out| snap::raw::Decoder::new().decompress(packed, out).ok())?;
+            fixed(left, into, |out| snap::raw::Decoder::new().decompress(packed, out).ok())
         }
-        Compression::ZSTD(_) => {
-            // Into fresh memory, which need not be set to zeros: no more than its capacity is filled.
-            let unpacked = ZSTD.with_borrow_mut(|zstd| {
-                if zstd.is_none() {
-                    *zstd = Decompressor::new().ok();
-                }
-                zstd.as_mut()?.decompress(packed, left).ok()
-            });
-            match unpacked {
-                Some(unpacked) if into.is_empty() => *into = unpacked,
-                Some(unpacked) => into.extend(unpacked),
-                None => return fail("a page cannot be unpacked to the size that it claims"),
-            }
-        }
+        Compression::ZSTD(_) => zstd(left, into, packed),
         other @ (Compression::UNCOMPRESSED | Compression::LZO) => {
             return fail(format!("its compression {other} is not read"));
         }
-    }
-    Ok(())
+    };
+    unpacked.map_or_else(|| fail("a page cannot be unpacked to the size that it claims"), Ok)
 }
 
-/// Appends as many bytes as are unpacked into a buffer of this size.
-fn fixed(left: usize, into: &mut Vec<u8>, unpack: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<()> {
+/// Appends as many bytes as are unpacked into a buffer of this size, or nothing.
+fn fixed(left: usize, into: &mut Vec<u8>, unpack: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<()> {
     let before = into.len();
     into.resize(before + left, 0);
-    let Some(bytes) = unpack(&mut into[before..]) else {
-        return fail("a page cannot be unpacked to the size that it claims");
-    };
-    into.truncate(before + bytes);
-    Ok(())
+    let bytes = unpack(&mut into[before..]);
+    into.truncate(before + bytes.unwrap_or(0));
+    bytes.map(drop)
+}
+
+/// Appends at most one byte more than are left, or nothing.
+fn stream(left: usize, into: &mut Vec<u8>, unpacked: impl Read) -> Option<()> {
+    let before = into.len();
+    let read = unpacked.take(left as u64 + 1).read_to_end(into);
+    read.inspect_err(|_| into.truncate(before)).ok().map(drop)
+}
+
+/// Into fresh memory, which need not be set to zeros: no more than its capacity is filled.
+fn zstd(left: usize, into: &mut Vec<u8>, packed: &[u8]) -> Option<()> {
+    let mut unpacked = ZSTD.with_borrow_mut(|zstd| {
+        if zstd.is_none() {
+            *zstd = Decompressor::new().ok();
+        }
+        zstd.as_mut()?.decompress(packed, left).ok()
+    })?;
+    if into.is_empty() {
+        *into = unpacked;
+    } else {
+        into.append(&mut unpacked);
+    }
+    Some(())
 }
 
 /// Hadoop's form of LZ4: blocks, each after its two sizes. `None` where the blocks do not fill the buffer exactly.
-fn hadoop_blocks(mut packed: &[u8], mut out: &mut [u8]) -> Option<()> {
+fn hadoop_blocks(mut packed: &[u8], mut out: &mut [u8]) -> Option<usize> {
+    let size = out.len();
     while !packed.is_empty() {
-        let (size, rest) = packed.split_first_chunk()?;
+        let (unpacked, rest) = packed.split_first_chunk()?;
         let (stored, rest) = rest.split_first_chunk()?;
         let (block, rest) = rest.split_at_checked(u32::from_be_bytes(*stored) as usize)?;
-        let (filled, free) = out.split_at_mut_checked(u32::from_be_bytes(*size) as usize)?;
+        let (filled, free) = out.split_at_mut_checked(u32::from_be_bytes(*unpacked) as usize)?;
         (block::decompress_into(block, filled).ok()? == filled.len()).then_some(())?;
         (packed, out) = (rest, free);
     }
-    out.is_empty().then_some(())
+    out.is_empty().then_some(size)
 }

@@ -16,6 +16,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{self, Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
 
 use crate::error::{Error, ErrorKind};
 use crate::parquet::page_crc;
@@ -141,14 +142,12 @@ fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Enco
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_created_by(concat!("freeplay ", env!("CARGO_PKG_VERSION")).to_owned());
     for field in batch.schema().fields() {
-        if matches!(field.data_type(), DataType::Float64 | DataType::Float32) {
-            let path = parquet::schema::types::ColumnPath::from(field.name().as_str());
-            builder = match encoding {
-                Encoding::Split => builder
-                    .set_column_dictionary_enabled(path.clone(), false)
-                    .set_column_encoding(path, basic::Encoding::BYTE_STREAM_SPLIT),
-                Encoding::Compatible => builder.set_column_dictionary_enabled(path, true),
-            };
+        let is_number = matches!(field.data_type(), DataType::Float64 | DataType::Float32);
+        if is_number && encoding == Encoding::Split {
+            let path = ColumnPath::from(field.name().as_str());
+            builder = builder
+                .set_column_dictionary_enabled(path.clone(), false)
+                .set_column_encoding(path, basic::Encoding::BYTE_STREAM_SPLIT);
         }
     }
     builder.build()

@@ -407,12 +407,6 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_cuts_the_log_in_two() {
-        let line = line(&[0.0, 0.1, 0.2, 5.0, 5.1, 5.2], &usual()).unwrap();
-        assert_eq!(line.segments, [0..3, 3..6]);
-    }
-
-    #[test]
     fn repeated_missing_and_swapped_stamps_are_mended_and_counted() {
         let line = line(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
         assert_eq!(line.kept, Some(vec![0, 2, 1, 5]));

@@ -67,9 +67,8 @@ impl TickFormat {
 pub(crate) struct TimestampParser<'a> {
     column: &'a str,
     ticks: TickFormat,
-    /// The first tick of all: a whole number, or a real one.
+    /// The first tick, if it is a whole number.
     first_whole: Option<i64>,
-    first_real: Option<f64>,
     turns: f64,
     before: f64,
     /// Seconds since the first stamp; of real ticks the ticks themselves, until all are there.
@@ -79,7 +78,7 @@ pub(crate) struct TimestampParser<'a> {
 impl<'a> TimestampParser<'a> {
     pub(crate) fn new(column: &'a str, ticks: TickFormat, rows: usize) -> Self {
         let seconds = Vec::with_capacity(rows.min(1 << 26));
-        Self { column, ticks, first_whole: None, first_real: None, turns: 0.0, before: f64::NAN, seconds }
+        Self { column, ticks, first_whole: None, turns: 0.0, before: f64::NAN, seconds }
     }
 
     pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), ErrorKind> {
@@ -146,30 +145,29 @@ impl<'a> TimestampParser<'a> {
         ticks / self.ticks.per_second
     }
 
-    /// Real ticks become seconds in their place.
-    fn convert_reals(&mut self) {
+    /// Real ticks become seconds in their place; returns the first one.
+    fn convert_reals(&mut self) -> Option<f64> {
         let mut ticks = std::mem::take(&mut self.seconds);
-        self.first_real = ticks.iter().copied().find(|tick| tick.is_finite());
-        let first = self.first_real.unwrap_or(f64::NAN);
+        let first = ticks.iter().copied().find(|tick| tick.is_finite());
         for tick in &mut ticks {
-            *tick = if tick.is_finite() { self.second_of(*tick - first) } else { f64::NAN };
+            *tick = match first {
+                Some(first) if tick.is_finite() => self.second_of(*tick - first),
+                _ => f64::NAN,
+            };
         }
         self.seconds = ticks;
+        first
     }
 
     pub(crate) fn stamps(mut self) -> Timestamps {
-        if !self.ticks.is_whole {
-            self.convert_reals();
-        }
         let per_second = self.ticks.per_second;
-        let (first_s, first_ns) = match (self.first_whole, self.first_real.map(|first| first / per_second)) {
-            (Some(first), _) => {
-                (first as f64 / per_second, Some(i128::from(first) * (1e9 / per_second) as i128))
-            }
-            (None, real_s) => (real_s.unwrap_or(0.0), real_s.map(|first_s| (first_s * 1e9) as i128)),
-        };
+        let whole = |first: i64| (first as f64 / per_second, i128::from(first) * (1e9 / per_second) as i128);
+        let real = |first: f64| (first / per_second, (first / per_second * 1e9) as i128);
+        let first =
+            if self.ticks.is_whole { self.first_whole.map(whole) } else { self.convert_reals().map(real) };
+        let first_s = first.map_or(0.0, |(first_s, _)| first_s);
         let zero_ns = 1_000_000_000 * i128::from(self.ticks.zero_s);
-        let instant = || Timestamp::from_nanosecond(first_ns? + zero_ns).ok();
+        let instant = || Timestamp::from_nanosecond(first?.1 + zero_ns).ok();
         let origin = match self.ticks.origin {
             TickEpoch::Utc => instant().map(TimeOrigin::Utc),
             TickEpoch::Local => instant().map(TimeOrigin::Local),
