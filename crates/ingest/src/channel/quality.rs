@@ -36,18 +36,16 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Describes a channel; missing samples are NaN, and so many of them are not asked for.
-    pub(crate) fn of(values: &[f64], segments: &[Range<usize>], step_s: f64, apart: usize) -> Self {
-        Self::seen((values, segments), &ChannelStats::of(values), step_s, apart)
-    }
-
-    /// As [`Quality::of`], with channel statistics that exist already.
-    pub(crate) fn seen(
-        (values, segments): (&[f64], &[Range<usize>]),
-        seen: &ChannelStats,
+    /// Describes a channel, by its statistics where they exist already; missing samples are NaN, and `apart` of them were
+    /// left out by a filter.
+    pub(crate) fn of(
+        values: &[f64],
+        segments: &[Range<usize>],
+        seen: Option<ChannelStats>,
         step_s: f64,
         apart: usize,
     ) -> Self {
+        let seen = &seen.unwrap_or_else(|| ChannelStats::of(values));
         let (samples, missing) = (values.len() - apart, seen.missing - apart);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);
@@ -391,7 +389,7 @@ mod tests {
     }
 
     fn described(values: &[f64], step_s: f64, apart: usize) -> Quality {
-        Quality::of(values, std::slice::from_ref(&(0..values.len())), step_s, apart)
+        Quality::of(values, std::slice::from_ref(&(0..values.len())), None, step_s, apart)
     }
 
     fn wave(amplitude: f64) -> Vec<f64> {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use records::Position;
 
 use crate::channel::quality::{self, Quality};
-use crate::channel::stats::{ChannelStats, span};
+use crate::channel::stats::span;
 use crate::channel::turns::{TurnEvidence, restore_turns};
 use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
@@ -40,10 +40,8 @@ pub(crate) fn assemble(
         flags.extend(restored(Role::Motor, &mut motor, &screw, &load, &segments));
         flags.extend(restored(Role::Screw, &mut screw, &motor, &load, &segments));
     }
-    let quality = [&motor, &screw, &load].map(|read| {
-        let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
-        Quality::seen((&read.values, &segments), &seen, line.step_s, apart)
-    });
+    let quality = [&motor, &screw, &load]
+        .map(|read| Quality::of(&read.values, &segments, read.seen, line.step_s, apart));
     let columns = [motor.column, screw.column, load.column];
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::quality_flags(&quality, line.step_s));

@@ -96,7 +96,7 @@ impl Normalized {
         }
         let quality = read
             .each_ref()
-            .map(|(values, seen)| Quality::seen((values, &self.segments), seen, self.step_s, self.apart));
+            .map(|(values, seen)| Quality::of(values, &self.segments, Some(*seen), self.step_s, self.apart));
         let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
         Ok(ActuatorChannels {
             position,

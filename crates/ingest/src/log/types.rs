@@ -86,7 +86,7 @@ impl ActuatorChannels {
 
     /// What δX looks like.
     pub fn dx_quality(&self) -> Quality {
-        Quality::of(&self.dx_m, &self.segments, self.step_s, self.apart)
+        Quality::of(&self.dx_m, &self.segments, None, self.step_s, self.apart)
     }
 
     /// Leaves the memory of its channels to the next actuator that this thread reads.

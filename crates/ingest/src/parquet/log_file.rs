@@ -243,26 +243,19 @@ impl LogFile {
         mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        let groups = self.groups();
-        let wanted: Vec<bool> = groups.clone().map(scan.wants_group).collect();
-        self.want(&leaves, |group| wanted[group])?;
-        let mut rows = 0_usize;
-        for group in groups {
-            if !wanted[group] {
-                rows = rows.saturating_add(self.rows_of(group));
-                continue;
-            }
+        let wanted: Vec<usize> = self.groups().filter(|group| (scan.wants_group)(*group)).collect();
+        self.want(&leaves, wanted.iter().copied())?;
+        for group in wanted {
             let mut scan = scan;
             for leaf in &leaves {
                 let pages = self.pages(group, leaf)?;
                 scan.batch_rows = page_reader::batch_rows(self.chunk(group, leaf), &pages, scan.batch_rows);
             }
-            let read = self.each_row_group(group, &leaves, scan, |columns| {
+            self.each_batch(group, &leaves, scan, |columns| {
                 take(names, columns.iter().map(leaf_columns::flatten).collect())
             })?;
-            rows = rows.saturating_add(read);
         }
-        self.all_rows(rows, names.first().copied().unwrap_or_default())
+        Ok(())
     }
 
     /// The least and the greatest text of a column in each row group, as far as its statistics hold them; both are
@@ -295,51 +288,48 @@ impl LogFile {
         into: &mut ColumnBuilder,
     ) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
-        self.want(&[leaf], |_| true)?;
-        let mut rows = 0;
+        self.want(&[leaf], self.groups())?;
         for group in self.groups() {
-            let declared = self.rows_of(group);
-            if !wanted.intersects(into.len()..into.len().saturating_add(declared)) {
-                if declared > self.rows().saturating_sub(rows) {
-                    return self.all_rows(rows.saturating_add(declared), name);
-                }
+            let (before, declared) = (into.len(), self.rows_of(group));
+            if !wanted.intersects(before..before + declared) {
                 into.append_nulls(declared);
-                rows += declared;
                 continue;
             }
-            let (pages, before, chunk) = (self.pages(group, leaf)?, into.len(), self.chunk(group, leaf));
+            let (pages, chunk) = (self.pages(group, leaf)?, self.chunk(group, leaf));
             if column_numbers::is_plain(chunk) {
                 let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
                 column_numbers::append(pages, chunk, wanted, into)
                     .map_err(|detail| self.decode(leaf, group, detail))?;
-                rows += into.len() - before;
-                continue;
+                self.all_rows(group, into.len() - before, leaf)?;
+            } else {
+                self.each_batch(group, &[leaf], Scan::PLAIN, |columns| {
+                    append(name, &leaf_columns::flatten(&columns[0]).values, into)
+                })?;
             }
-            rows += self.each_row_group(group, &[leaf], Scan::PLAIN, |columns| {
-                append(name, &leaf_columns::flatten(&columns[0]).values, into)
-            })?;
         }
-        self.all_rows(rows, name)
+        Ok(())
     }
 
-    /// Checks that the declared number of rows was read.
-    fn all_rows(&self, rows: usize, column: &str) -> Result<(), Error> {
-        if rows == self.rows() {
+    /// Checks that as many rows of a row group were read as it declares.
+    fn all_rows(&self, group: usize, rows: usize, leaf: &LeafColumn) -> Result<(), Error> {
+        let declared = self.rows();
+        let found = declared - self.rows_of(group) + rows;
+        if found == declared {
             return Ok(());
         }
-        let (found, declared, column) = (rows as u64, self.rows() as u64, column.to_owned());
+        let (found, declared, column) = (found as u64, declared as u64, leaf.name.clone());
         Err(self.error(ErrorKind::RowCount { column, found, declared }))
     }
 
     /// Steps through one row group's leaves, each by its own reader: two fields of one struct would
     /// otherwise come back as one column.
-    fn each_row_group(
+    fn each_batch(
         &self,
         group: usize,
         leaves: &[&LeafColumn],
         scan: Scan<'_>,
         mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
-    ) -> Result<usize, Error> {
+    ) -> Result<(), Error> {
         let mut columns =
             leaves.iter().map(|leaf| self.column(group, leaf, scan)).collect::<Result<Vec<_>, _>>()?;
         let mut rows = 0;
@@ -350,7 +340,7 @@ impl LogFile {
                 let next = next.map_err(|detail| self.decode(leaf, group, detail))?;
                 batch.extend(next.map(|found| Arc::clone(found.column(0))));
             }
-            let Some(first) = batch.first() else { return Ok(rows) };
+            let Some(first) = batch.first() else { return self.all_rows(group, rows, leaves[0]) };
             if batch.len() < leaves.len() || batch.iter().any(|a| a.len() != first.len()) {
                 let detail = "its leaves hold different numbers of rows".to_owned();
                 return Err(self.decode(leaves[0], group, detail));
@@ -372,12 +362,8 @@ impl LogFile {
         let schema = footer.parquet_schema();
         let mask = ProjectionMask::leaves(schema, [leaf.index]);
         let hint = is_coded.then(|| footer.schema().fields());
-        let groups = BoundedGroups::new(
-            Arc::clone(&self.source.file),
-            footer.metadata(),
-            vec![group],
-            scan.batch_rows,
-        );
+        let (file, groups) = (Arc::clone(&self.source.file), vec![group]);
+        let groups = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: scan.batch_rows };
         parquet_to_arrow_field_levels(schema, mask, hint)
             .and_then(|levels| {
                 ParquetRecordBatchReader::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
@@ -395,13 +381,8 @@ impl LogFile {
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
-        self.want(&[leaf], |_| true)?;
-        let mut rows = 0_usize;
-        for group in self.groups() {
-            self.pages(group, leaf)?;
-            rows = rows.saturating_add(self.rows_of(group));
-        }
-        self.all_rows(rows, name)
+        self.want(&[leaf], self.groups())?;
+        self.groups().try_for_each(|group| self.pages(group, leaf).map(drop))
     }
 
     /// Row groups of the file.
@@ -424,7 +405,7 @@ impl LogFile {
     /// Whether every page of these leaves carries a checksum.
     pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        self.want(&leaves, |_| true)?;
+        self.want(&leaves, self.groups())?;
         for group in self.groups() {
             for leaf in &leaves {
                 if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
@@ -440,8 +421,7 @@ impl LogFile {
     }
 
     /// Fetches the chunks of these leaves in some row groups.
-    fn want(&self, leaves: &[&LeafColumn], wants_group: impl Fn(usize) -> bool) -> Result<(), Error> {
-        let groups = self.groups().filter(|group| wants_group(*group));
+    fn want(&self, leaves: &[&LeafColumn], groups: impl Iterator<Item = usize>) -> Result<(), Error> {
         let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
         self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
     }
@@ -469,12 +449,11 @@ impl LogFile {
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
-        self.want(&wanted, |_| true)?;
+        self.want(&wanted, self.groups())?;
         for group in self.groups() {
             for leaf in &wanted {
-                let (start, bytes) = self.chunk(group, leaf).byte_range();
-                let end = length.min(start.saturating_add(bytes));
-                digest.take(file, start..end).map_err(unreadable)?;
+                let Range { start, end } = range_of(self.chunk(group, leaf));
+                digest.take(file, start..length.min(end)).map_err(unreadable)?;
             }
         }
         digest.take(file, self.footer_start..length).map_err(unreadable)?;

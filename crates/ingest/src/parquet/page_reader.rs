@@ -37,24 +37,14 @@ fn fail<T>(detail: impl Into<String>) -> Result<T> {
 /// Some row groups of a file, whose pages keep to their claims.
 #[derive(Debug)]
 pub(crate) struct BoundedGroups<'m> {
-    file: Arc<File>,
-    metadata: &'m ParquetMetaData,
-    groups: Vec<usize>,
-    batch_rows: usize,
+    pub(crate) file: Arc<File>,
+    pub(crate) metadata: &'m ParquetMetaData,
+    pub(crate) groups: Vec<usize>,
+    /// Most rows of a batch.
+    pub(crate) batch_rows: usize,
 }
 
 impl<'m> BoundedGroups<'m> {
-    pub(crate) fn new(
-        file: Arc<File>,
-        metadata: &'m ParquetMetaData,
-        groups: Vec<usize>,
-        batch_rows: usize,
-    ) -> Self {
-        let groups = Self { file, metadata, groups, batch_rows };
-        // A table of few rows may hold long texts.
-        Self { batch_rows: batch_rows.min(groups.num_rows()), ..groups }
-    }
-
     fn chosen(&self) -> impl Iterator<Item = &'m RowGroupMetaData> {
         self.groups.iter().map(|group| self.metadata.row_group(*group))
     }
@@ -68,7 +58,8 @@ impl RowGroups for BoundedGroups<'_> {
     fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
         let chunks: Vec<_> =
             self.chosen().map(|group| (group.column(column).clone(), group.num_rows())).collect();
-        let (file, batch_rows) = (Arc::clone(&self.file), self.batch_rows);
+        // A table of few rows may hold long texts.
+        let (file, batch_rows) = (Arc::clone(&self.file), self.batch_rows.min(self.num_rows()));
         Ok(Box::new(Chunks(chunks.into_iter().map(move |(chunk, rows)| {
             let pages = page_header::bounded(&file, &chunk, rows).map_err(ParquetError::General)?;
             Ok(Box::new(Pages::new(Arc::clone(&file), &chunk, pages, batch_rows)) as Box<dyn PageReader>)

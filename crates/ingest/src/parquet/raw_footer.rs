@@ -57,6 +57,10 @@ pub(crate) fn read(
     bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
     bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
     bounds::check_rows("rows", claims.rows, length)?;
+    if claims.group_rows != claims.rows {
+        let Claims { rows, group_rows, .. } = claims;
+        return Err(not_parquet(format!("its row groups claim {group_rows} rows, and its footer {rows}")));
+    }
     if claims.encoding > HIGHEST_ENCODING {
         let number = claims.encoding;
         let encoding = if number == ALP { "ALP".to_owned() } else { format!("number {number}") };
@@ -86,7 +90,9 @@ pub(crate) struct Claims {
     depth: usize,
     /// Column chunks of all row groups.
     chunks: u64,
+    /// Rows of the file, and those of all row groups together.
     rows: u64,
+    group_rows: u64,
     /// The highest number of an encoding.
     encoding: i64,
     /// Whether the whole file is encrypted.
@@ -139,6 +145,10 @@ impl Thrift<'_> {
         match self.path[..] {
             [2, ELEMENT, 5] => self.children = number,
             [3] => self.claims.rows = u64::try_from(number).unwrap_or(0),
+            [4, ELEMENT, 3] => {
+                let group_rows = self.claims.group_rows.checked_add(u64::try_from(number).ok()?)?;
+                self.claims.group_rows = group_rows;
+            }
             [4, ELEMENT, 1, ELEMENT, 3, 2, ELEMENT] => {
                 self.claims.encoding = self.claims.encoding.max(number);
             }

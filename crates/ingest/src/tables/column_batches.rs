@@ -262,7 +262,8 @@ fn groups(
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
-    let rows = BoundedGroups::new(Arc::clone(file), footer.metadata(), groups.collect(), ROWS);
+    let (file, groups) = (Arc::clone(file), groups.collect());
+    let rows = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: ROWS };
     let mut reader = caught(|| {
         let hint = Some(footer.schema().fields());
         let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;
