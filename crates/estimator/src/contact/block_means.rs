@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::Samples;
 use crate::contact::codes::Rejection;
-use crate::contact::friction::friction_model::{Drive, FrictionState};
+use crate::contact::friction::friction_model::{Coupling, Drive, FrictionState};
 use crate::contact::stats::{LOOKS, middle_and_half};
 use crate::contact::types::{PartPrior, SHORTEST_S};
 use crate::gap::load_band::{quantiles, reversals};
@@ -28,8 +28,8 @@ pub(crate) struct BlockMeans {
     speed_reach: usize,
     /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
     is_calm: bool,
-    /// The block at which each segment starts.
-    pub(crate) starts: Vec<usize>,
+    /// The blocks of each segment.
+    pub(crate) segments: Vec<Range<usize>>,
     /// Middle of each block, s from the first sample of the log.
     pub(crate) time_s: Vec<f64>,
     /// X₁, m.
@@ -48,6 +48,8 @@ pub(crate) struct BlockMeans {
     logged_n: Vec<f64>,
     /// Sine and cosine of the screw's position within the period of its errors; empty where no period is configured.
     pub(crate) phases: Vec<[f64; 2]>,
+    /// The coupling at each block, once it is integrated.
+    pub(crate) couplings: Vec<Coupling>,
 }
 
 impl BlockMeans {
@@ -65,13 +67,14 @@ impl BlockMeans {
             [longest_step(samples.dx_m, samples.segments)?, longest_step(samples.load_n, samples.segments)?];
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
-            self.starts.push(self.len());
+            let first = self.len();
             let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
             for start in (segment.start..end).step_by(each) {
                 self.time_s.push(middle_s(start));
                 self.push(mean(samples, start..start + each, steps));
             }
+            self.segments.push(first..self.len());
         }
         self.is_calm = is_calm;
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
@@ -87,12 +90,12 @@ impl BlockMeans {
 
     /// No block, and room for so many.
     fn clear(&mut self, blocks: usize, period_s: f64) {
-        let Self { starts, time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n, .. } = self;
+        let Self { segments, time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n, .. } = self;
         for column in [time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n] {
             column.clear();
             column.reserve(blocks);
         }
-        starts.clear();
+        segments.clear();
         self.phases.clear();
         (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
         self.speed_reach = ((SPEED_S / period_s).round() as usize).max(1);
@@ -155,12 +158,6 @@ impl BlockMeans {
         self.time_s.len()
     }
 
-    /// The blocks of each segment.
-    pub(crate) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
-        let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(self.len()));
-        self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
-    }
-
     /// The number of the stretch of 2 s that contains a block: residuals within it are taken as dependent.
     pub(crate) fn stretch(&self, k: usize) -> u32 {
         (self.time_s[k] / 2.0) as u32
@@ -198,10 +195,10 @@ impl BlockMeans {
         let windows = if whole.is_longer(most) {
             whole.windows(load_n, most / WINDOW_BLOCKS)
         } else {
-            whole.segments().collect()
+            whole.segments.clone()
         };
         for window in windows {
-            self.starts.push(self.len());
+            let first = self.len();
             for (taken, column) in [
                 (&mut self.time_s, &whole.time_s),
                 (&mut self.motor_m, &whole.motor_m),
@@ -211,6 +208,7 @@ impl BlockMeans {
             ] {
                 taken.extend(column[window.clone()].chunks_exact(count).map(mean_of_sound));
             }
+            self.segments.push(first..self.len());
         }
         self.dx_m.resize(self.len(), f64::NAN);
         self.load_n.resize(self.len(), f64::NAN);
@@ -220,11 +218,11 @@ impl BlockMeans {
     /// 95 % load on either side, the other evenly among the rest. The load alone selects, so that what is estimated does
     /// not select its own data.
     fn windows(&self, load_n: f64, count: usize) -> Vec<Range<usize>> {
-        let of_segment = |segment: Range<usize>| {
+        let of_segment = |segment: &Range<usize>| {
             let starts = segment.clone().step_by(WINDOW_BLOCKS).take(segment.len() / WINDOW_BLOCKS);
             starts.map(|from| from..from + WINDOW_BLOCKS)
         };
-        let mut chosen: Vec<Range<usize>> = self.segments().flat_map(of_segment).collect();
+        let mut chosen: Vec<Range<usize>> = self.segments.iter().flat_map(of_segment).collect();
         chosen.sort_by_cached_key(|window| {
             std::cmp::Reverse(reversals(&self.logged_n[window.clone()], 0.15 * load_n))
         });
@@ -246,12 +244,14 @@ impl BlockMeans {
     /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
     /// three channels belong to one moment.
     pub(crate) fn apply_delays(&mut self, state: &FrictionState) {
-        // Nothing is read across the end of a segment.
-        let segments: Vec<Range<usize>> = self.segments().collect();
-        for segment in segments {
-            let (screw_m, logged_n) = (&self.screw_m[segment.clone()], &self.logged_n[segment.clone()]);
-            read_later(screw_m, state.skew_s / self.period_s, &mut self.dx_m[segment.clone()]);
-            read_later(logged_n, state.load_delay_s / self.period_s, &mut self.load_n[segment]);
+        for (logged, delay_s, read) in [
+            (&self.screw_m, state.skew_s, &mut self.dx_m),
+            (&self.logged_n, state.load_delay_s, &mut self.load_n),
+        ] {
+            // Nothing is read across the end of a segment.
+            for segment in &self.segments {
+                read_later(&logged[segment.clone()], delay_s / self.period_s, &mut read[segment.clone()]);
+            }
         }
         self.dx_m.iter_mut().zip(&self.motor_m).for_each(|(dx, x)| *dx -= x);
     }

@@ -1,7 +1,7 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
 use crate::contact::block_means::BlockMeans;
-use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP, RowSource};
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::flank::Flank;
@@ -36,7 +36,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
         let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
         let on_branch_m = || {
-            RowSource { blocks, scaling }.without_slow_parts_m(k, &contact.line.fit.beta)
+            blocks.without_slow_parts_m(scaling, k, &contact.line.fit.beta)
                 - load_n * contact.compliance_m_per_n.0
         };
         is_on_branch.then(on_branch_m).filter(|m| m.is_finite()).map(|m| (m, blocks.stretch(k)))

@@ -60,32 +60,25 @@ pub(crate) struct DesignMatrix {
     pub(crate) light: Vec<DesignRow<COLUMNS>>,
 }
 
-/// Where rows are made from: blocks and the scales.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RowSource<'a> {
-    pub(crate) blocks: &'a BlockMeans,
-    pub(crate) scaling: &'a Scaling,
-}
-
 #[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
-impl RowSource<'_> {
+impl BlockMeans {
     /// Rows of all blocks that keep their flank, none of which mixes flank and gap.
     ///
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
     /// full or its stretch ends.
-    pub(crate) fn rows(&self, couplings: &[Coupling]) -> DesignMatrix {
-        let Self { blocks, scaling } = self;
-        let most = scaling.row_blocks(blocks.period_s);
-        let firm = Vec::with_capacity(blocks.len() / most);
+    pub(crate) fn rows(&self, scaling: &Scaling) -> DesignMatrix {
+        let most = scaling.row_blocks(self.period_s);
+        let firm = Vec::with_capacity(self.len() / most);
         let (mut design, most) = (DesignMatrix { firm, light: Vec::new() }, most as f64);
         // Of the lower and the upper flank, lightly and firmly touched.
         let mut open = [DesignRow::ZERO; 4];
         let firm_n = FIRM_SHARE * scaling.load_n;
         let (mut stretch, mut last) = (0, (0, 0));
-        for segment in blocks.segments() {
-            for (k, around) in (segment.start + BEFORE..).zip(couplings[segment].array_windows()) {
-                let Some(kind) = touch(around, firm_n).filter(|_| blocks.is_complete(k)) else { continue };
-                let here = blocks.stretch(k);
+        for segment in &self.segments {
+            for (k, around) in (segment.start + BEFORE..).zip(self.couplings[segment.clone()].array_windows())
+            {
+                let Some(kind) = touch(around, firm_n).filter(|_| self.is_complete(k)) else { continue };
+                let here = self.stretch(k);
                 if here != stretch {
                     open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
                     stretch = here;
@@ -96,7 +89,7 @@ impl RowSource<'_> {
                 if open[kind].blocks >= full {
                     design.close(kind, &mut open[kind]);
                 }
-                open[kind].add(&self.row(k, &couplings[k]));
+                open[kind].add(&self.row(scaling, k));
             }
         }
         open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
@@ -105,36 +98,34 @@ impl RowSource<'_> {
 
     /// The row of one complete block.
     #[inline(always)]
-    pub(crate) fn row(&self, k: usize, coupling: &Coupling) -> DesignRow<COLUMNS> {
-        let [a, b, c, d, e, f, g] = self.coupling_columns(k, coupling);
-        let [h, i, j, l, m, n, o, p, q] = self.slow_columns(k);
+    pub(crate) fn row(&self, scaling: &Scaling, k: usize) -> DesignRow<COLUMNS> {
+        let [a, b, c, d, e, f, g] = self.coupling_columns(scaling, k);
+        let [h, i, j, l, m, n, o, p, q] = self.slow_columns(scaling, k);
         let x = [1.0, a, b, c, d, e, f, g, h, i, j, l, m, n, o, p, q];
-        DesignRow { x, y_m: self.blocks.dx_m[k], blocks: 1.0, stretch: self.blocks.stretch(k) }
+        DesignRow { x, y_m: self.dx_m[k], blocks: 1.0, stretch: self.stretch(k) }
     }
 
     /// The columns from [`GAP`] to [`FORCE_DRIFT`].
     #[inline]
-    pub(crate) fn coupling_columns(&self, k: usize, coupling: &Coupling) -> [f64; SPEED - GAP] {
-        let Self { blocks, scaling } = self;
-        let Coupling { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, .. } = *coupling;
+    pub(crate) fn coupling_columns(&self, scaling: &Scaling, k: usize) -> [f64; SPEED - GAP] {
+        let Coupling { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, .. } = self.couplings[k];
         let side = if force_n == 0.0 { 0.0 } else { 0.5 * force_n.signum() };
         let [force, loss, stribeck] =
             [force_n, dforce_dloss_n, dforce_dstribeck_n].map(|n| n * scaling.per_load);
-        [side, force, force.abs(), dforce_ddry, loss, stribeck, force * scaling.time_share(blocks.time_s[k])]
+        [side, force, force.abs(), dforce_ddry, loss, stribeck, force * scaling.time_share(self.time_s[k])]
     }
 
     /// The columns from [`SPEED`] on, of a block that has neighbours.
     #[inline(always)]
-    fn slow_columns(&self, k: usize) -> [f64; COLUMNS - SPEED] {
-        let Self { blocks, scaling } = self;
-        let rate = |values: &[f64]| (values[k + 1] - values[k - 1]) * blocks.per_two_s;
-        let time = scaling.time_share(blocks.time_s[k]);
+    fn slow_columns(&self, scaling: &Scaling, k: usize) -> [f64; COLUMNS - SPEED] {
+        let rate = |values: &[f64]| (values[k + 1] - values[k - 1]) * self.per_two_s;
+        let time = scaling.time_share(self.time_s[k]);
         // The screw's own position: its transducer's slope acts on the gap as well.
-        let place = scaling.place_share(blocks.motor_m[k] + blocks.dx_m[k]);
-        let [sine, cosine] = blocks.phases.get(k).copied().unwrap_or_default();
+        let place = scaling.place_share(self.motor_m[k] + self.dx_m[k]);
+        let [sine, cosine] = self.phases.get(k).copied().unwrap_or_default();
         [
-            rate(&blocks.motor_m) * SPEED_M_PER_S.recip(),
-            rate(&blocks.load_n) * scaling.per_load_rate,
+            rate(&self.motor_m) * SPEED_M_PER_S.recip(),
+            rate(&self.load_n) * scaling.per_load_rate,
             time,
             time * time,
             place,
@@ -147,9 +138,9 @@ impl RowSource<'_> {
 
     /// δX of a block without all that does not depend on the force in the coupling, m; NaN where something is missing.
     #[inline]
-    pub(crate) fn without_slow_parts_m(&self, k: usize, beta: &[f64; COLUMNS]) -> f64 {
-        if self.blocks.is_complete(k) {
-            self.blocks.dx_m[k] - dot(&beta[SPEED..], &self.slow_columns(k))
+    pub(crate) fn without_slow_parts_m(&self, scaling: &Scaling, k: usize, beta: &[f64; COLUMNS]) -> f64 {
+        if self.is_complete(k) {
+            self.dx_m[k] - dot(&beta[SPEED..], &self.slow_columns(scaling, k))
         } else {
             f64::NAN
         }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, dot, less_pressed,
+    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, SIDE_FORCE, dot, less_pressed,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
@@ -18,7 +18,7 @@ use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::flank::FIRM_SHARE;
-use crate::contact::friction::friction_model::{Coupling, FrictionState};
+use crate::contact::friction::friction_model::FrictionState;
 use crate::contact::stats::{LOOKS, second_difference_rms};
 use crate::gap::midrange;
 use crate::kalman::Filter;
@@ -42,7 +42,6 @@ const GROUPS: usize = 10;
 pub struct ContactWorkspace {
     pub(crate) whole: BlockMeans,
     excerpt: BlockMeans,
-    couplings: Vec<Coupling>,
 }
 
 /// The fitted flanks.
@@ -111,7 +110,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     if gap_m.0 < UNSEEN_GAP * windup_m {
         check_both_sides(&workspace.whole, scaling, false)?;
     }
-    fit.unexplained_m = unexplained_m(workspace, scaling, &fit);
+    fit.unexplained_m = unexplained_m(&mut workspace.excerpt, scaling, &fit);
     // The load of a bench is no other actuator's: travel that no flank accounts for may be the gap's.
     if fit.unexplained_m > 0.0 && !scaling.is_locked() {
         return Err(Rejection::MotionUnexplained);
@@ -147,7 +146,7 @@ pub(crate) fn midrange_at_fit_m(
     scaling: &Scaling,
     fit: &FlankFit,
 ) -> Option<f64> {
-    let ContactWorkspace { whole, excerpt, .. } = workspace;
+    let ContactWorkspace { whole, excerpt } = workspace;
     let of = |blocks: &BlockMeans| midrange_of_m(blocks, scaling, fit);
     let of_whole = if whole.len() < SHORT_BLOCKS { of(whole) } else { None };
     let of_excerpt = if whole.is_longer(EXCERPT_BLOCKS) { of(excerpt) } else { None };
@@ -156,11 +155,9 @@ pub(crate) fn midrange_at_fit_m(
 }
 
 fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Option<f64> {
-    let source = RowSource { blocks, scaling };
     let beta = &fit.line.fit.beta;
-    let dx_m: Vec<f64> = (0..blocks.len()).map(|k| source.without_slow_parts_m(k, beta)).collect();
+    let dx_m: Vec<f64> = (0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta)).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
-    let segments: Vec<Range<usize>> = blocks.segments().collect();
     let stiffness_n_per_m = fit.compliance_m_per_n.0.recip();
     // A damping ratio of 0.7: a mode that rings between two samples would outlast them.
     let (damping, mode_rad_per_s) = (1.4, 2500.0);
@@ -183,14 +180,14 @@ fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Opti
         motor_m: &blocks.motor_m,
         dx_m: &dx_m,
         load_n: &load_n,
-        segments: &segments,
+        segments: &blocks.segments,
     };
     midrange::estimate(&samples, &filter).ok().map(|found| found.gap.gap_m)
 }
 
 /// Searches with long rows, in an excerpt as long as it must be, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
-    let ContactWorkspace { whole, excerpt, couplings } = workspace;
+    let ContactWorkspace { whole, excerpt } = workspace;
     let has_period = scaling.per_period > 0.0;
     let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
     let mut blocks = EXCERPT_BLOCKS;
@@ -199,7 +196,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         if has_period {
             excerpt.find_phases(scaling.per_period);
         }
-        match ParameterSearch::new(excerpt, couplings, &coarse).run() {
+        match ParameterSearch::new(excerpt, &coarse).run() {
             Ok(best) => break best,
             Err(why) if !whole.is_longer(blocks) => return Err(why),
             // Too little contact: a longer excerpt may show more.
@@ -210,7 +207,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         whole.find_phases(scaling.per_period);
     }
     let iterations = if whole.len() < SHORT_BLOCKS { 2 } else { 1 };
-    let found = search((whole, couplings), scaling, best.found.state, (iterations, REWEIGHTINGS))?;
+    let found = search(whole, scaling, best.found.state, (iterations, REWEIGHTINGS))?;
     Ok(SearchResult { found, ..best })
 }
 
@@ -312,15 +309,13 @@ fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
 /// By how much δX travels further than gap and wind-up do, from the 5 % to the 95 % quantile, m; 0 where noise may explain
 /// it. A screw that friction holds within its gap, or a load that is another actuator's, leaves travel over that no flank
 /// accounts for.
-fn unexplained_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> f64 {
-    let ContactWorkspace { excerpt: blocks, couplings, .. } = workspace;
+fn unexplained_m(blocks: &mut BlockMeans, scaling: &Scaling, fit: &FlankFit) -> f64 {
     let GaussNewtonResult { design, fit: line, at, .. } = &fit.line;
     blocks.apply_delays(at);
-    integrate(blocks, at, scaling.motor_sense, couplings);
-    let source = RowSource { blocks, scaling };
+    integrate(blocks, at, scaling.motor_sense);
     let looks = (0..blocks.len()).step_by(blocks.len().div_ceil(LOOKS).max(1));
-    let sound = looks.filter(|&k| blocks.is_complete(k) && couplings[k].force_n.is_finite());
-    let rows = sound.map(|k| source.row(k, &couplings[k]));
+    let sound = looks.filter(|&k| blocks.is_complete(k) && blocks.couplings[k].force_n.is_finite());
+    let rows = sound.map(|k| blocks.row(scaling, k));
     let (seen_m, expected_m): (Vec<f64>, Vec<f64>) =
         rows.map(|row| (row.y_m - fit.other_m(&row), dot(&line.beta[..DRY], &row.x[..DRY]))).unzip();
     let (seen_m, expected_m) = (span_m(seen_m), span_m(expected_m));

@@ -3,13 +3,13 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
-    RowSource, SHARE, SIDE_FORCE, SPEED, STRIBECK, less_pressed,
+    COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE, SHARE,
+    SIDE_FORCE, SPEED, STRIBECK, less_pressed,
 };
 use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use crate::contact::friction::coupling_path::integrate;
-use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
+use crate::contact::friction::friction_model::{Friction, FrictionState};
 use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
@@ -29,7 +29,7 @@ pub(crate) struct GaussNewtonResult {
 /// # Errors
 /// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
 pub(crate) fn search(
-    (blocks, couplings): (&mut BlockMeans, &mut Vec<Coupling>),
+    blocks: &mut BlockMeans,
     scaling: &Scaling,
     mut state: FrictionState,
     (iterations, rounds): (usize, usize),
@@ -37,8 +37,8 @@ pub(crate) fn search(
     let mut found = None;
     for _ in 0..iterations {
         blocks.apply_delays(&state);
-        integrate(blocks, &state, scaling.motor_sense, couplings);
-        let design = RowSource { blocks, scaling }.rows(couplings);
+        integrate(blocks, &state, scaling.motor_sense);
+        let design = blocks.rows(scaling);
         rejection_of_contact(less_pressed(design.firm.iter(), blocks.period_s))?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);

@@ -6,11 +6,11 @@
 
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
-use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, RowSource, SPEED, dot};
+use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, SPEED, dot};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::integrate;
-use crate::contact::friction::friction_model::{Coupling, Friction, FrictionState};
+use crate::contact::friction::friction_model::{Friction, FrictionState};
 use crate::contact::stats::spread;
 
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
@@ -29,7 +29,6 @@ pub(crate) struct SearchResult {
 /// The state of a search.
 pub(crate) struct ParameterSearch<'a> {
     blocks: &'a mut BlockMeans,
-    couplings: &'a mut Vec<Coupling>,
     scaling: &'a Scaling,
     /// δX of each block less all that does not depend on the force in the coupling, m.
     linear_m: Vec<f64>,
@@ -45,12 +44,8 @@ struct Candidate {
 }
 
 impl<'a> ParameterSearch<'a> {
-    pub(crate) fn new(
-        blocks: &'a mut BlockMeans,
-        couplings: &'a mut Vec<Coupling>,
-        scaling: &'a Scaling,
-    ) -> Self {
-        Self { blocks, couplings, scaling, linear_m: Vec::new(), scale_m: f64::INFINITY, tried: Vec::new() }
+    pub(crate) fn new(blocks: &'a mut BlockMeans, scaling: &'a Scaling) -> Self {
+        Self { blocks, scaling, linear_m: Vec::new(), scale_m: f64::INFINITY, tried: Vec::new() }
     }
 
     /// The best parameters of a flight.
@@ -113,17 +108,17 @@ impl<'a> ParameterSearch<'a> {
 
     /// Iterates from a state; blocks, couplings and linear parts are those of the result.
     fn search(&mut self, state: FrictionState, iterations: usize) -> Result<GaussNewtonResult, Rejection> {
-        let found = search((self.blocks, self.couplings), self.scaling, state, (iterations, 1))?;
+        let found = search(self.blocks, self.scaling, state, (iterations, 1))?;
         self.take_linear_parts(&found);
         Ok(found)
     }
 
     fn take_linear_parts(&mut self, found: &GaussNewtonResult) {
-        let source = RowSource { blocks: self.blocks, scaling: self.scaling };
+        let Self { blocks, scaling, linear_m, .. } = self;
         let beta = &found.fit.beta;
-        self.linear_m.clear();
-        self.linear_m
-            .extend((0..source.blocks.len()).map(|k| source.without_slow_parts_m(k, beta) - beta[ORIGIN]));
+        linear_m.clear();
+        linear_m
+            .extend((0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta) - beta[ORIGIN]));
     }
 
     /// Takes a state's fit when it fits better.
@@ -213,7 +208,7 @@ impl<'a> ParameterSearch<'a> {
     /// The misfit of a prepared fit with another load zero, for which the couplings are integrated.
     fn misfit_at(&mut self, found: &GaussNewtonResult, load_zero_n: f64) -> f64 {
         let state = FrictionState { load_zero_n, ..found.at };
-        integrate(self.blocks, &state, self.scaling.motor_sense, self.couplings);
+        integrate(self.blocks, &state, self.scaling.motor_sense);
         self.misfit(found, load_zero_n)
     }
 
@@ -225,13 +220,12 @@ impl<'a> ParameterSearch<'a> {
 
     /// What a fit with another load zero leaves of δX in every complete block, m.
     fn each_residual(&self, found: &GaussNewtonResult, load_zero_n: f64, mut take: impl FnMut(f64)) {
-        let source = RowSource { blocks: self.blocks, scaling: self.scaling };
         let beta = &found.fit.beta;
         // In contact a zero is an offset of δX.
         let shift_m = (load_zero_n - found.at.load_zero_n) * beta[FORCE] * self.scaling.per_load;
-        for (k, (linear_m, coupling)) in self.linear_m.iter().zip(self.couplings.iter()).enumerate() {
+        for (k, (linear_m, coupling)) in self.linear_m.iter().zip(&self.blocks.couplings).enumerate() {
             let inside_m = if coupling.force_n == 0.0 { coupling.relative_m } else { 0.0 };
-            let coupling_m = dot(&beta[GAP..SPEED], &source.coupling_columns(k, coupling));
+            let coupling_m = dot(&beta[GAP..SPEED], &self.blocks.coupling_columns(self.scaling, k));
             let residual_m = linear_m - shift_m - inside_m - coupling_m;
             if residual_m.is_finite() {
                 take(residual_m);

@@ -11,17 +11,14 @@ use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, 
 const LANES: usize = 8;
 
 /// Integrates the coupling of every block over all segments under one set of parameters.
-pub(crate) fn integrate(
-    blocks: &BlockMeans,
-    state: &FrictionState,
-    motor_sense: f64,
-    couplings: &mut Vec<Coupling>,
-) {
+pub(crate) fn integrate(blocks: &mut BlockMeans, state: &FrictionState, motor_sense: f64) {
+    let mut couplings = std::mem::take(&mut blocks.couplings);
     couplings.resize(blocks.len(), Coupling::UNKNOWN);
     let params = CouplingParams::new(state, motor_sense);
-    for segment in blocks.segments() {
-        integrate_segment(params, blocks, segment, couplings);
+    for segment in &blocks.segments {
+        integrate_segment(params, blocks, segment.clone(), &mut couplings);
     }
+    blocks.couplings = couplings;
 }
 
 /// Integrates eight parts of a segment in parallel lanes, each from an arbitrary state; then from the true start of each part
@@ -153,11 +150,10 @@ mod tests {
                 let slowness = f64::from(chance % 5) / 5.0;
                 blocks.put([place_m + missing(0), 0.0, f64::from(load) * 51.7 + missing(1)], slowness);
             }
-            let mut starts: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
-            starts.push(0);
-            starts.sort_unstable();
-            starts.dedup();
-            blocks.starts = starts;
+            let mut ends: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
+            ends.push(steps.len());
+            ends.sort_unstable();
+            blocks.segments = ends.iter().scan(0, |from, &end| Some(std::mem::replace(from, end)..end)).collect();
             let state = FrictionState {
                 stiffness_n_per_m: 5e7,
                 gap_m,
@@ -167,16 +163,15 @@ mod tests {
                 load_zero_n,
                 ..FrictionState::default()
             };
-            let mut couplings = Vec::new();
-            integrate(&blocks, &state, 1.0, &mut couplings);
-            for segment in blocks.segments() {
+            integrate(&mut blocks, &state, 1.0);
+            for segment in blocks.segments.clone() {
                 let (params, mut screw) = (CouplingParams::new(&state, 1.0), None);
                 for k in segment {
                     let drive = blocks.drive(k);
                     let bits = |c: Coupling| {
                         [c.force_n, c.dforce_ddry, c.dforce_dloss_n, c.relative_m].map(f64::to_bits)
                     };
-                    prop_assert_eq!(bits(couplings[k]), bits(params.follow(&mut screw, drive)), "block {}", k);
+                    prop_assert_eq!(bits(blocks.couplings[k]), bits(params.follow(&mut screw, drive)), "block {}", k);
                 }
             }
         }
