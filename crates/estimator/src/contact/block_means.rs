@@ -24,8 +24,6 @@ pub(crate) struct BlockMeans {
     pub(crate) period_s: f64,
     /// One over the length of two blocks, 1/s.
     pub(crate) per_two_s: f64,
-    /// Blocks on either side over which the speed of the motor is taken.
-    speed_reach: usize,
     /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
     is_calm: bool,
     /// The blocks of each segment.
@@ -72,7 +70,10 @@ impl BlockMeans {
             let end = segment.start + segment.len() / each * each;
             for start in (segment.start..end).step_by(each) {
                 self.time_s.push(middle_s(start));
-                self.push(mean(samples, start..start + each, steps));
+                let [motor_m, dx_m, load_n] = mean(samples, start..start + each, steps);
+                self.motor_m.push(motor_m);
+                self.dx_m.push(dx_m);
+                self.load_n.push(load_n);
             }
             self.segments.push(first..self.len());
         }
@@ -98,7 +99,6 @@ impl BlockMeans {
         segments.clear();
         self.phases.clear();
         (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
-        self.speed_reach = ((SPEED_S / period_s).round() as usize).max(1);
     }
 
     /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
@@ -123,21 +123,6 @@ impl BlockMeans {
         // The ratio of both is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second or more.
         let is_pile = pile > 2.0 * below && pile * count as f64 * self.period_s > 1.0;
         if is_pile { top_n - width_n } else { f64::INFINITY }
-    }
-
-    fn push(&mut self, mean: Option<[f64; 3]>) {
-        let [motor_m, dx_m, load_n] = mean.unwrap_or([f64::NAN; 3]);
-        self.motor_m.push(motor_m);
-        self.dx_m.push(dx_m);
-        self.load_n.push(load_n);
-    }
-
-    /// One more block, of which all is known but its time.
-    #[cfg(test)]
-    pub(crate) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3], slowness: f64) {
-        self.slowness.push(slowness);
-        self.time_s.push(self.len() as f64 * PERIOD_S);
-        self.push(Some([motor_m, dx_m, load_n]));
     }
 
     /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
@@ -210,8 +195,6 @@ impl BlockMeans {
             }
             self.segments.push(first..self.len());
         }
-        self.dx_m.resize(self.len(), f64::NAN);
-        self.load_n.resize(self.len(), f64::NAN);
     }
 
     /// The windows of an excerpt in order of time: one half by the number of load reversals in them, which pass 15 % of the
@@ -236,9 +219,10 @@ impl BlockMeans {
 
     /// Speed of the motor by the difference over [`SPEED_S`] on either side, m/s; NaN at the ends and near gaps.
     pub(crate) fn speed_m_per_s(&self, at: usize) -> f64 {
-        let Some(from) = at.checked_sub(self.speed_reach) else { return f64::NAN };
-        let to_m = self.motor_m.get(at + self.speed_reach).copied().unwrap_or(f64::NAN);
-        (to_m - self.motor_m[from]) / (2.0 * self.speed_reach as f64 * self.period_s)
+        let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
+        let Some(from) = at.checked_sub(reach) else { return f64::NAN };
+        let to_m = self.motor_m.get(at + reach).copied().unwrap_or(f64::NAN);
+        (to_m - self.motor_m[from]) / (2.0 * reach as f64 * self.period_s)
     }
 
     /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
@@ -248,6 +232,7 @@ impl BlockMeans {
             (&self.screw_m, state.skew_s, &mut self.dx_m),
             (&self.logged_n, state.load_delay_s, &mut self.load_n),
         ] {
+            read.resize(logged.len(), f64::NAN);
             // Nothing is read across the end of a segment.
             for segment in &self.segments {
                 read_later(&logged[segment.clone()], delay_s / self.period_s, &mut read[segment.clone()]);
@@ -256,14 +241,11 @@ impl BlockMeans {
         self.dx_m.iter_mut().zip(&self.motor_m).for_each(|(dx, x)| *dx -= x);
     }
 
-    /// Sine and cosine of the screw's position, of which one period has 2π over so many metres.
+    /// Sine and cosine of the screw's position times 2π over the period, 1/m, where that is not zero.
     pub(crate) fn find_phases(&mut self, per_period: f64) {
-        self.phases.clear();
-        let phase = |screw_m: &f64| {
-            let (sine, cosine) = (screw_m * per_period).sin_cos();
-            [sine, cosine]
-        };
-        self.phases.extend(self.screw_m.iter().map(phase));
+        if per_period > 0.0 {
+            self.phases.extend(self.screw_m.iter().map(|m| <[f64; 2]>::from((m * per_period).sin_cos())));
+        }
     }
 
     /// e^−(v/v_s)² of every block with v_s = 3 mm/s, the speed at which most of the excess of friction at rest is gone; 0 where
@@ -336,8 +318,8 @@ fn cubic(u: f64) -> [f64; 4] {
 }
 
 /// Means of motor, δX and load over the complete samples of a block that are no spikes of δX or the load, beyond some
-/// steps; none where they are fewer than half.
-fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> Option<[f64; 3]> {
+/// steps; NaN where they are fewer than half.
+fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> [f64; 3] {
     let Samples { motor_m, dx_m, load_n, .. } = *samples;
     let (mut sums, mut sound, least) = ([0.0; 3], 0.0, 0.5 * block.len() as f64);
     let before = block.start.saturating_sub(1);
@@ -352,7 +334,7 @@ fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> Option<[
         }
         (last_y, last_f) = (y, f);
     }
-    (sound >= least).then(|| sums.map(|sum| sum / sound))
+    sums.map(|sum| if sound >= least { sum / sound } else { f64::NAN })
 }
 
 /// Whether a sample leaps by more than some step, and the next one leaps back: a new level is no spike.

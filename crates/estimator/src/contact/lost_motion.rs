@@ -4,7 +4,6 @@ use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::friction::flank::Flank;
 use crate::contact::stats::{MAD, median};
 
 /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap of
@@ -15,7 +14,7 @@ use crate::contact::stats::{MAD, median};
 pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
     let (gap_m, gap_se_m) = contact.gap_m;
     let overlap_m = -gap_m;
-    let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n.0;
+    let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n;
     let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
     // A closed loop, of the lightly loaded rows that the straight fit never saw, overlaps by less than half of what the
     // extrapolated flanks do.
@@ -37,7 +36,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
         let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
         let on_branch_m = || {
             blocks.without_slow_parts_m(scaling, k, &contact.line.fit.beta)
-                - load_n * contact.compliance_m_per_n.0
+                - load_n * contact.compliance_m_per_n
         };
         is_on_branch.then(on_branch_m).filter(|m| m.is_finite()).map(|m| (m, blocks.stretch(k)))
     };
@@ -65,11 +64,11 @@ fn travel_m<'a>(
     rows: &(impl Iterator<Item = &'a DesignRow<COLUMNS>> + Clone),
 ) -> Option<(f64, f64)> {
     let line = &contact.line.fit;
-    let beyond_m = |flank: Flank| {
-        let of_flank = rows.clone().filter(|row| row.x[GAP] * flank.sign() > 0.0);
-        median_and_error_m(of_flank.map(|row| (flank.sign() * line.residual_m(row), row.stretch)))
+    let beyond_m = |side: f64| {
+        let of_flank = rows.clone().filter(|row| row.x[GAP] * side > 0.0);
+        median_and_error_m(of_flank.map(|row| (side * line.residual_m(row), row.stretch)))
     };
-    let (upper, lower) = (beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?);
+    let (upper, lower) = (beyond_m(1.0)?, beyond_m(-1.0)?);
     let line_m = line.beta[GAP] + 2.0 * load * line.beta[FORCE];
     // The uncertainty of the gap (drift, transducer, friction) applies here too; the scatter of the medians is added.
     Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))

@@ -32,9 +32,8 @@ mod types;
 
 pub use codes::{QualityFlag, Rejection};
 pub use fit::flank_fit::ContactWorkspace;
-pub use friction::flank::Flank;
 pub use friction::friction_model::Friction;
-pub use plot_data::{ContactPlot, Touch};
+pub use plot_data::{ContactPlot, Flank, Touch};
 pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, GapAtPlace, PartPrior};
 
 use crate::error::Error;
@@ -103,9 +102,9 @@ pub fn find_rejection(
 /// As [`estimate`].
 pub fn plot_data(samples: &Samples<'_>, prior: &PartPrior) -> Result<Option<ContactPlot>, Error> {
     check(samples, prior)?;
-    Ok(look(samples, prior, &mut ContactWorkspace::default())
-        .ok()
-        .map(|(frame, contact)| ContactPlot::of(&frame, &contact)))
+    let mut room = ContactWorkspace::default();
+    let found = look(samples, prior, &mut room).ok();
+    Ok(found.map(|(frame, contact)| ContactPlot::of(room.whole.period_s, &frame, &contact)))
 }
 
 fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
@@ -127,8 +126,8 @@ fn prepare(
     }
     room.whole.gather(samples, prior)?;
     let mut frame = Scaling::of(&room.whole, prior)?;
-    let found = if prior.output_locked { SignCheck::NONE } else { sign_check::check(&room.whole, &frame)? };
-    frame.stiffness_n_per_m = found.stiffness_n_per_m.unwrap_or(frame.stiffness_n_per_m);
+    let found =
+        if prior.output_locked { SignCheck::NONE } else { sign_check::check(&room.whole, &mut frame)? };
     Ok((frame, found))
 }
 
@@ -140,7 +139,7 @@ fn look(
     let (frame, _) = prepare(samples, prior, room)?;
     let contact = flank_fit::fit(room, &frame)?;
     let (gap_m, gap_se_m) = contact.gap_m;
-    let gives_way = contact.compliance_m_per_n.0 > 0.0;
+    let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
     // Channels of absurd size overflow the sums of the fit.
     if gap_m.is_finite() && gap_se_m.is_finite() && gives_way && is_possible {
@@ -159,10 +158,10 @@ fn report(
     let preload_n = lost_motion::preload_n(contact);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
     let gap_se_m = contact.gap_m.1;
-    let (compliance, compliance_se) = contact.compliance_m_per_n;
+    let compliance = contact.compliance_m_per_n;
 
     let GaussNewtonResult { design, fit, state, .. } = &contact.line;
-    let error_m = |terms: &[(usize, f64)]| fit.standard_error_of_sum_m(terms, &design.firm);
+    let error_m = |terms: &[(usize, f64)]| fit.standard_error_m(terms, &design.firm);
     // A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
     let friction_error_n = |terms: &[(usize, f64)]| error_m(terms) / compliance;
     let mut found = ContactEstimate {
@@ -170,7 +169,7 @@ fn report(
         gap_se_m,
         gap_bounds_m: (gap_m - NORMAL_95 * gap_se_m, gap_m + NORMAL_95 * gap_se_m),
         stiffness_n_per_m: compliance.recip(),
-        stiffness_se_n_per_m: compliance_se / (compliance * compliance),
+        stiffness_se_n_per_m: error_m(&[(FORCE, 1.0)]) / frame.load_n / (compliance * compliance),
         skew_s: state.skew_s,
         skew_se_s: error_m(&[(SPEED, 1.0)]) / SPEED_M_PER_S,
         load_zero_n: state.load_zero_n,

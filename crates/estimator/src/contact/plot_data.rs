@@ -1,9 +1,24 @@
 //! Plot data of an estimate: δX against the force in the coupling.
 
-use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
+use crate::contact::fit::design_matrix::{COLUMNS, DRIFT, DesignRow, FORCE, GAP, ORIGIN, SIDE_FORCE};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::friction::flank::Flank;
+
+/// One of the two sides of the gap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flank {
+    /// Pressed by a positive force.
+    Upper = 1,
+    /// Pressed by a negative one.
+    Lower = -1,
+}
+
+impl Flank {
+    /// s, +1 for the upper and −1 for the lower.
+    pub fn sign(self) -> f64 {
+        f64::from(self as i8)
+    }
+}
 
 /// A stretch in contact on one flank, a tenth of a second or longer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,32 +49,28 @@ pub struct ContactPlot {
 }
 
 impl ContactPlot {
-    pub(crate) fn of(frame: &Scaling, contact: &FlankFit) -> Self {
-        let design = &contact.line.design;
-        let firm = design.firm.iter().zip(contact.line.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
+    pub(crate) fn of(period_s: f64, frame: &Scaling, contact: &FlankFit) -> Self {
+        let (design, fit) = (&contact.line.design, &contact.line.fit);
+        let firm = design.firm.iter().zip(fit.trusts(&design.firm)).map(|(row, trust)| (row, Some(trust)));
         let light = design.light.iter().map(|row| (row, None));
-        let touches: Vec<Touch> =
-            firm.chain(light).map(|(row, trust)| touch(frame, contact, row, trust)).collect();
-        let flank = |flank: Flank| {
-            let forces_n = touches.iter().filter(|t| t.flank == flank).map(|t| t.force_n.abs());
-            let most_n = forces_n.fold(0.0, f64::max);
-            let at = |force_n: f64| {
-                (flank.sign() * force_n, contact.flank_m(flank.sign(), force_n / frame.load_n))
-            };
-            [at(0.0), at(most_n)]
+        let touch = |(row, trust): (&DesignRow<COLUMNS>, Option<f64>)| Touch {
+            time_s: frame.time_s.0 + row.x[DRIFT] * frame.time_s.1,
+            duration_s: row.blocks * period_s,
+            flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
+            force_n: row.x[FORCE] * frame.load_n,
+            dx_m: row.y_m - contact.other_m(row),
+            trust,
         };
-        let (upper, lower) = (flank(Flank::Upper), flank(Flank::Lower));
-        Self { touches, upper, lower }
-    }
-}
-
-fn touch(frame: &Scaling, contact: &FlankFit, row: &DesignRow<COLUMNS>, trust: Option<f64>) -> Touch {
-    Touch {
-        time_s: row.moment_s(frame),
-        duration_s: row.blocks * contact.period_s,
-        flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
-        force_n: row.x[FORCE] * frame.load_n,
-        dx_m: row.y_m - contact.other_m(row),
-        trust,
+        let touches: Vec<Touch> = firm.chain(light).map(touch).collect();
+        let ends = |flank: Flank| {
+            let side = flank.sign();
+            let forces_n = touches.iter().filter(|t| t.flank == flank).map(|t| t.force_n.abs());
+            [0.0, forces_n.fold(0.0, f64::max)].map(|force_n| {
+                let force = force_n / frame.load_n;
+                let from_middle_m = 0.5 * fit.beta[GAP] + force * fit.beta[FORCE];
+                (side * force_n, fit.beta[ORIGIN] + side * from_middle_m + force * fit.beta[SIDE_FORCE])
+            })
+        };
+        Self { upper: ends(Flank::Upper), lower: ends(Flank::Lower), touches }
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
-use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::Coupling;
 
 /// Columns of the regression.
@@ -35,6 +34,8 @@ pub(crate) const PLACE: usize = 12;
 /// Errors periodic in position: sine and cosine.
 pub(crate) const PERIODIC: usize = 15;
 
+/// Forces over the 95 % load below which flanks may be soft.
+pub(crate) const FIRM_SHARE: f64 = 0.12;
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;
 
@@ -200,12 +201,5 @@ impl<const N: usize> DesignRow<N> {
     fn mean(&self) -> Self {
         let share = self.blocks.recip();
         Self { x: self.x.map(|x| x * share), y_m: self.y_m * share, ..*self }
-    }
-}
-
-impl DesignRow<COLUMNS> {
-    /// The middle of a row, s from the first sample of the log.
-    pub(crate) fn moment_s(&self, scaling: &Scaling) -> f64 {
-        scaling.time_s.0 + self.x[DRIFT] * scaling.time_s.1
     }
 }

@@ -9,15 +9,14 @@ use std::ops::Range;
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FORCE, GAP, ORIGIN, PERIODIC, SIDE_FORCE, dot, less_pressed,
+    COLUMNS, DRY, DesignRow, FIRM_SHARE, FORCE, GAP, PERIODIC, dot, less_pressed,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
 use crate::contact::fit::robust_regression::REWEIGHTINGS;
-use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling};
+use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling, UNSEEN_GAP};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::friction::coupling_path::integrate;
-use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
 use crate::contact::stats::{LOOKS, second_difference_rms};
 use crate::gap::midrange;
@@ -25,8 +24,6 @@ use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
 use crate::samples::Samples;
 
-/// A gap under this share of the wind-up does not show the zero of the load cell.
-pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Largest error of that zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
 /// Blocks that the search begins with.
@@ -49,13 +46,11 @@ pub struct ContactWorkspace {
 pub(crate) struct FlankFit {
     /// ΔS and its standard error, m.
     pub(crate) gap_m: (f64, f64),
-    /// 1/K and its standard error, m/N.
-    pub(crate) compliance_m_per_n: (f64, f64),
+    /// 1/K, m/N.
+    pub(crate) compliance_m_per_n: f64,
     pub(crate) load_zero_se_n: f64,
     /// Rms of the residuals of single blocks, m.
     residual_rms_m: f64,
-    /// Length of a block, s.
-    pub(crate) period_s: f64,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
     /// Whether higher loads alone read another gap, by more than 2.3 jackknife errors.
@@ -67,12 +62,6 @@ pub(crate) struct FlankFit {
 }
 
 impl FlankFit {
-    /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
-    pub(crate) fn flank_m(&self, side: f64, force: f64) -> f64 {
-        let beta = &self.line.fit.beta;
-        beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE]) + force * beta[SIDE_FORCE]
-    }
-
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         dot(&self.line.fit.beta[DRY..], &row.x[DRY..])
@@ -86,7 +75,6 @@ impl FlankFit {
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
-    let compliance_se = line.fit.standard_error_m(FORCE, &line.design.firm);
     let windup_m = scaling.windup_m();
     let vibration_n = second_difference_rms(&workspace.whole.load_n);
     // A load that turns between two samples, and residuals by which it has mixed both flanks beyond use.
@@ -99,10 +87,9 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let mut fit = FlankFit {
         gap_m,
         profile,
-        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, compliance_se / scaling.load_n),
+        compliance_m_per_n: line.fit.beta[FORCE] / scaling.load_n,
         load_zero_se_n,
         residual_rms_m: scale_m,
-        period_s: workspace.whole.period_s,
         is_soft: sigma > 2.3,
         unexplained_m: 0.0,
         line,
@@ -158,7 +145,7 @@ fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Opti
     let beta = &fit.line.fit.beta;
     let dx_m: Vec<f64> = (0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta)).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
-    let stiffness_n_per_m = fit.compliance_m_per_n.0.recip();
+    let stiffness_n_per_m = fit.compliance_m_per_n.recip();
     // A damping ratio of 0.7: a mode that rings between two samples would outlast them.
     let (damping, mode_rad_per_s) = (1.4, 2500.0);
     let actuator = ActuatorModel::linear(
@@ -188,14 +175,11 @@ fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Opti
 /// Searches with long rows, in an excerpt as long as it must be, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
     let ContactWorkspace { whole, excerpt } = workspace;
-    let has_period = scaling.per_period > 0.0;
     let coarse = Scaling { row_s: SEARCH_ROW_S, ..*scaling };
     let mut blocks = EXCERPT_BLOCKS;
     let best = loop {
         excerpt.excerpt_of(whole, scaling.load_n, blocks);
-        if has_period {
-            excerpt.find_phases(scaling.per_period);
-        }
+        excerpt.find_phases(scaling.per_period);
         match ParameterSearch::new(excerpt, &coarse).run() {
             Ok(best) => break best,
             Err(why) if !whole.is_longer(blocks) => return Err(why),
@@ -203,7 +187,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
             Err(_) => blocks *= 4,
         }
     };
-    if has_period && is_periodic(&best.found) {
+    if is_periodic(&best.found) {
         whole.find_phases(scaling.per_period);
     }
     let iterations = if whole.len() < SHORT_BLOCKS { 2 } else { 1 };
@@ -215,7 +199,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 fn is_periodic(found: &GaussNewtonResult) -> bool {
     [PERIODIC, PERIODIC + 1].into_iter().any(|column| {
         let size_m = found.fit.beta[column].abs();
-        size_m > 2e-7 && size_m > 3.0 * found.fit.standard_error_m(column, &found.design.firm)
+        size_m > 2e-7 && size_m > 3.0 * found.fit.standard_error_m(&[(column, 1.0)], &found.design.firm)
     })
 }
 
@@ -242,7 +226,7 @@ fn gap_and_error_m(
     let all: f64 = rows.iter().map(|row| row.blocks).sum();
     let high = if less_pressed(stiff, 1.0) > 0.05 * all { refit(STIFF_SHARE) } else { None };
     let jackknife_m = low.as_ref().map_or_else(
-        || line.fit.standard_error_m(GAP, rows),
+        || line.fit.standard_error_m(&[(GAP, 1.0)], rows),
         |(_, parts)| jackknife_error_m(parts.iter().copied()),
     );
     let (difference_m, error_m) = match (&low, &high) {

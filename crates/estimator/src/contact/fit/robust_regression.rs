@@ -212,17 +212,13 @@ impl<const N: usize> RobustFit<N> {
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
 
-    /// Standard error of a coefficient, m: the sandwich estimate over segments, and the share of uncertain priors.
+    /// Standard error of a weighted sum of coefficients, m: the sandwich estimate over stretches, and the share of
+    /// uncertain priors; of one coefficient
     ///
     /// ```text
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
-    pub(crate) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
-        self.standard_error_of_sum_m(&[(column, 1.0)], rows)
-    }
-
-    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of coefficients.
-    pub(crate) fn standard_error_of_sum_m(&self, terms: &[(usize, f64)], rows: &[DesignRow<N>]) -> f64 {
+    pub(crate) fn standard_error_m(&self, terms: &[(usize, f64)], rows: &[DesignRow<N>]) -> f64 {
         let influence: [f64; N] = std::array::from_fn(|i| {
             terms.iter().map(|&(column, weight)| weight * self.inverse[(column, i)]).sum()
         });

@@ -12,6 +12,8 @@ use crate::gap::load_band::quantiles;
 pub(crate) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(crate) const LATE_S: f64 = 0.01;
+/// Wind-ups that a gap must reach for the flight to show the zero of its load cell.
+pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Longest row, s: that of the search, which needs no fine rows.
 pub(crate) const SEARCH_ROW_S: f64 = 0.4;
 

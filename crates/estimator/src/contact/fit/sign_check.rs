@@ -3,9 +3,8 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::DesignRow;
-use crate::contact::fit::flank_fit::UNSEEN_GAP;
 use crate::contact::fit::robust_regression::{GaussianPrior, fit};
-use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
+use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling, UNSEEN_GAP};
 use crate::contact::stats::LOOKS;
 
 /// A fault of the mapping is stated beyond this many standard errors.
@@ -14,8 +13,6 @@ const SIGNIFICANT: f64 = 4.0;
 /// What the check finds in channels that are mapped correctly.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SignCheck {
-    /// A stiffness to start from, N/m, where the slope shows that the part's is off by more than a factor of three.
-    pub(crate) stiffness_n_per_m: Option<f64>,
     /// Whether δX grows with the load by more than its error: it does not with the load of another actuator.
     pub(crate) follows_load: bool,
     /// Whether δX differs between the two sides of the load by more than its error and a tenth of the wind-up.
@@ -24,23 +21,26 @@ pub(crate) struct SignCheck {
 
 impl SignCheck {
     /// Of channels that are not checked: nothing speaks against them.
-    pub(crate) const NONE: Self = Self { stiffness_n_per_m: None, follows_load: true, shows_gap: true };
+    pub(crate) const NONE: Self = Self { follows_load: true, shows_gap: true };
 }
 
 /// Regresses δX on the load, the side it presses to, the sign of the speed, speed and place.
 ///
 /// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
-/// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case.
+/// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case. Where the slope
+/// shows that the part's stiffness is off by more than a factor of three, the fit starts from the stiffness of the slope:
+/// from the part's it would end at a soft contact.
 ///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
-pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<SignCheck, Rejection> {
+pub(crate) fn check(blocks: &BlockMeans, frame: &mut Scaling) -> Result<SignCheck, Rejection> {
     // Every fourth block is used, and fewer of long flights.
     let stride = (blocks.len() / LOOKS).max(4);
     let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
     let Some(found) = fit(&rows, &[GaussianPrior::NONE; 6], 4) else { return Ok(SignCheck::NONE) };
     let [_, side_m, load_m, slip_m, speed_m, place_m] = found.beta;
-    let [side_se_m, load_se_m, place_se_m] = [1, 2, 5].map(|column| found.standard_error_m(column, &rows));
+    let [side_se_m, load_se_m, place_se_m] =
+        [1, 2, 5].map(|column| found.standard_error_m(&[(column, 1.0)], &rows));
     // Two positions of one screw have a slope of one. Slopes that differ by 1 % are another lead or unit, and less than 60 µm
     // at the ends of the travel may be the transducer's own error.
     if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * frame.place_m.1).max(60e-6) {
@@ -50,21 +50,16 @@ pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<SignCheck, R
     let doubt_m = SIGNIFICANT * side_se_m.hypot(load_se_m);
     // A wind-up of 30 % of the part's against its sign counts as flipped.
     if windup_m + doubt_m > -0.3 * frame.windup_m() {
-        return Ok(SignCheck {
-            stiffness_n_per_m: other_stiffness(load_m, SIGNIFICANT * load_se_m, frame),
-            follows_load: windup_m > doubt_m,
-            shows_gap: side_m > (UNSEEN_GAP * frame.windup_m()).max(3.0 * side_se_m),
-        });
+        let shows_gap = side_m > (UNSEEN_GAP * frame.windup_m()).max(3.0 * side_se_m);
+        let (load_doubt_m, part_m) = (SIGNIFICANT * load_se_m, frame.windup_m());
+        let is_softer = load_m - load_doubt_m > 3.0 * part_m;
+        let is_stiffer = load_m > load_doubt_m && load_m + load_doubt_m < part_m / 3.0;
+        if is_softer || is_stiffer {
+            frame.stiffness_n_per_m = frame.load_n / load_m;
+        }
+        return Ok(SignCheck { follows_load: windup_m > doubt_m, shows_gap });
     }
     Err(if slip_m + speed_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
-}
-
-/// The stiffness of a wind-up at the 95 % load, m, that is known to `doubt_m`, where the part's differs by more than a factor
-/// of three: that would be no start for the fit, which would end at a soft contact.
-fn other_stiffness(windup_m: f64, doubt_m: f64, frame: &Scaling) -> Option<f64> {
-    let is_softer = windup_m - doubt_m > 3.0 * frame.windup_m();
-    let is_stiffer = windup_m > doubt_m && windup_m + doubt_m < frame.windup_m() / 3.0;
-    (is_softer || is_stiffer).then(|| frame.load_n / windup_m)
 }
 
 fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<6>> {

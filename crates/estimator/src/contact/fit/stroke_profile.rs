@@ -52,7 +52,7 @@ pub(crate) fn stroke_profile(
     let error_m = |gap: f64, weights: &[f64; KNOTS]| {
         let knots = (COLUMNS..).zip(weights.iter().copied());
         let terms: Vec<(usize, f64)> = knots.chain(std::iter::once((GAP, gap))).collect();
-        found.standard_error_of_sum_m(&terms, &rows)
+        found.standard_error_m(&terms, &rows)
     };
     let only = |knot: usize| -> [f64; KNOTS] { std::array::from_fn(|k| f64::from(u8::from(k == knot))) };
     let mean_m = value_m(&shares);

@@ -148,7 +148,10 @@ mod tests {
                 place_m += f64::from(step) * 1.3e-5;
                 let missing = |which: u8| if chance == which { f64::NAN } else { 0.0 };
                 let slowness = f64::from(chance % 5) / 5.0;
-                blocks.put([place_m + missing(0), 0.0, f64::from(load) * 51.7 + missing(1)], slowness);
+                blocks.time_s.push(0.0);
+                blocks.motor_m.push(place_m + missing(0));
+                blocks.load_n.push(f64::from(load) * 51.7 + missing(1));
+                blocks.slowness.push(slowness);
             }
             let mut ends: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
             ends.push(steps.len());
