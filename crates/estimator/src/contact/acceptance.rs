@@ -2,10 +2,12 @@
 
 use super::codes::QualityFlag;
 use super::fit::scaling::Scaling;
-use super::types::{ContactEstimate, DETECTION_SHARE};
+use super::types::ContactEstimate;
 
 /// Standard errors a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
+/// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
+const DETECTION_SHARE: f64 = 0.01;
 /// Largest relative standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
 

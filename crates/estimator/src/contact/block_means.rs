@@ -5,8 +5,8 @@ use std::ops::Range;
 use crate::Samples;
 use crate::contact::codes::Rejection;
 use crate::contact::friction::friction_model::{Coupling, Drive, FrictionState};
-use crate::contact::stats::{LOOKS, middle_and_half};
-use crate::contact::types::{PartPrior, SHORTEST_S};
+use crate::contact::stats::{LOOKS, middle_and_half, second_differences};
+use crate::contact::types::PartPrior;
 use crate::gap::load_band::{quantiles, reversals};
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
@@ -17,6 +17,9 @@ const CALM_PERIOD_S: f64 = 0.012;
 const SPEED_S: f64 = 0.03;
 /// Blocks of a window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
+/// Blocks that span too little time to hold a flight, s.
+const SHORTEST_S: f64 = 9.0;
+
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
 pub(crate) struct BlockMeans {
@@ -264,19 +267,12 @@ impl BlockMeans {
 /// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is less than 5 % of
 /// their rms.
 fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
-    let (mut differences, mut loads) = (0.0, 0.0);
-    for segment in samples.segments {
-        let (mut before, mut here) = (f64::NAN, f64::NAN);
-        for part in samples.load_n[segment.clone()].chunks_exact(summed) {
-            let after: f64 = part.iter().sum();
-            let difference = before - 2.0 * here + after;
-            if difference.is_finite() {
-                differences += difference * difference;
-                loads += here * here;
-            }
-            (before, here) = (here, after);
-        }
-    }
+    let sums = samples.segments.iter().flat_map(|segment| {
+        let parts = samples.load_n[segment.clone()].chunks_exact(summed);
+        // No difference reaches across the end of a segment.
+        parts.map(|part| part.iter().sum::<f64>()).chain([f64::NAN])
+    });
+    let [differences, loads, _] = second_differences(sums);
     differences < 0.05 * 0.05 * loads
 }
 

@@ -18,7 +18,7 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
     let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
     // A closed loop, of the lightly loaded rows that the straight fit never saw, overlaps by less than half of what the
     // extrapolated flanks do.
-    let loop_m = || travel_m(contact, 0.0, &contact.line.design.light.iter());
+    let loop_m = || travel_m(contact, 0.0, &contact.search.line.design.light.iter());
     let closes = || loop_m().is_some_and(|(loop_m, _)| loop_m > -0.5 * overlap_m);
     (is_overlap && closes()).then(|| (force_n(overlap_m), force_n(gap_se_m)))
 }
@@ -31,11 +31,11 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
     let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
     let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
     let position = |side: f64, k: usize| {
-        let load_n = blocks.load_n[k] - contact.line.at.load_zero_n;
+        let load_n = blocks.load_n[k] - contact.search.line.at.load_zero_n;
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
         let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
         let on_branch_m = || {
-            blocks.without_slow_parts_m(scaling, k, &contact.line.fit.beta)
+            blocks.without_slow_parts_m(scaling, k, &contact.search.line.fit.beta)
                 - load_n * contact.compliance_m_per_n
         };
         is_on_branch.then(on_branch_m).filter(|m| m.is_finite()).map(|m| (m, blocks.stretch(k)))
@@ -52,7 +52,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
 pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
-    let rows = contact.line.design.firm.iter().chain(&contact.line.design.light);
+    let rows = contact.search.line.design.firm.iter().chain(&contact.search.line.design.light);
     travel_m(contact, load, &rows.filter(move |row| (row.x[FORCE].abs() - load).abs() < 0.25 * load))
 }
 
@@ -63,7 +63,7 @@ fn travel_m<'a>(
     load: f64,
     rows: &(impl Iterator<Item = &'a DesignRow<COLUMNS>> + Clone),
 ) -> Option<(f64, f64)> {
-    let line = &contact.line.fit;
+    let line = &contact.search.line.fit;
     let beyond_m = |side: f64| {
         let of_flank = rows.clone().filter(|row| row.x[GAP] * side > 0.0);
         median_and_error_m(of_flank.map(|row| (side * line.residual_m(row), row.stretch)))

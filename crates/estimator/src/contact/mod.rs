@@ -43,8 +43,11 @@ use fit::flank_fit::{self, FlankFit};
 use fit::gauss_newton::GaussNewtonResult;
 use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
-use types::{LONGEST_STEP_S, NORMAL_95};
 
+/// Slower logs blur the moment at which a flank is left, s.
+const LONGEST_STEP_S: f64 = 0.05;
+/// Standard normal 95 % quantile.
+const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 /// Standard errors by which no gap of a sound log is below zero.
 const IMPOSSIBLE_SIGMA: f64 = 5.0;
 
@@ -160,7 +163,7 @@ fn report(
     let gap_se_m = contact.gap_m.1;
     let compliance = contact.compliance_m_per_n;
 
-    let GaussNewtonResult { design, fit, state, .. } = &contact.line;
+    let GaussNewtonResult { design, fit, state, .. } = &contact.search.line;
     let error_m = |terms: &[(usize, f64)]| fit.standard_error_m(terms, &design.firm);
     // A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
     let friction_error_n = |terms: &[(usize, f64)]| error_m(terms) / compliance;
@@ -173,7 +176,7 @@ fn report(
         skew_s: state.skew_s,
         skew_se_s: error_m(&[(SPEED, 1.0)]) / SPEED_M_PER_S,
         load_zero_n: state.load_zero_n,
-        load_zero_se_n: contact.load_zero_se_n,
+        load_zero_se_n: contact.search.load_zero_se_n,
         load_delay_s: state.load_delay_s,
         load_delay_se_s: error_m(&[(LOAD_RATE, 1.0)]) * LATE_S / fit.beta[FORCE],
         friction: state.friction,

@@ -50,7 +50,7 @@ pub struct ContactPlot {
 
 impl ContactPlot {
     pub(crate) fn of(period_s: f64, frame: &Scaling, contact: &FlankFit) -> Self {
-        let (design, fit) = (&contact.line.design, &contact.line.fit);
+        let (design, fit) = (&contact.search.line.design, &contact.search.line.fit);
         let firm = design.firm.iter().zip(fit.trusts(&design.firm)).map(|(row, trust)| (row, Some(trust)));
         let light = design.light.iter().map(|row| (row, None));
         let touch = |(row, trust): (&DesignRow<COLUMNS>, Option<f64>)| Touch {

@@ -28,15 +28,16 @@ pub(crate) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     MAD * median(&mut values.map(f64::abs).collect::<Vec<f64>>())
 }
 
-/// Rms of the second difference of a channel, which slow loads do not show.
-pub(crate) fn second_difference_rms(values: &[f64]) -> f64 {
-    let (mut squares, mut count) = (0.0, 0_usize);
-    for [before, here, after] in values.array_windows() {
+/// Sums over the neighbours of which none is missing: of the square of their second difference, which slow loads do not
+/// show, of the square of the middle one, and of 1.
+pub(crate) fn second_differences(values: impl Iterator<Item = f64>) -> [f64; 3] {
+    let (mut sums, mut before, mut here) = ([0.0; 3], f64::NAN, f64::NAN);
+    for after in values {
         let difference = before - 2.0 * here + after;
         if difference.is_finite() {
-            squares += difference * difference;
-            count += 1;
+            sums = [sums[0] + difference * difference, sums[1] + here * here, sums[2] + 1.0];
         }
+        (before, here) = (here, after);
     }
-    (squares / count.max(1) as f64).sqrt()
+    sums
 }

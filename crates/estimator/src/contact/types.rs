@@ -3,19 +3,6 @@
 use super::codes::{QualityFlag, Rejection};
 use super::friction::friction_model::Friction;
 
-/// Blocks that span too little time to hold a flight, s.
-pub(crate) const SHORTEST_S: f64 = 9.0;
-/// Slower logs blur the moment at which a flank is left, s.
-pub(crate) const LONGEST_STEP_S: f64 = 0.05;
-/// Each flank must be touched this long, s.
-pub(crate) const REQUIRED_CONTACT_S: f64 = 1.0;
-/// Below this a flank was not touched at all, s.
-pub(crate) const MIN_CONTACT_S: f64 = 0.1;
-/// Standard normal 95 % quantile.
-pub(crate) const NORMAL_95: f64 = 1.644_853_626_951_472_2;
-/// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
-pub(crate) const DETECTION_SHARE: f64 = 0.01;
-
 /// What is known of the part before its flight is seen.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartPrior {

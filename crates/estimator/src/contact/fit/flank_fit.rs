@@ -18,7 +18,7 @@ use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling, UNSEEN_GAP};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::stats::{LOOKS, second_difference_rms};
+use crate::contact::stats::{LOOKS, second_differences};
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -48,23 +48,20 @@ pub(crate) struct FlankFit {
     pub(crate) gap_m: (f64, f64),
     /// 1/K, m/N.
     pub(crate) compliance_m_per_n: f64,
-    pub(crate) load_zero_se_n: f64,
-    /// Rms of the residuals of single blocks, m.
-    residual_rms_m: f64,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
     /// Whether higher loads alone read another gap, by more than 2.3 jackknife errors.
     pub(crate) is_soft: bool,
     /// Travel that neither gap nor wind-up accounts for, m: a part of the error of the gap and of the loop.
     pub(crate) unexplained_m: f64,
-    /// The fit and its rows.
-    pub(crate) line: GaussNewtonResult,
+    /// What it comes from: the fit of the whole flight with its rows, and what the search found.
+    pub(crate) search: SearchResult,
 }
 
 impl FlankFit {
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
-        dot(&self.line.fit.beta[DRY..], &row.x[DRY..])
+        dot(&self.search.line.fit.beta[DRY..], &row.x[DRY..])
     }
 }
 
@@ -74,25 +71,23 @@ impl FlankFit {
 /// As [`search`]; [`Rejection::RateTooLow`] for a load that vibrates faster than it is sampled, so that neighbouring
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
-    let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
+    let search = coarse_to_fine(workspace, scaling)?;
     let windup_m = scaling.windup_m();
-    let vibration_n = second_difference_rms(&workspace.whole.load_n);
+    let [squares, _, count] = second_differences(workspace.whole.load_n.iter().copied());
+    let vibration_n = (squares / count.max(1.0)).sqrt();
     // A load that turns between two samples, and residuals by which it has mixed both flanks beyond use.
-    if vibration_n > 0.3 * scaling.load_n && scale_m > 0.16 * windup_m {
+    if vibration_n > 0.3 * scaling.load_n && search.scale_m > 0.16 * windup_m {
         return Err(Rejection::RateTooLow);
     }
-    let profile = stroke_profile(&line, &workspace.whole, scaling);
-    let (gap_m, sigma) =
-        gap_and_error_m(&line, profile.as_ref(), spread_m, vibration_n, scaling, &workspace.whole);
+    let profile = stroke_profile(&search.line, &workspace.whole, scaling);
+    let (gap_m, sigma) = gap_and_error_m(&search, profile.as_ref(), vibration_n, scaling, &workspace.whole);
     let mut fit = FlankFit {
         gap_m,
         profile,
-        compliance_m_per_n: line.fit.beta[FORCE] / scaling.load_n,
-        load_zero_se_n,
-        residual_rms_m: scale_m,
+        compliance_m_per_n: search.line.fit.beta[FORCE] / scaling.load_n,
         is_soft: sigma > 2.3,
         unexplained_m: 0.0,
-        line,
+        search,
     };
     if gap_m.0 < UNSEEN_GAP * windup_m {
         check_both_sides(&workspace.whole, scaling, false)?;
@@ -142,9 +137,10 @@ pub(crate) fn midrange_at_fit_m(
 }
 
 fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Option<f64> {
-    let beta = &fit.line.fit.beta;
+    let beta = &fit.search.line.fit.beta;
     let dx_m: Vec<f64> = (0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta)).collect();
-    let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
+    let load_n: Vec<f64> =
+        blocks.load_n.iter().map(|load_n| load_n - fit.search.line.at.load_zero_n).collect();
     let stiffness_n_per_m = fit.compliance_m_per_n.recip();
     // A damping ratio of 0.7: a mode that rings between two samples would outlast them.
     let (damping, mode_rad_per_s) = (1.4, 2500.0);
@@ -154,7 +150,7 @@ fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Opti
         stiffness_n_per_m / (mode_rad_per_s * mode_rad_per_s),
     );
     let noise = NoiseModel::Sensors(SensorNoise {
-        screw_rms_m: fit.residual_rms_m,
+        screw_rms_m: fit.search.scale_m,
         screw_resolution_m: 0.0,
         motor_rms_m: 0.0,
         motor_resolution_m: 0.0,
@@ -187,12 +183,12 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
             Err(_) => blocks *= 4,
         }
     };
-    if is_periodic(&best.found) {
+    if is_periodic(&best.line) {
         whole.find_phases(scaling.per_period);
     }
     let iterations = if whole.len() < SHORT_BLOCKS { 2 } else { 1 };
-    let found = search(whole, scaling, best.found.state, (iterations, REWEIGHTINGS))?;
-    Ok(SearchResult { found, ..best })
+    let line = search(whole, scaling, best.line.state, (iterations, REWEIGHTINGS))?;
+    Ok(SearchResult { line, ..best })
 }
 
 /// Whether errors that repeat with the position are there for certain, and matter: 0.2 µm do.
@@ -210,13 +206,13 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
 /// the wind-up, and friction between two samples that the load's slow part does not show. It grows with few changes of the
 /// flank, with heavy friction, and with a load cell at its end.
 fn gap_and_error_m(
-    line: &GaussNewtonResult,
+    search: &SearchResult,
     profile: Option<&StrokeProfile>,
-    spread_m: f64,
     vibration_n: f64,
     scaling: &Scaling,
     whole: &BlockMeans,
 ) -> ((f64, f64), f64) {
+    let line = &search.line;
     let rows = &line.design.firm;
     let groups = groups(rows);
     let refit = |least: f64| line.fit.leave_one_out(GAP, rows, &groups, (FORCE, least));
@@ -257,7 +253,7 @@ fn gap_and_error_m(
     let floor_m = (4.5e-4 * windup_m).hypot(0.4 * vibration_m);
     let (gap_m, jackknife_m, candidates_m) = profile.map_or_else(
         || {
-            let candidates_m = (0.45 * spread_m).hypot(weight * difference_m * choice.hypot(bend));
+            let candidates_m = (0.45 * search.spread_m).hypot(weight * difference_m * choice.hypot(bend));
             (line.fit.beta[GAP] + weight * difference_m, jackknife_m, candidates_m)
         },
         // What one gap for the whole stroke leaves unexplained is explained now.
@@ -294,7 +290,7 @@ fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
 /// it. A screw that friction holds within its gap, or a load that is another actuator's, leaves travel over that no flank
 /// accounts for.
 fn unexplained_m(blocks: &mut BlockMeans, scaling: &Scaling, fit: &FlankFit) -> f64 {
-    let GaussNewtonResult { design, fit: line, at, .. } = &fit.line;
+    let GaussNewtonResult { design, fit: line, at, .. } = &fit.search.line;
     blocks.apply_delays(at);
     integrate(blocks, at, scaling.motor_sense);
     let looks = (0..blocks.len()).step_by(blocks.len().div_ceil(LOOKS).max(1));

@@ -10,7 +10,11 @@ use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
-use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
+
+/// Each flank must be touched this long, s.
+const REQUIRED_CONTACT_S: f64 = 1.0;
+/// Below this a flank was not touched at all, s.
+const MIN_CONTACT_S: f64 = 0.1;
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]

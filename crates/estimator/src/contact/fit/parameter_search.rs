@@ -16,8 +16,9 @@ use crate::contact::stats::spread;
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 /// The best candidate.
+#[derive(Debug)]
 pub(crate) struct SearchResult {
-    pub(crate) found: GaussNewtonResult,
+    pub(crate) line: GaussNewtonResult,
     /// Spread of the gaps of all candidates about the best one's, each weighted by its misfit, m.
     pub(crate) spread_m: f64,
     /// Scale of the residuals of single blocks, m.
@@ -71,7 +72,7 @@ impl<'a> ParameterSearch<'a> {
         }
         let load_zero_se_n = self.zero_error_n(&best.found);
         Ok(SearchResult {
-            found: best.found,
+            line: best.found,
             spread_m: (squares / total.max(f64::MIN_POSITIVE)).sqrt(),
             scale_m: self.scale_m,
             load_zero_se_n,

@@ -114,7 +114,7 @@ fn time_shares(blocks: &BlockMeans, scaling: &Scaling) -> [f64; KNOTS] {
     let mut shares = [0.0; KNOTS];
     let mut all = 0.0;
     for (motor_m, dx_m) in blocks.motor_m.iter().zip(&blocks.dx_m) {
-        let place = (motor_m + dx_m - scaling.place_m.0) * scaling.per_place;
+        let place = scaling.place_share(motor_m + dx_m);
         if place.is_finite() {
             shares.iter_mut().zip(hats(place)).for_each(|(sum, share)| *sum += share);
             all += 1.0;
