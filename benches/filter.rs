@@ -73,7 +73,7 @@ fn load_band(bencher: Bencher, count: usize) {
 #[divan::bench(sample_count = 10)]
 fn contact_regression(bencher: Bencher) {
     let (prior, mut room) = (PartPrior::of_stiffness(5e7), contact::ContactWorkspace::default());
-    over(bencher, OUT_OF_CACHE, |samples| contact::estimate_with(samples, &prior, &mut room).unwrap());
+    over(bencher, OUT_OF_CACHE, |samples| contact::estimate(samples, &prior, &mut room).unwrap());
 }
 
 fn stream(bencher: Bencher, start: fn(&Filter) -> Stream, restart_each: usize) {

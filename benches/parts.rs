@@ -9,7 +9,7 @@ mod made_flight;
 use std::hint::black_box;
 use std::process::ExitCode;
 
-use estimator::contact::{self, PartPrior};
+use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{Error, GainSchedule, Samples, gap, midrange};
 use made_flight::{STEP_S, channels, filter};
 
@@ -46,7 +46,7 @@ fn run(part: &str, count: usize) -> Result<(), Error> {
         "published" => {
             black_box(midrange::estimate_with(&samples, &GainSchedule::new(&filter), &mut Vec::new())?);
         }
-        "contact" => drop(black_box(contact::estimate(&samples, &prior)?)),
+        "contact" => drop(black_box(contact::estimate(&samples, &prior, &mut ContactWorkspace::default())?)),
         _ => {}
     }
     black_box((dx_m, motor_m, load_n));

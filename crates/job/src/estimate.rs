@@ -2,7 +2,9 @@
 
 use std::cell::RefCell;
 
-use estimator::contact::{self, ContactEstimate, ContactPlot, GapAtPlace, PartPrior, Rejection};
+use estimator::contact::{
+    self, ContactEstimate, ContactPlot, ContactWorkspace, GapAtPlace, PartPrior, Rejection,
+};
 use estimator::{Filter, GainSchedule, GapStatistic, MidRangeEstimate, Samples, gap, midrange};
 use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
@@ -86,7 +88,8 @@ pub fn contact_regression(
     if let Some(reason) = pre_check_rejection(channels) {
         return Ok(Err(reason));
     }
-    let outcome = contact::estimate(&samples(channels), &prior(channels, part));
+    let outcome =
+        contact::estimate(&samples(channels), &prior(channels, part), &mut ContactWorkspace::default());
     Ok(outcome.map_err(|e| Diagnostic::new("estimate_failed", e))?.map_err(Rejection::code))
 }
 
@@ -97,7 +100,7 @@ const MAX_KEPT_SAMPLES: usize = 2 << 20;
 #[derive(Debug, Default)]
 struct Workspaces {
     published: Vec<f64>,
-    contact: contact::ContactWorkspace,
+    contact: ContactWorkspace,
 }
 
 thread_local! {
@@ -207,9 +210,9 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
 fn contact_estimate(
     channels: &ActuatorChannels,
     prior: &PartPrior,
-    workspace: &mut contact::ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<GapEstimate, estimator::Error> {
-    let outcome = contact::estimate_with(&samples(channels), prior, workspace)?;
+    let outcome = contact::estimate(&samples(channels), prior, workspace)?;
     Ok(outcome.map_or_else(|why| GapEstimate::refused(why.code()), |found| from_contact(&found)))
 }
 
@@ -220,7 +223,7 @@ fn midrange_estimate(
     channels: &ActuatorChannels,
     prior: &PartPrior,
     published: Option<&MidRangeEstimate>,
-    workspace: &mut contact::ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<GapEstimate, estimator::Error> {
     let Some(published) = published else { return Ok(GapEstimate::refused("channel_constant")) };
     let why = contact::find_rejection(&samples(channels), prior, workspace)?;
@@ -275,7 +278,7 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         load_delay_s: Some(found.load_delay_s),
         load_delay_se_s: Some(found.load_delay_se_s),
         friction_n: Some(found.friction_n()),
-        friction_se_n: Some(found.friction_se.at_p95_n),
+        friction_se_n: Some(found.friction_p95_se_n),
         friction_dry_n: Some(found.friction.dry_n),
         friction_dry_se_n: Some(found.friction_se.dry_n),
         friction_load_share: Some(found.friction.lost_share),

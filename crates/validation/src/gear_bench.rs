@@ -11,7 +11,7 @@ use std::path::Path;
 use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
-use estimator::contact::{self, PartPrior};
+use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
@@ -100,7 +100,8 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
     let regression = |end: usize| {
         let segment = 0..end;
         let samples = samples(step_s, [&motor_m, &dx_m, &load_n], &segment);
-        let outcome = contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))?;
+        let outcome = contact::estimate(&samples, &prior, &mut ContactWorkspace::default())
+            .map_err(|e| format!("{file}: {e}"))?;
         let degrees = |length_m: Option<f64>| length_m.map_or(f64::NAN, |m| (m / RADIUS_M).to_degrees());
         let found = outcome.ok();
         let lengths_m = [

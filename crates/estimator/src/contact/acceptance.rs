@@ -6,6 +6,8 @@ use super::types::ContactEstimate;
 
 /// Standard errors a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
+/// Load over friction below which friction dominates the relative position.
+const HEAVY: f64 = 3.0;
 /// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
 const DETECTION_SHARE: f64 = 0.01;
 /// Largest relative standard error of a useful gap, in wind-ups.
@@ -31,7 +33,7 @@ pub(crate) fn flags(
         (QualityFlag::GapVaries, !found.gap_profile.is_empty()),
         // Three spreads of 15 %.
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > 0.45),
-        (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
+        (QualityFlag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
         (QualityFlag::SoftContact, is_soft && !is_preloaded),
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];

@@ -85,7 +85,9 @@ impl BlockMeans {
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
         self.in_range_n = -self.clipped_above_n(-1.0)..self.clipped_above_n(1.0);
-        if !prior.output_locked && self.is_still() {
+        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
+        // A dead sensor, or that of a locked surface, repeats one value; a billionth of the motor's travel is rounding.
+        if !prior.output_locked && (0.0..=1e-9 * motor_m).contains(&screw_m) {
             return Err(Rejection::ChannelConstant);
         }
         let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
@@ -128,13 +130,6 @@ impl BlockMeans {
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 
-    /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
-    fn is_still(&self) -> bool {
-        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
-        // A billionth of the motor's travel is rounding.
-        (0.0..=1e-9 * motor_m).contains(&screw_m)
-    }
-
     /// What drives the coupling at a block.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
@@ -160,11 +155,6 @@ impl BlockMeans {
         changes.is_some_and(|(motor_m, load_n)| (self.dx_m[k] + motor_m + load_n).is_finite())
             && self.time_s[k] > 1.0
             && self.in_range_n.contains(&self.load_n[k])
-    }
-
-    /// Whether the load cell is at an end of its range for a part of the time.
-    pub(crate) fn is_clipped(&self) -> bool {
-        self.in_range_n.start.is_finite() || self.in_range_n.end.is_finite()
     }
 
     /// Whether an excerpt of so many blocks saves much.
@@ -278,9 +268,16 @@ fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
 
 /// A channel read so many blocks later; NaN where that lies outside the flight.
 fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
-    let (whole, part) = (shift.floor(), shift - shift.floor());
-    let weights = cubic(part);
-    let (from, len) = ((whole as isize).saturating_sub(1), logged.len());
+    let u = shift - shift.floor();
+    let (square, cube) = (u * u, u * u * u);
+    // For a place between the middle two of four.
+    let [a, b, c, d] = [
+        0.5 * (2.0 * square - cube - u),
+        0.5 * (3.0 * cube - 5.0 * square + 2.0),
+        0.5 * (4.0 * square - 3.0 * cube + u),
+        0.5 * (cube - square),
+    ];
+    let (from, len) = ((shift.floor() as isize).saturating_sub(1), logged.len());
     // The blocks for which all four lie within the flight.
     let begin = len.min(from.saturating_neg().max(0) as usize);
     let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
@@ -290,7 +287,6 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
     for (read, four) in
         read[begin..end].iter_mut().zip(logged.get(first..).unwrap_or(&[]).array_windows::<4>())
     {
-        let [a, b, c, d] = weights;
         *read = a * four[0] + b * four[1] + c * four[2] + d * four[3];
     }
 }
@@ -300,17 +296,6 @@ fn mean_of_sound(values: &[f64]) -> f64 {
     let (sum, count) =
         values.iter().filter(|v| v.is_finite()).fold((0.0, 0_usize), |(s, n), v| (s + v, n + 1));
     if 2 * count < values.len() { f64::NAN } else { sum / count as f64 }
-}
-
-/// Weights of four even points for a place between the middle two.
-fn cubic(u: f64) -> [f64; 4] {
-    let (square, cube) = (u * u, u * u * u);
-    [
-        0.5 * (2.0 * square - cube - u),
-        0.5 * (3.0 * cube - 5.0 * square + 2.0),
-        0.5 * (4.0 * square - 3.0 * cube + u),
-        0.5 * (cube - square),
-    ]
 }
 
 /// Means of motor, δX and load over the complete samples of a block that are no spikes of δX or the load, beyond some

@@ -34,7 +34,7 @@ pub use codes::{QualityFlag, Rejection};
 pub use fit::flank_fit::ContactWorkspace;
 pub use friction::friction_model::Friction;
 pub use plot_data::{ContactPlot, Flank, Touch};
-pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, GapAtPlace, PartPrior};
+pub use types::{ContactEstimate, ContactOutcome, GapAtPlace, PartPrior};
 
 use crate::error::Error;
 use crate::{Samples, model};
@@ -51,7 +51,8 @@ const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 /// Standard errors by which no gap of a sound log is below zero.
 const IMPOSSIBLE_SIGMA: f64 = 5.0;
 
-/// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection.
+/// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection. Flights that
+/// are estimated one after the other share the scratch memory of a workspace.
 ///
 /// Time is linear in the samples; memory is some twenty numbers for each block and a row of twenty for
 /// each tenth of a second or more.
@@ -59,15 +60,7 @@ const IMPOSSIBLE_SIGMA: f64 = 5.0;
 /// # Errors
 /// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness, a reference
 /// load or an unknown force that is not positive.
-pub fn estimate(samples: &Samples<'_>, prior: &PartPrior) -> Result<ContactOutcome, Error> {
-    estimate_with(samples, prior, &mut ContactWorkspace::default())
-}
-
-/// As [`estimate`], for one flight of many that share scratch memory.
-///
-/// # Errors
-/// As [`estimate`].
-pub fn estimate_with(
+pub fn estimate(
     samples: &Samples<'_>,
     prior: &PartPrior,
     room: &mut ContactWorkspace,
@@ -180,11 +173,11 @@ fn report(
         load_delay_s: state.load_delay_s,
         load_delay_se_s: error_m(&[(LOAD_RATE, 1.0)]) * LATE_S / fit.beta[FORCE],
         friction: state.friction,
-        friction_se: FrictionErrors {
+        friction_se: Friction {
             dry_n: friction_error_n(&[(DRY, 1.0)]),
             lost_share: friction_error_n(&[(SHARE, 1.0)]) / frame.load_n,
-            at_p95_n: friction_error_n(&[(DRY, 1.0), (SHARE, 1.0)]),
         },
+        friction_p95_se_n: friction_error_n(&[(DRY, 1.0), (SHARE, 1.0)]),
         gap_profile: contact.profile.as_ref().map(|profile| profile.places.clone()).unwrap_or_default(),
         preload_n,
         loop_width_m: lost_motion::loop_width_m(contact, &room.whole, frame),

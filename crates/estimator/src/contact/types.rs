@@ -37,17 +37,6 @@ pub struct GapAtPlace {
     pub gap_se_m: f64,
 }
 
-/// Standard errors of a fitted friction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrictionErrors {
-    /// Of `F_d`, N.
-    pub dry_n: f64,
-    /// Of η.
-    pub lost_share: f64,
-    /// Of the friction at the 95 % load, N.
-    pub at_p95_n: f64,
-}
-
 /// The gap by contact regression, and what was found on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactEstimate {
@@ -76,8 +65,10 @@ pub struct ContactEstimate {
     pub load_delay_se_s: f64,
     /// Friction of the screw in motion.
     pub friction: Friction,
-    /// Its standard errors.
-    pub friction_se: FrictionErrors,
+    /// The standard errors of its two parts.
+    pub friction_se: Friction,
+    /// Standard error of the friction at the 95 % load, N.
+    pub friction_p95_se_n: f64,
     /// The gap by place, from one end of the stroke seen to the other, where it varies along the stroke; empty where it
     /// does not.
     pub gap_profile: Vec<GapAtPlace>,

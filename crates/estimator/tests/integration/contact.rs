@@ -13,6 +13,10 @@ use simulator::{
 
 type Fault = fn(&mut Case);
 
+pub(crate) fn fit(samples: &Samples<'_>, prior: &PartPrior) -> Result<ContactOutcome, Error> {
+    contact::estimate(samples, prior, &mut ContactWorkspace::default())
+}
+
 /// A flight to be estimated, and the stiffness it is estimated with.
 struct Case {
     plant: Plant,
@@ -52,7 +56,7 @@ impl Case {
 
     fn estimate(&self, samples: &Samples<'_>) -> ContactOutcome {
         let prior = PartPrior { reference_load_n: Some(4000.0), ..self.prior() };
-        let outcome = contact::estimate(samples, &prior).unwrap();
+        let outcome = fit(samples, &prior).unwrap();
         let without_fit = contact::find_rejection(samples, &prior, &mut ContactWorkspace::default()).unwrap();
         match outcome {
             Ok(_) => assert_eq!(without_fit, None),
@@ -277,10 +281,9 @@ fn errors_periodic_in_position_become_terms() {
         c.sensors.screw.periodic = PeriodicErrors::try_from(vec![error]).unwrap();
     });
     let flight = case.fly(3);
-    let fit =
-        |prior| case.with_samples_of(&flight, |samples| contact::estimate(samples, &prior)).unwrap().unwrap();
-    let found = fit(PartPrior { period_m: Some(5e-3), ..case.prior() });
-    let without = fit(case.prior());
+    let fitted = |prior| case.with_samples_of(&flight, |samples| fit(samples, &prior)).unwrap().unwrap();
+    let found = fitted(PartPrior { period_m: Some(5e-3), ..case.prior() });
+    let without = fitted(case.prior());
     assert!((found.gap_m - 100e-6).abs() < 0.6e-6, "{found:?}");
     assert!(found.gap_se_m < 0.7 * without.gap_se_m, "{found:?} against {without:?}");
 }
@@ -305,7 +308,7 @@ fn bench(gaps_m: &[f64]) -> ContactEstimate {
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = PartPrior { output_locked: true, ..PartPrior::of_stiffness(stiffness_n_per_m) };
-    *contact::estimate(&samples, &prior).unwrap().unwrap()
+    *fit(&samples, &prior).unwrap().unwrap()
 }
 
 /// By hand: at zero load friction still holds 300 N in the coupling on either side, so that the loop is 12 µm wider than the
@@ -350,7 +353,7 @@ fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
         segments: &segments,
     };
     let prior = PartPrior::of_stiffness(5e7);
-    let found = contact::estimate(&samples, &prior).unwrap().unwrap();
+    let found = fit(&samples, &prior).unwrap().unwrap();
     assert!((found.gap_m / 100e-6 - 1.0).abs() < 5e-3, "{found:?}");
 }
 
@@ -418,7 +421,7 @@ proptest! {
         let samples =
             Samples { step_s: rate_hz.recip(), motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
         let prior = PartPrior { reference_load_n: Some(1e3), ..PartPrior::of_stiffness(5e7) };
-        if let Ok(gap) = contact::estimate(&samples, &prior).unwrap() {
+        if let Ok(gap) = fit(&samples, &prior).unwrap() {
             prop_assert!(gap.gap_m.is_finite() && gap.gap_se_m > 0.0 && gap.stiffness_n_per_m.is_finite());
         }
     }
@@ -428,8 +431,8 @@ proptest! {
 fn a_prior_that_cannot_be_is_an_error() {
     let samples = Samples { step_s: 0.01, motor_m: &[], dx_m: &[], load_n: &[], segments: &[] };
     let prior = PartPrior::of_stiffness(0.0);
-    assert!(matches!(contact::estimate(&samples, &prior), Err(Error::Parameter { .. })));
-    let nothing = contact::estimate(&samples, &PartPrior { stiffness_n_per_m: 5e7, ..prior });
+    assert!(matches!(fit(&samples, &prior), Err(Error::Parameter { .. })));
+    let nothing = fit(&samples, &PartPrior { stiffness_n_per_m: 5e7, ..prior });
     assert_eq!(nothing, Ok(Err(Rejection::ChannelConstant)));
 }
 

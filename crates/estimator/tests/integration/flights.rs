@@ -4,10 +4,11 @@
 use std::ops::Range;
 
 use estimator::SensorNoise;
-use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
+use estimator::contact::{ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use serde_json::Value;
 
+use crate::contact::fit;
 use crate::parquet_fixture::load;
 
 const FLIGHTS: [&str; 4] =
@@ -64,7 +65,7 @@ impl Log {
         let stiffness_n_per_m = self.number("assumed", "stiffness_n_per_m");
         let prior =
             PartPrior { reference_load_n: Some(3000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
-        contact::estimate(&self.samples(), &prior).unwrap()
+        fit(&self.samples(), &prior).unwrap()
     }
 
     fn gap(&self) -> Box<ContactEstimate> {

@@ -38,21 +38,6 @@ fn fly(seed: u64, gap_m: f64, friction: f64, rate_hz: f64) -> Flight {
     simulate(&plant, &profile, &Sensors::default(), seed).unwrap()
 }
 
-/// Set d is in radians with a P₀ of its own; set c opens with two missing rows, which only a batch can
-/// fill from what follows.
-#[test]
-fn a_stream_agrees_with_the_fifty_digits() {
-    for name in &SETS[..2] {
-        let set = Set::load(name);
-        let filter = set.filter(&set.as_given());
-        let (y, u, wanted) = (&set.columns["y"], &set.columns["u"], &set.columns["x_filt_2"]);
-        for stream in [Stream::constant_time(&filter), Stream::steady_state(&filter)] {
-            let error = difference(&streamed(stream, y, u), wanted);
-            assert!(error < 1e-10, "{name}: S off by {error:e} of the peak");
-        }
-    }
-}
-
 /// 1e-12 of the peak where the whole recursion goes on beyond settling; no bit where it does not.
 #[test]
 fn a_stream_is_the_batch_over_whole_flights() {

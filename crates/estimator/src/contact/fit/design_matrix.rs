@@ -68,7 +68,7 @@ impl BlockMeans {
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
     /// full or its stretch ends.
     pub(crate) fn rows(&self, scaling: &Scaling) -> DesignMatrix {
-        let most = scaling.row_blocks(self.period_s);
+        let most = ((scaling.row_s / self.period_s).round() as usize).max(6);
         let firm = Vec::with_capacity(self.len() / most);
         let (mut design, most) = (DesignMatrix { firm, light: Vec::new() }, most as f64);
         // Of the lower and the upper flank, lightly and firmly touched.

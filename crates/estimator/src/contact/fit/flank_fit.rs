@@ -249,7 +249,8 @@ fn gap_and_error_m(
     let friction_share = (friction.at_n(scaling.load_n) / scaling.load_n).min(0.6);
     let growth = 1.5 / (changes.max(1) as f64).sqrt() + 0.8 * friction_share;
     // The friction model is driven by the reading of the load cell, also where that is at its end.
-    let growth = growth.exp() * if whole.is_clipped() { 1.5 } else { 1.0 };
+    let is_clipped = whole.in_range_n.start.is_finite() || whole.in_range_n.end.is_finite();
+    let growth = growth.exp() * if is_clipped { 1.5 } else { 1.0 };
     let floor_m = (4.5e-4 * windup_m).hypot(0.4 * vibration_m);
     let (gap_m, jackknife_m, candidates_m) = profile.map_or_else(
         || {

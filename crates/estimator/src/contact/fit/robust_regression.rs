@@ -56,20 +56,23 @@ pub(crate) fn fit<const N: usize>(
     let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
     // Before the noise is known, beliefs only tell dependent columns apart.
     let hint = beliefs.map(|b| if b.sd.is_finite() { 1e-9 } else { 0.0 });
-    let mut found = solve(rows, beliefs, even.clone(), hint)?;
-    for round in 1..=rounds {
+    let (mut weights, mut lent) = (even.clone(), hint);
+    for round in 1.. {
+        let (normal, right) = normal_equations(rows, &weights);
+        let (beta, factor) = solve_normal(normal, right, beliefs, &lent)?;
+        let found =
+            RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs };
+        if round > rounds {
+            return Some(found);
+        }
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
         let spread_m = spread(residuals_m.iter().copied()).max(LEAST_SPREAD_M);
-        let weights: Vec<f64> = even
-            .iter()
-            .zip(&residuals_m)
-            .map(|(w, e)| w * trust(e.abs() / spread_m, round == rounds))
-            .collect();
+        let trusts = residuals_m.iter().map(|e| trust(e.abs() / spread_m, round == rounds));
+        weights = even.iter().zip(trusts).map(|(w, trust)| w * trust).collect();
         let noise = variance_of_a_row(rows, &weights, &residuals_m);
-        let lent = beliefs.map(|b| if b.sd.is_finite() { noise / (b.sd * b.sd) } else { 0.0 });
-        found = solve(rows, beliefs, weights, lent)?;
+        lent = beliefs.map(|b| if b.sd.is_finite() { noise / (b.sd * b.sd) } else { 0.0 });
     }
-    Some(found)
+    None
 }
 
 /// Weight of a residual. Outliers are rejected only in the last round: before, a bad start could reject a
@@ -138,17 +141,6 @@ fn normal_equations<const N: usize>(
         }
     }
     (SMatrix::from_fn(|i, j| squares[i][j]), SVector::from(right))
-}
-
-fn solve<const N: usize>(
-    rows: &[DesignRow<N>],
-    beliefs: &[GaussianPrior; N],
-    weights: Vec<f64>,
-    lent: [f64; N],
-) -> Option<RobustFit<N>> {
-    let (normal, right) = normal_equations(rows, &weights);
-    let (beta, factor) = solve_normal(normal, right, beliefs, &lent)?;
-    Some(RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
 }
 
 /// The coefficients of normal equations to which the priors are added.

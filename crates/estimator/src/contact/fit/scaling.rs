@@ -94,11 +94,6 @@ impl Scaling {
         self.load_n / self.stiffness_n_per_m
     }
 
-    /// Most blocks of a row, for blocks of some length, s; six at least.
-    pub(crate) fn row_blocks(&self, period_s: f64) -> usize {
-        ((self.row_s / period_s).round() as usize).max(6)
-    }
-
     /// A time from −1 at the start of the flight to 1 at its end.
     pub(crate) fn time_share(&self, time_s: f64) -> f64 {
         (time_s - self.time_s.0) * self.per_time

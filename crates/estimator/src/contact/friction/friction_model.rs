@@ -27,15 +27,7 @@ impl Friction {
     pub fn at_n(&self, load_n: f64) -> f64 {
         self.dry_n + self.lost_share * load_n.abs()
     }
-
-    /// Whether a load is less than three times the friction it meets.
-    pub(crate) fn is_heavy(&self, load_n: f64) -> bool {
-        load_n < HEAVY * self.at_n(load_n)
-    }
 }
-
-/// Load over friction below which friction dominates the relative position.
-const HEAVY: f64 = 3.0;
 
 /// Parameters of the screw, its coupling and the channels that the regression iterates over.
 #[derive(Debug, Clone, Copy, Default)]
