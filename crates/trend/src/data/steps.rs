@@ -1,5 +1,7 @@
 //! A step that wear cannot make, found by comparing lines on both sides of every flight.
 
+use std::ops::Range;
+
 use crate::data::outliers::WeightedGap;
 
 /// Numbers of estimates on each side of a candidate, from the shortest window to the longest.
@@ -60,27 +62,23 @@ const BLOCK: usize = 480;
 pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepChange> {
     let sums = PrefixSums::new(estimates, limit_m);
     let mut found: Vec<StepChange> = Vec::new();
-    // Begin of the range between two steps, first place of the block, and end of the range.
-    let mut open = vec![(0, 0, estimates.len())];
-    while let Some((low, from, high)) = open.pop() {
-        let mut to = (from + BLOCK).min(high);
-        let mut step = sums.largest(low, (from, to), high);
+    // Ranges between two steps, and the first place of the block in each.
+    let mut open = vec![(0..estimates.len(), 0)];
+    while let Some((range, from)) = open.pop() {
+        let mut to = (from + BLOCK).min(range.end);
+        let mut step = sums.largest(&range, from..to);
         // A larger step may follow just after the block.
-        while to < high && step.is_some_and(|step| step.at + FARTHEST > to) {
-            to = (to + BLOCK).min(high);
-            step = sums.largest(low, (from, to), high);
+        while to < range.end && step.is_some_and(|step| step.at + FARTHEST > to) {
+            to = (to + BLOCK).min(range.end);
+            step = sums.largest(&range, from..to);
         }
-        match step {
+        if let Some(step) = step {
             // Places before the block hold no step, unless the new one changes their windows.
-            Some(step) => {
-                open.extend([
-                    (step.at, step.at, high),
-                    (low, from.saturating_sub(FARTHEST).max(low), step.at),
-                ]);
-                found.push(step);
-            }
-            None if to < high => open.push((low, to, high)),
-            None => {}
+            let again = from.saturating_sub(FARTHEST).max(range.start);
+            open.extend([(step.at..range.end, step.at), (range.start..step.at, again)]);
+            found.push(step);
+        } else if to < range.end {
+            open.push((range, to));
         }
     }
     found.sort_unstable_by_key(|step| step.at);
@@ -97,7 +95,7 @@ pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f6
     let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
         .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
     changes.fold((0.0, 0.0), |(squares, count), at| {
-        let step = sums.offset(0, at, estimates.len(), REACH);
+        let step = sums.offset(&(0..estimates.len()), at, REACH);
         let se_m = step.se_m();
         if step.step_m.abs() > largest_m || se_m > 0.5 * largest_m {
             return (squares, count);
@@ -162,8 +160,8 @@ impl PrefixSums {
         Self { sums, usages, slope_information, wear_noise_m: WEAR_NOISE * limit_m }
     }
 
-    fn window_stats(&self, from: usize, to: usize) -> WindowStats {
-        let (a, b) = (&self.sums[from], &self.sums[to]);
+    fn window_stats(&self, window: Range<usize>) -> WindowStats {
+        let (a, b) = (&self.sums[window.start], &self.sums[window.end]);
         let weight = b[0] - a[0];
         let variance = weight.recip();
         let (x, y) = ((b[1] - a[1]) * variance, (b[2] - a[2]) * variance);
@@ -171,10 +169,15 @@ impl PrefixSums {
         WindowStats { variance, x, y, xx: centred(3, x * x), xy: centred(4, x * y), yy: centred(5, y * y) }
     }
 
+    /// The windows of as many estimates before and after a place of a range.
+    fn sides(&self, range: &Range<usize>, at: usize, reach: usize) -> [WindowStats; 2] {
+        let Range { start, end } = around(range, at, reach);
+        [self.window_stats(start..at), self.window_stats(at..end)]
+    }
+
     /// The step at a place of a range, by as many estimates on each side.
-    fn offset(&self, low: usize, at: usize, high: usize, reach: usize) -> Offset {
-        let (from, to) = (at.saturating_sub(reach).max(low), (at + reach).min(high));
-        let (left, right) = (self.window_stats(from, at), self.window_stats(at, to));
+    fn offset(&self, range: &Range<usize>, at: usize, reach: usize) -> Offset {
+        let [left, right] = self.sides(range, at, reach);
         let slope_variance = (left.xx + right.xx + self.slope_information).recip();
         let slope = (left.xy + right.xy) * slope_variance;
         let apart = right.x - left.x;
@@ -183,8 +186,8 @@ impl PrefixSums {
     }
 
     /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
-    fn is_beyond_wear(&self, low: usize, high: usize, step: &Offset) -> bool {
-        let (left, right) = self.near_sides(low, high, step);
+    fn is_beyond_wear(&self, range: &Range<usize>, step: &Offset) -> bool {
+        let [left, right] = self.sides(range, step.at, NEAR);
         let worn_m = (step.slope * (right.x - left.x)).abs();
         step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m().powi(2) + self.wear_noise_m * worn_m)
     }
@@ -194,37 +197,30 @@ impl PrefixSums {
     ///
     /// A bend, as at the onset of wear, makes a far line miss on one side; it does not make neighbours
     /// differ.
-    fn is_near(&self, low: usize, high: usize, step: &Offset) -> bool {
-        let (left, right) = self.near_sides(low, high, step);
+    fn is_near(&self, range: &Range<usize>, step: &Offset) -> bool {
+        let [left, right] = self.sides(range, step.at, NEAR);
         let se_m = (left.variance + right.variance).sqrt();
-        let (from, to) = (step.at.saturating_sub(SIDE).max(low), (step.at + SIDE).min(high));
-        let of_side = |from, to| self.slope(from, to, step.slope);
-        [step.slope, of_side(from, step.at), of_side(step.at, to)].into_iter().all(|slope| {
+        let [before, after] = self.sides(range, step.at, SIDE).map(|side| self.slope(&side, step.slope));
+        [step.slope, before, after].into_iter().all(|slope| {
             let step_m = right.y - left.y - slope * (right.x - left.x);
             step_m / step.step_m > NEAR_SHARE && step_m.abs() > NEAR_BELIEVED * se_m
         })
     }
 
-    /// The near window before a step and that after it.
-    fn near_sides(&self, low: usize, high: usize, step: &Offset) -> (WindowStats, WindowStats) {
-        let (from, to) = (step.at.saturating_sub(NEAR).max(low), (step.at + NEAR).min(high));
-        (self.window_stats(from, step.at), self.window_stats(step.at, to))
-    }
-
     /// Slope of one side, drawn to another so far as it is uncertain.
-    fn slope(&self, from: usize, to: usize, other: f64) -> f64 {
-        let side = self.window_stats(from, to);
+    fn slope(&self, side: &WindowStats, other: f64) -> f64 {
         (side.xy + self.slope_information * other) / (side.xx + self.slope_information)
     }
 
-    /// The step with the largest ratio to its standard error, over a range of places and all window lengths.
+    /// The step with the largest ratio to its standard error, over some places of a range and all window lengths.
     ///
     /// Every third place is tested first, then all places near those with half the required ratio.
-    fn largest(&self, low: usize, (from, to): (usize, usize), high: usize) -> Option<StepChange> {
+    fn largest(&self, range: &Range<usize>, block: Range<usize>) -> Option<StepChange> {
         let ratio = |step: &Offset| (step.step_m / step.se_m()).abs();
-        let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES).min(to);
+        let places = block.start.max(range.start + MIN_ESTIMATES)
+            ..(range.end + 1).saturating_sub(MIN_ESTIMATES).min(block.end);
         let is_half = |at: usize, reach: usize| {
-            let Offset { step_m, variance, .. } = self.offset(low, at, high, reach);
+            let Offset { step_m, variance, .. } = self.offset(range, at, reach);
             step_m * step_m > (0.6 * BELIEVED).powi(2) * variance
         };
         let promising = |&at: &usize| REACHES.into_iter().any(|reach| is_half(at, reach));
@@ -234,45 +230,47 @@ impl PrefixSums {
         all.dedup();
         all.into_iter()
             .filter(|at| places.contains(at))
-            .flat_map(|at| REACHES.map(|reach| (self.offset(low, at, high, reach), reach)))
-            .filter(|(found, _)| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
+            .flat_map(|at| REACHES.map(|reach| (self.offset(range, at, reach), reach)))
+            .filter(|(found, _)| self.is_beyond_wear(range, found) && self.is_near(range, found))
             .max_by(|(a, _), (b, _)| ratio(a).total_cmp(&ratio(b)))
-            .map(|(step, reach)| self.located(low, step.at, high, reach))
+            .map(|(step, reach)| self.located(range, step.at, reach))
     }
 
     /// The step at the place near a found one where two lines leave the smallest squares, and its size there.
     ///
     /// The largest ratio of a step to its error lies up to three flights from where the step happened: next to
     /// it the common slope takes up a part of the step.
-    fn located(&self, low: usize, found: usize, high: usize, reach: usize) -> StepChange {
-        let (from, to) = (found.saturating_sub(NEAR).max(low), (found + NEAR).min(high));
-        let places = found.saturating_sub(LOCATE).max(from + LEAST_SIDE)
-            ..=(found + LOCATE).min(to.saturating_sub(LEAST_SIDE));
-        let squares = |at: usize| self.squares_about_line(from, at) + self.squares_about_line(at, to);
+    fn located(&self, range: &Range<usize>, found: usize, reach: usize) -> StepChange {
+        let near = around(range, found, NEAR);
+        let places = found.saturating_sub(LOCATE).max(near.start + LEAST_SIDE)
+            ..=(found + LOCATE).min(near.end.saturating_sub(LEAST_SIDE));
+        let squares_about_line =
+            |WindowStats { xx, xy, yy, .. }: WindowStats| yy - xy * xy / (xx + self.slope_information);
+        let squares = |at: usize| {
+            let [before, after] = self.sides(&near, at, 2 * NEAR).map(squares_about_line);
+            before + after
+        };
         let at = places.min_by(|a, b| squares(*a).total_cmp(&squares(*b))).unwrap_or(found);
-        let step = self.offset(low, at, high, reach);
-        let (jump_m, jump_se_m) = self.step_between_lines(low, at, high, step.slope);
+        let step = self.offset(range, at, reach);
+        let (jump_m, jump_se_m) = self.step_between_lines(range, at, step.slope);
         StepChange { at, step_m: step.step_m, se_m: step.se_m(), jump_m, jump_se_m }
-    }
-
-    /// Weighted sum of squared residuals of the range's own line.
-    fn squares_about_line(&self, from: usize, to: usize) -> f64 {
-        let WindowStats { xx, xy, yy, .. } = self.window_stats(from, to);
-        yy - xy * xy / (xx + self.slope_information)
     }
 
     /// The step between the lines of both sides, each with a slope of its own, where they meet in time: the
     /// growth from one flight to the next is no part of it.
-    fn step_between_lines(&self, low: usize, at: usize, high: usize, common: f64) -> (f64, f64) {
-        let (from, to) = (at.saturating_sub(SIDE).max(low), (at + SIDE).min(high));
+    fn step_between_lines(&self, range: &Range<usize>, at: usize, common: f64) -> (f64, f64) {
         let x = self.usages[at - 1].midpoint(self.usages[at]);
-        let end = |from: usize, to: usize| {
-            let side = self.window_stats(from, to);
+        let end = |side: WindowStats| {
             let away = x - side.x;
             let variance = side.variance + away * away / (side.xx + self.slope_information);
-            (side.y + away * self.slope(from, to, common), variance)
+            (side.y + away * self.slope(&side, common), variance)
         };
-        let ((before_m, before_m2), (after_m, after_m2)) = (end(from, at), end(at, to));
+        let [(before_m, before_m2), (after_m, after_m2)] = self.sides(range, at, SIDE).map(end);
         (after_m - before_m, (before_m2 + after_m2).sqrt())
     }
+}
+
+/// The part of a range that reaches as far from a place on both sides.
+fn around(range: &Range<usize>, at: usize, reach: usize) -> Range<usize> {
+    at.saturating_sub(reach).max(range.start)..(at + reach).min(range.end)
 }
