@@ -5,7 +5,7 @@ use trend::{State, assess};
 use crate::histories::{Drawn, LIMIT_UM, prior, settings};
 
 /// Name, the state that is due at least (`None` where the records alone give it), and what draws the history.
-type Kind = (&'static str, Option<State>, fn(&mut Drawn));
+pub(crate) type Kind = (&'static str, Option<State>, fn(&mut Drawn));
 
 const UNITS: u64 = 100;
 
@@ -25,7 +25,7 @@ fn rise(d: &mut Drawn, from_um: f64, (least, most): (usize, usize), (low, high):
 }
 
 /// The kinds that must be acted on.
-const URGENT: [Kind; 27] = [
+pub(crate) const URGENT: [Kind; 27] = [
     ("one above the limit", None, |d| {
         young_or_old(d);
         jump(d, 1, 1);
@@ -166,7 +166,7 @@ const URGENT: [Kind; 27] = [
 ];
 
 /// The kinds that call for nothing.
-const CALM: [Kind; 7] = [
+pub(crate) const CALM: [Kind; 7] = [
     ("calm", None, |d| {
         young_or_old(d);
     }),
@@ -204,7 +204,7 @@ const CALM: [Kind; 7] = [
 ];
 
 /// Histories of a kind, with the due state of each.
-fn drawn(kind: Kind, number: u64) -> Vec<(Drawn, State)> {
+pub(crate) fn drawn(kind: Kind, number: u64) -> Vec<(Drawn, State)> {
     let one = |seed: u64| {
         let mut drawn = Drawn::new(1000 * number + seed, 1);
         (kind.2)(&mut drawn);
