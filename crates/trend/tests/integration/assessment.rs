@@ -79,12 +79,6 @@ fn a_state_stands_from_the_first_record_on() {
 }
 
 #[test]
-fn later_flights_do_not_change_an_assessment() {
-    let long = unit(400, |h| 20.0 + 0.02 * h);
-    assert_eq!(state_of(&long, 199), state_of(&unit(200, |h| 20.0 + 0.02 * h), 199));
-}
-
-#[test]
 fn settings_nothing_can_be_judged_by_are_refused() {
     let settings = Settings { watch_m: 2e-4, ..Settings::for_limit(1e-4) };
     let text = assess(&unit(9, |_| 20.0), 0, &settings, None).unwrap_err().to_string();
@@ -111,14 +105,16 @@ fn a_repair_is_on_record_whatever_the_number_of_flights_without_a_log() {
         let row = histories::row(flight, 8 * HOUR_US, 2.0, um, 0.3);
         Observation { gap_m: row.gap_m.filter(|_| flight % 10 == 0), ..row }
     };
-    let repair = trend::MaintenanceEvent { utc_us: 8 * HOUR_US * 285, renews: true };
     let series = histories::series((0..600).map(row));
-    let settings = Settings::for_limit(150e-6);
-    let with = series.clone().with_maintenance(vec![repair]);
-    let resets = |series: &Series| {
-        let found = assess(series, 8 * HOUR_US * 600, &settings, None).unwrap();
-        found.changes.iter().map(|change| change.kind).collect::<Vec<_>>()
+    let entered = |renews: Option<bool>| {
+        let entry = renews.map(|renews| trend::MaintenanceEvent { utc_us: 8 * HOUR_US * 285, renews });
+        let series = series.clone().with_maintenance(entry.into_iter().collect());
+        let found = assess(&series, 8 * HOUR_US * 600, &Settings::for_limit(150e-6), None).unwrap();
+        let level = found.level.map(|level| (level.gap_m, level.se_m, level.records));
+        (found.changes.iter().map(|change| change.kind).collect::<Vec<_>>(), level)
     };
-    assert_eq!(resets(&series), [trend::ChangePointKind::Reset]);
-    assert_eq!(resets(&with), [trend::ChangePointKind::Recorded]);
+    assert_eq!(entered(None).0, [trend::ChangePointKind::Reset]);
+    assert_eq!(entered(Some(true)).0, [trend::ChangePointKind::Recorded]);
+    // The level is measured either way.
+    assert_eq!(entered(Some(false)), entered(Some(true)));
 }

@@ -1,8 +1,8 @@
 //! Fleets whose truth a small simulator knows, with laws the bank does and does not contain.
 
 use trend::{
-    Assessment, ChangePoint, ChangePointKind, Executor, FleetPrior, MaintenanceEvent, Observation,
-    SerialExecutor, Series, Settings, UsageAxis, WearStatus, assess,
+    Assessment, ChangePointKind, FleetPrior, MaintenanceEvent, Observation, SerialExecutor, Series, Settings,
+    UsageAxis, WearStatus, assess,
 };
 
 use crate::histories::{self, DAY_US, series};
@@ -14,15 +14,12 @@ const LIMIT_M: f64 = 1e-4;
 type WearLaw = fn(f64) -> f64;
 
 /// None of these is in the bank.
-const STRANGE: [WearLaw; 4] = [
-    // Running in, then a line.
-    |t| 0.15 * (1.0 - (-t / 0.05).exp()) + 0.85 * t,
-    // Slow, fast, slow again: it meets the limit on the steep part.
-    |t| ((1.0 / (1.0 + (-6.0 * (t - 0.8)).exp())) - 0.008) / (0.7685 - 0.008),
-    // Two slopes with a knee.
-    |t| if t < 0.6 { 0.6 * t } else { 0.36 + 1.6 * (t - 0.6) },
-    // A logarithm.
-    |t| (1.0 + 4.0 * t).ln() / 5.0_f64.ln(),
+const STRANGE: [(&str, WearLaw); 4] = [
+    ("running in, then a line", |t| 0.15 * (1.0 - (-t / 0.05).exp()) + 0.85 * t),
+    // It meets the limit on the steep part.
+    ("slow, fast, slow", |t| ((1.0 / (1.0 + (-6.0 * (t - 0.8)).exp())) - 0.008) / (0.7685 - 0.008)),
+    ("two slopes", |t| if t < 0.6 { 0.6 * t } else { 0.36 + 1.6 * (t - 0.6) }),
+    ("logarithm", |t| (1.0 + 4.0 * t).ln() / 5.0_f64.ln()),
 ];
 
 /// A unit of two flights a day at 1.7 h, four in five of which leave an estimate.
@@ -102,18 +99,13 @@ fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
 }
 
 #[test]
-fn a_fleet_on_a_line_is_forecast_within_a_tenth_and_its_intervals_hold() {
-    let (error, coverage) = score(|t| t, &[0.4, 0.7]);
-    println!("line: median error {error:.3}, coverage {coverage:.3}");
-    assert!(error < 0.12 && coverage > 0.8, "{error} {coverage}");
-}
-
-#[test]
-fn laws_the_bank_does_not_contain_are_still_forecast_with_intervals_that_mostly_hold() {
-    for (name, law) in ["running in", "sigmoid", "knee", "logarithm"].into_iter().zip(STRANGE) {
-        let (error, coverage) = score(law, &[0.5, 0.7, 0.85]);
+fn fleets_are_forecast_with_intervals_that_hold_and_laws_the_bank_does_not_contain_hardly_worse() {
+    let line: (&str, WearLaw, &[f64], f64, f64) = ("line", |t| t, &[0.4, 0.7], 0.12, 0.8);
+    let strange = STRANGE.map(|(name, law)| (name, law, &[0.5, 0.7, 0.85][..], 0.6, 0.35));
+    for (name, law, shares, largest_error, least_coverage) in [line].into_iter().chain(strange) {
+        let (error, coverage) = score(law, shares);
         println!("{name}: median error {error:.3}, coverage {coverage:.3}");
-        assert!(error < 0.6 && coverage > 0.35, "{name}: {error} {coverage}");
+        assert!(error < largest_error && coverage > least_coverage, "{name}: {error} {coverage}");
     }
 }
 
@@ -129,35 +121,32 @@ fn rows(seed: u64, change_um: impl Fn(i64, f64) -> f64) -> Vec<Observation> {
         .collect()
 }
 
-fn changes(rows: Vec<Observation>) -> Vec<ChangePoint> {
-    assessment(&series(rows), 250 * DAY_US, None).changes
+fn changes(assessment: &Assessment) -> Vec<ChangePointKind> {
+    assessment.changes.iter().map(|change| change.kind).collect()
 }
 
 #[test]
-fn a_rise_that_no_record_explains_is_a_step_and_stays_in_the_level() {
-    let risen = |rise_um: f64| {
-        let rows = rows(2, |flight, gap| if flight < 200 { gap } else { gap + rise_um });
+fn a_rise_is_a_step_and_stays_in_the_level_and_is_the_books_own_at_a_change_of_installation() {
+    let risen = |rise_um: f64, installation: u32| {
+        let mut rows = rows(2, |flight, gap| if flight < 200 { gap } else { gap + rise_um });
+        for row in &mut rows[200..] {
+            row.installation = installation;
+            row.tail_hours_end = row.tail_hours_end.map(|hours| hours + 5000.0 * f64::from(installation));
+        }
         assessment(&series(rows), 250 * DAY_US, None)
     };
-    let (moved, still) = (risen(9.0), risen(0.0));
-    assert_eq!(moved.changes.iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangePointKind::Step]);
+    let (moved, still) = (risen(9.0, 0), risen(0.0, 0));
+    assert_eq!(changes(&moved), [ChangePointKind::Step]);
     let off_m = moved.level.unwrap().gap_m - still.level.unwrap().gap_m - 9e-6;
     assert!(off_m.abs() < 2e-6, "{off_m:e}");
-    assert!(still.changes.is_empty(), "{:?}", still.changes);
-}
-
-#[test]
-fn the_same_step_at_a_change_of_installation_is_the_books_own() {
-    let mut rows = rows(3, |flight, gap| if flight < 200 { gap } else { gap + 9.0 });
-    rows[200..].iter_mut().for_each(|row| row.installation = 1);
-    rows[200..].iter_mut().for_each(|row| row.tail_hours_end = row.tail_hours_end.map(|h| h + 5000.0));
-    assert_eq!(changes(rows).iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangePointKind::Recorded]);
+    assert_eq!(changes(&still), []);
+    assert_eq!(changes(&risen(9.0, 1)), [ChangePointKind::Recorded]);
 }
 
 #[test]
 fn wear_that_begins_late_is_an_onset_and_no_step() {
-    let found =
-        changes(rows(4, |flight, _| 20.0 + if flight < 250 { 0.0 } else { 0.08 * (flight - 250) as f64 }));
+    let rows = rows(4, |flight, _| 20.0 + if flight < 250 { 0.0 } else { 0.08 * (flight - 250) as f64 });
+    let found = assessment(&series(rows), 250 * DAY_US, None).changes;
     let [change] = found[..] else { panic!("{found:?}") };
     assert_eq!(change.kind, ChangePointKind::Onset);
     assert!((change.departure_us - 125 * DAY_US).abs() < 20 * DAY_US, "{change:?}");
@@ -180,50 +169,6 @@ fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units
     assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
     let cut = learned(&fleet(401).collect::<Vec<_>>());
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
-}
-
-/// The last first, each on a thread of its own.
-struct Backwards;
-
-impl Executor for Backwards {
-    fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
-        let work = &work;
-        let mut results: Vec<R> = std::thread::scope(|scope| {
-            let threads: Vec<_> = things.iter().rev().map(|thing| scope.spawn(move || work(thing))).collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-        });
-        results.reverse();
-        results
-    }
-}
-
-#[test]
-fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
-    let fleet: Vec<Series> = (0..6).map(|seed| series(unit(seed, |t| t, 400).rows)).collect();
-    let day = 200 * DAY_US;
-    let in_turn = FleetPrior::learn(&fleet, day, LIMIT_M, None, &SerialExecutor);
-    let apart = FleetPrior::learn(&fleet, day, LIMIT_M, None, &Backwards);
-    assert_eq!(format!("{in_turn:?}"), format!("{apart:?}"));
-}
-
-#[test]
-fn a_booked_re_shim_is_the_books_own_and_begins_the_unit_anew() {
-    // A fall of 8 µm to some 25 µm above new: too small to be known for a reset without the book.
-    let at = 300;
-    let fell = rows(11, |flight, gap| if flight < at { gap + 30.0 } else { gap + 22.0 });
-    let departure_us = fell[at as usize].departure_us;
-    let booked = |renews: Option<bool>| {
-        let maintenance = renews.map(|renews| MaintenanceEvent { utc_us: departure_us - 1, renews });
-        let series = series(fell.clone()).with_maintenance(maintenance.into_iter().collect());
-        assessment(&series, 250 * DAY_US, None)
-    };
-    let kinds = |trend: &Assessment| trend.changes.iter().map(|c| c.kind).collect::<Vec<_>>();
-    let (single_unit, rigged, renewed) = (booked(None), booked(Some(false)), booked(Some(true)));
-    assert!(!kinds(&single_unit).contains(&ChangePointKind::Recorded), "{:?}", single_unit.changes);
-    assert_eq!(kinds(&rigged), [ChangePointKind::Recorded]);
-    // The level is measured either way.
-    let level = |trend: &Assessment| trend.level.map(|level| (level.gap_m, level.se_m, level.records));
-    assert_eq!(level(&rigged), level(&renewed));
 }
 
 /// Thirty units of 400 flights at 1.5 h that wear by 30 µm in 600 h from 20 µm; halfway the gap falls by 8 µm.
