@@ -2,11 +2,11 @@
 
 use crate::data::series::{DAY_US, Flight, Series};
 use crate::error::Error;
-use crate::math::distributions::{self, NORMAL_95};
+use crate::math::{NORMAL_95, normal_cdf};
 use crate::measured::exceedance::Exceedance;
 use crate::measured::level::Level;
 use crate::measured::rise::Rise;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
@@ -141,7 +141,7 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
 fn over_limit(level: Option<Level>, installation_sd_m: f64, limit_m: f64) -> Option<f64> {
     let level = level?;
     let error_m = level.se_m.hypot(installation_sd_m).max(f64::MIN_POSITIVE);
-    Some(distributions::cdf((level.gap_m - limit_m) / error_m))
+    Some(normal_cdf((level.gap_m - limit_m) / error_m))
 }
 
 /// The crossing without times beyond the horizon.
@@ -160,7 +160,7 @@ fn chance_by(hours: f64, rise: &Rise) -> f64 {
         return 1.0 - 0.5 * rise.p50_hours / hours.max(f64::MIN_POSITIVE);
     }
     let spread = (rise.p50_hours / rise.p05_hours.max(f64::MIN_POSITIVE)).ln() / NORMAL_95;
-    distributions::cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
+    normal_cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
 }
 
 /// The pace of the last ninety days of flights; nothing when they show no hours.

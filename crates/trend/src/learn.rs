@@ -8,7 +8,7 @@ use crate::data::steps::installation_steps;
 use crate::executor::Executor;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
-use crate::prior::fleet_prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
+use crate::prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
 use crate::statement::history::History;
 use crate::wear::bank::WearLaw;
 use crate::wear::component::AgeAssumption;

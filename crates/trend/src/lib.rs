@@ -64,7 +64,7 @@ pub use executor::{Executor, SerialExecutor};
 pub use forecast::{Forecast, Interval, forecast};
 pub use measured::level::Level;
 pub use measured::record::Record;
-pub use prior::fleet_prior::{FleetPrior, UsageAxis};
+pub use prior::{FleetPrior, UsageAxis};
 pub use settings::Settings;
 pub use statement::assessment::Assessment;
 pub use statement::state::{Reason, State};

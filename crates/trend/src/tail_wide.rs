@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::data::series::DAY_US;
-use crate::math::median::median;
+use crate::math::median;
 
 /// Time within which steps of one tail are one step: a step is dated to within some flights.
 const SAME_US: i64 = 7 * DAY_US;

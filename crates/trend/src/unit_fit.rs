@@ -7,7 +7,7 @@ use crate::inference::consistency::agrees;
 use crate::inference::posterior::{Posterior, posterior};
 use crate::measured::rise::Rise;
 use crate::measured::{Jump, Measured};
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::history::{self, History};
 use crate::statement::level;

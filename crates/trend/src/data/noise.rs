@@ -2,7 +2,7 @@
 //!
 //! One estimator for gaps and for all other quantities.
 
-use crate::math::median::{SD_OVER_MAD, median};
+use crate::math::{SD_OVER_MAD, median};
 
 /// Flights of a batch whose means show a scatter that neighbours share.
 const BATCH: usize = 8;

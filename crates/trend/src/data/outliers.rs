@@ -38,21 +38,17 @@ pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> (Vec<WeightedGa
     let measured = flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?)));
     let (measured, gaps): (Vec<usize>, Vec<Gap>) = measured.unzip();
     let noise = noise(&gaps, limit_m);
-    let gaps: Vec<f64> = gaps.iter().map(|gap| gap.gap_m).collect();
-    let (mut estimates, mut errors) = (Vec::with_capacity(gaps.len()), Vec::with_capacity(gaps.len()));
-    let mut outliers = Vec::new();
-    for (k, is_sound) in noise.are_sound(&gaps, AGREEMENT_SDS).into_iter().enumerate() {
-        let flight = measured[k];
-        if is_sound {
-            let (Flight { installation, departure_us, hours: usage, .. }, gap_m) = (flights[flight], gaps[k]);
-            let weight = noise.errors[k].powi(-2);
-            estimates.push(WeightedGap { flight, installation, departure_us, usage, gap_m, weight });
-            errors.push(noise.errors[k]);
-        } else {
-            outliers.push(flight);
-        }
-    }
-    let sound: Vec<f64> = estimates.iter().map(|estimate: &WeightedGap| estimate.gap_m).collect();
+    let gaps_m: Vec<f64> = gaps.iter().map(|gap| gap.gap_m).collect();
+    let are_sound = noise.are_sound(&gaps_m, AGREEMENT_SDS);
+    let (sound, outliers): (Vec<usize>, Vec<usize>) = (0..gaps.len()).partition(|k| are_sound[*k]);
+    let estimate = |k: &usize| {
+        let (flight, gap_m, weight) = (measured[*k], gaps_m[*k], noise.errors[*k].powi(-2));
+        let Flight { installation, departure_us, hours: usage, .. } = flights[flight];
+        WeightedGap { flight, installation, departure_us, usage, gap_m, weight }
+    };
+    let mut estimates: Vec<WeightedGap> = sound.iter().map(estimate).collect();
+    let outliers = outliers.into_iter().map(|k| measured[k]).collect();
+    let (sound, errors): (Vec<f64>, Vec<f64>) = sound.iter().map(|k| (gaps_m[*k], noise.errors[*k])).unzip();
     let inflation = certain_inflation(&sound, &errors);
     estimates.iter_mut().for_each(|estimate| estimate.weight /= inflation);
     (estimates, outliers, noise.factor)

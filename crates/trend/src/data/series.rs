@@ -188,25 +188,15 @@ impl Series {
     }
 }
 
-/// Largest amount of a gap or of its error, m: far beyond any actuator.
-const MAX_GAP_M: f64 = 100.0;
-
-/// Least standard error of a gap, m: a thousandth of an atomic nucleus.
-const MIN_GAP_SE_M: f64 = 1e-18;
-
-/// Longest flight, and largest reading of an hour meter, h.
-const MAX_HOURS: (f64, f64) = (1e5, 1e9);
-
 /// Rows in the order of the flights, each flight once.
 fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observation>, RowFaults), Error> {
     let mut rows: Vec<Observation> = rows.into_iter().collect();
-    rows.iter().try_for_each(check)?;
     let mut faults = RowFaults::default();
     for row in &mut rows {
         let is_negative = |hours: Option<f64>| hours.is_some_and(|hours| hours < 0.0);
         faults.negative_usage +=
             usize::from(is_negative(row.flight_hours) || is_negative(row.tail_hours_end));
-        forget_implausible(row);
+        check(row)?;
     }
     rows.sort_unstable_by(order);
     rows.dedup_by(|next, kept| {
@@ -220,28 +210,30 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     Ok((rows, faults))
 }
 
-/// Rejects values that are not finite or out of range.
-fn check(row: &Observation) -> Result<(), Error> {
+/// Rejects values that are not finite, and errors that are not positive. A number that no unit can have is left out: one
+/// such record must not end the assessment of a fleet.
+fn check(row: &mut Observation) -> Result<(), Error> {
+    const MAX_FLIGHT_HOURS: f64 = 1e5;
+    const MAX_METER_HOURS: f64 = 1e9;
+    // Of a gap and of its error: far beyond any actuator, and a thousandth of an atomic nucleus.
+    const MAX_GAP_M: f64 = 100.0;
+    const MIN_GAP_SE_M: f64 = 1e-18;
+    let departure_us = row.departure_us;
     let numbers = [
-        ("flight_hours", row.flight_hours, f64::MIN),
-        ("tail_hours_end", row.tail_hours_end, f64::MIN),
-        ("gap_m", row.gap_m, f64::MIN),
-        ("gap_se_m", row.gap_se_m, f64::MIN_POSITIVE),
+        ("flight_hours", &mut row.flight_hours, 0.0..=MAX_FLIGHT_HOURS),
+        ("tail_hours_end", &mut row.tail_hours_end, 0.0..=MAX_METER_HOURS),
+        ("gap_m", &mut row.gap_m, -MAX_GAP_M..=MAX_GAP_M),
+        ("gap_se_m", &mut row.gap_se_m, MIN_GAP_SE_M..=MAX_GAP_M),
     ];
-    for (what, value, least) in numbers {
-        if let Some(value) = value.filter(|v| !v.is_finite() || *v < least) {
-            return Err(Error::Observation { what, departure_us: row.departure_us, value });
+    for (what, number, plausible) in numbers {
+        let is_refused =
+            |value: &f64| !value.is_finite() || (what == "gap_se_m" && *value < f64::MIN_POSITIVE);
+        if let Some(value) = number.filter(is_refused) {
+            return Err(Error::Observation { what, departure_us, value });
         }
+        *number = number.filter(|value| plausible.contains(value));
     }
     Ok(())
-}
-
-/// A number that no unit can have is not known: one such record must not end the assessment of a fleet.
-fn forget_implausible(row: &mut Observation) {
-    row.gap_m = row.gap_m.filter(|gap_m| gap_m.abs() <= MAX_GAP_M);
-    row.gap_se_m = row.gap_se_m.filter(|se_m| (MIN_GAP_SE_M..=MAX_GAP_M).contains(se_m));
-    row.flight_hours = row.flight_hours.filter(|hours| (0.0..=MAX_HOURS.0).contains(hours));
-    row.tail_hours_end = row.tail_hours_end.filter(|hours| (0.0..=MAX_HOURS.1).contains(hours));
 }
 
 /// A total order, so that neither arrival nor duplicates decide anything.

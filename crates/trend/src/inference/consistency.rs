@@ -7,7 +7,7 @@ use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
 use crate::measured::level::measured_level;
 use crate::measured::record::Record;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::FleetPrior;
 use crate::statement::history::History;
 use crate::wear::component::Component;
 

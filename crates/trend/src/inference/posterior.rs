@@ -3,8 +3,8 @@
 use crate::data::bins::{self, Segment};
 use crate::inference::level_filter::Regression;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
-use crate::math::distributions::ln_peak_density;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::math::ln_peak_density;
+use crate::prior::FleetPrior;
 use crate::wear::bank::{Candidate, WearLaw, candidates};
 use crate::wear::component::{AgeAssumption, Component};
 

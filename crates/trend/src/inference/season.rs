@@ -10,8 +10,7 @@ use crate::data::bins::{self, Bin, Segment};
 use crate::inference::level_filter::Pass;
 use crate::inference::posterior::Posterior;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
-use crate::prior::fleet_prior::FleetPrior;
-use crate::prior::season_params::{PSEUDO_SD, SeasonParams, YEAR_US};
+use crate::prior::{FleetPrior, PSEUDO_SD, SeasonParams, YEAR_US};
 
 /// Weight of the assumption of no seasonal component, in units.
 const PSEUDO_UNITS: f64 = 4.0;

@@ -2,7 +2,7 @@
 
 use crate::data::bins::{Bin, Segment};
 use crate::inference::level_filter::{Filter, Pass, Regression};
-use crate::prior::fleet_prior::{FleetPrior, LogPrior};
+use crate::prior::{FleetPrior, LogPrior};
 
 /// A segment's bins behind one filter, with the season fitted together with the candidate.
 pub(crate) struct SegmentFit<'a> {

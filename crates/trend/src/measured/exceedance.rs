@@ -98,7 +98,7 @@ pub(crate) fn exceedance(
 fn before(records: &[Record], at: usize) -> Option<f64> {
     let period = records[at].period;
     let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);
-    crate::math::median::median(near.map(|r| r.gap_m).collect())
+    crate::math::median(near.map(|r| r.gap_m).collect())
 }
 
 fn event(first: &Record, run: &Run, kind: ChangePointKind) -> ChangePoint {

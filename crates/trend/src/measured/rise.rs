@@ -1,6 +1,6 @@
 //! Local line: the rise of the last records, and when it meets the limit.
 
-use crate::math::distributions::NORMAL_95;
+use crate::math::NORMAL_95;
 use crate::measured::level::Line;
 use crate::measured::record::Record;
 use crate::settings::Settings;

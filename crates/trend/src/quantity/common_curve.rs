@@ -5,8 +5,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{QuantityValue, median};
-use crate::math::median::SD_OVER_MAD;
+use super::QuantityValue;
+use crate::math::{SD_OVER_MAD, median};
 
 const WEEK_US: i64 = 7 * 86_400_000_000;
 /// Fewest tails from which a week's deviation is taken.

@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{QuantityValue, median};
-use crate::math::median::SD_OVER_MAD;
+use super::QuantityValue;
+use crate::math::{SD_OVER_MAD, median};
 
 /// Standard errors from which a slope is applied.
 const SIGNIFICANT: f64 = 4.0;

@@ -7,7 +7,7 @@ pub mod changes;
 pub mod common_curve;
 pub mod covariates;
 
-pub use crate::math::median::median;
+pub use crate::math::median;
 
 /// Fewest flights from which a change is sought.
 pub const MIN_FLIGHTS: usize = 8;

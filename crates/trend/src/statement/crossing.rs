@@ -1,9 +1,8 @@
 //! When the limit is met: the crossings of all components, added up.
 
 use crate::inference::posterior::Posterior;
-use crate::math::distributions::GAUSS_HERMITE_5;
-use crate::math::weighted::WeightedSamples;
-use crate::prior::fleet_prior::{FleetPrior, WAIT_QUANTILES};
+use crate::math::{GAUSS_HERMITE_5, WeightedSamples};
+use crate::prior::{FleetPrior, WAIT_QUANTILES};
 use crate::settings::Settings;
 use crate::statement::types::Crossing;
 use crate::wear::bank::WearLaw;

@@ -4,8 +4,8 @@ use crate::data::bins::Segment;
 use crate::data::outliers::{WeightedGap, mark_outliers};
 use crate::data::series::{Flight, MaintenanceEvent, UnitData};
 use crate::data::steps::{StepChange, detect_steps};
-use crate::math::distributions;
-use crate::prior::fleet_prior::FleetPrior;
+use crate::math::normal_cdf;
+use crate::prior::FleetPrior;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// A step larger than this share of the limit is never a matter of rigging: a fall made the unit new, a rise is
@@ -94,7 +94,7 @@ impl<'a> History<'a> {
         let departure_us = data.flights[flight].departure_us;
         let certainty = match kind {
             ChangePointKind::Recorded => 1.0,
-            _ => distributions::cdf(step.step_m.abs() / step.se_m),
+            _ => normal_cdf(step.step_m.abs() / step.se_m),
         };
         let renewed = step.step_m < 0.0 && data.maintenance_near(flight).any(|entry| entry.renews);
         let begins_anew = kind == ChangePointKind::Reset || renewed;

@@ -1,8 +1,7 @@
 //! Rate, growth and wear law of a unit, from the mixture over its curves.
 
 use crate::inference::posterior::Posterior;
-use crate::math::distributions;
-use crate::math::weighted::WeightedSamples;
+use crate::math::{WeightedSamples, normal_cdf};
 use crate::statement::types::Rate;
 use crate::wear::bank::{WearClass, WearLaw};
 use crate::wear::component::Component;
@@ -24,7 +23,7 @@ pub(crate) fn growth_probability(posterior: &Posterior, limit_m: f64) -> f64 {
     let visible_m = VISIBLE * limit_m;
     let sd_m = posterior.growth_m2.sqrt();
     let grown_m = |n: &Component| n.level_m - n.new_m - n.amplitude_m * n.law.value(n.age_begin);
-    let grown = |n: &Component| n.weight * distributions::cdf((grown_m(n) - visible_m) / sd_m);
+    let grown = |n: &Component| n.weight * normal_cdf((grown_m(n) - visible_m) / sd_m);
     probability(posterior.components.iter().map(grown).sum())
 }
 

@@ -1,9 +1,10 @@
 //! Fleet prior: distribution of the parameters of a new unit of one part number (empirical Bayes).
 
-use crate::data::series::Flight;
+use std::f64::consts::TAU;
+
+use crate::data::series::{DAY_US, Flight};
 use crate::data::steps::WEAR_NOISE;
-use crate::math::distributions::{NORMAL_95, ln_peak_density};
-use crate::prior::season_params::SeasonParams;
+use crate::math::{NORMAL_95, ln_peak_density};
 use crate::wear::bank::{FAMILIES, WearLaw, default_shares};
 use crate::wear::component::{AgeAssumption, Component};
 
@@ -35,6 +36,12 @@ const FIRST_SPREAD: f64 = 0.1;
 /// Share of the fleet below which a family of laws is not tried: a unit that needs it is assessed without the
 /// fleet.
 const RULED_OUT: f64 = 0.003;
+
+/// A tropical year, microseconds.
+pub(crate) const YEAR_US: f64 = 365.242_2 * DAY_US as f64;
+
+/// Spread of the amplitude from unit to unit while no fleet is known, a share of the limit.
+pub(crate) const PSEUDO_SD: f64 = 0.003;
 
 /// What wear of a part number follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, strum::Display)]
@@ -208,6 +215,27 @@ impl FleetPrior {
     /// found, or not found yet.
     pub(crate) fn includes_law(&self, law: WearLaw) -> bool {
         matches!(law, WearLaw::None | WearLaw::Onset { .. }) || self.shares[law.family()] >= RULED_OUT
+    }
+}
+
+/// Yearly seasonal component of the measurement: one phase for a part number's fleet, an amplitude for each unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SeasonParams {
+    pub(crate) phase: f64,
+    /// Mean amplitude and its spread from unit to unit, metres.
+    pub(crate) mean_m: f64,
+    pub(crate) sd_m: f64,
+}
+
+impl SeasonParams {
+    /// Parameters while no fleet is known: no mean amplitude.
+    pub(crate) fn unknown(limit_m: f64) -> Self {
+        Self { phase: 0.0, mean_m: 0.0, sd_m: PSEUDO_SD * limit_m }
+    }
+
+    /// The component of unit amplitude at a time.
+    pub(crate) fn wave(&self, departure_us: f64) -> f64 {
+        (TAU * departure_us / YEAR_US - self.phase).cos()
     }
 }
 

@@ -1,5 +1,0 @@
-//! Distributions, medians and weighted quantiles.
-
-pub(crate) mod distributions;
-pub(crate) mod median;
-pub(crate) mod weighted;

@@ -1,4 +1,0 @@
-//! The fleet prior and its parameters.
-
-pub(crate) mod fleet_prior;
-pub(crate) mod season_params;
