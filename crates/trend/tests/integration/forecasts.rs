@@ -35,7 +35,8 @@ fn unit(class: &Class, seed: u64) -> (Drawn, f64) {
     let mut d = Drawn::new(seed, 1);
     let (power, share) = (d.between(class.power.0, class.power.1), d.between(0.35, 0.92));
     let (calm, logs) = (d.count(class.calm.0, class.calm.1), d.count(class.logs.0, class.logs.1));
-    let from_um = d.calm(calm);
+    d.stay((calm, calm), (40.0, 90.0));
+    let from_um = d.um;
     let to_um = from_um + share * (LIMIT_UM - from_um);
     d.logs(logs, |t| from_um + (to_um - from_um) * t.powf(power));
     let life = share.powf(-power.recip());

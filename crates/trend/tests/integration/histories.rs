@@ -39,6 +39,8 @@ pub(crate) struct Drawn {
     /// Standard error of a record, and what it is stated to be, µm.
     pub(crate) error_um: f64,
     stated: f64,
+    /// The gap of the last logs that stayed where they were, µm.
+    pub(crate) um: f64,
     /// Flights from one log to the next.
     pub(crate) every: i64,
     flight: i64,
@@ -51,7 +53,7 @@ impl Drawn {
         let error_um = random.between(0.3, 1.5);
         let stated = random.between(0.8, 1.25);
         let (rows, maintenance) = (Vec::new(), Vec::new());
-        Self { random, rows, maintenance, error_um, stated, every, flight: 0, installation: 0 }
+        Self { random, rows, maintenance, error_um, stated, um: 0.0, every, flight: 0, installation: 0 }
     }
 
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -62,24 +64,38 @@ impl Drawn {
         low + (self.random.uniform() * (high - low + 1) as f64) as usize
     }
 
-    /// A log whose true gap is this, µm; returns the measured one.
-    pub(crate) fn log(&mut self, true_um: f64) -> f64 {
-        let um = true_um + self.error_um * self.random.normal();
-        self.flown(Some(um), false);
-        um
-    }
-
-    /// Logs of a gap that grows from one value to another.
+    /// Logs of a gap that grows from one value to another, µm.
     pub(crate) fn logs(&mut self, count: usize, gap_um: impl Fn(f64) -> f64) {
         for k in 0..count {
-            self.log(gap_um((k + 1) as f64 / count as f64));
+            let um = gap_um((k + 1) as f64 / count as f64) + self.error_um * self.random.normal();
+            self.flown(Some(um));
         }
     }
 
-    /// Logs of such a gap, their number drawn between two.
-    pub(crate) fn some_logs(&mut self, least: usize, most: usize, gap_um: impl Fn(f64) -> f64) {
+    /// Logs of one gap, µm, which is remembered; gap and number are drawn between two.
+    pub(crate) fn stay(&mut self, (least, most): (usize, usize), (low, high): (f64, f64)) {
+        self.um = self.between(low, high);
+        self.above((least, most), (0.0, 0.0));
+    }
+
+    /// Logs of a gap that is above the remembered one by as much, µm.
+    pub(crate) fn above(&mut self, (least, most): (usize, usize), (low, high): (f64, f64)) {
+        let (um, count) = (self.um + self.between(low, high), self.count(least, most));
+        self.logs(count, |_| um);
+    }
+
+    /// Logs above the limit.
+    pub(crate) fn jump(&mut self, least: usize, most: usize) {
+        let um = self.between(155.0, 300.0).max(LIMIT_UM + 8.0 * self.error_um);
         let count = self.count(least, most);
-        self.logs(count, gap_um);
+        self.logs(count, |_| um);
+    }
+
+    /// Logs of a gap that rises from the remembered one to a share of the limit, along a power of the time.
+    pub(crate) fn rise(&mut self, (least, most): (usize, usize), share: (f64, f64), power: (f64, f64)) {
+        let (from_um, to_um) = (self.um, LIMIT_UM * self.between(share.0, share.1));
+        let (power, count) = (self.between(power.0, power.1), self.count(least, most));
+        self.logs(count, |t| from_um + (to_um - from_um) * t.powf(power));
     }
 
     /// Flags the last records.
@@ -88,11 +104,12 @@ impl Drawn {
         self.rows[from..].iter_mut().for_each(|row| row.is_doubtful = true);
     }
 
-    pub(crate) fn refused(&mut self, count: usize) {
-        (0..count).for_each(|_| self.flown(None, false));
+    /// Refused flights, their number drawn between two.
+    pub(crate) fn refused(&mut self, least: usize, most: usize) {
+        (0..self.count(least, most)).for_each(|_| self.flown(None));
     }
 
-    fn flown(&mut self, gap_um: Option<f64>, is_doubtful: bool) {
+    fn flown(&mut self, gap_um: Option<f64>) {
         self.flight += self.every;
         self.rows.push(Observation {
             departure_us: self.flight * DAY_US / 2,
@@ -102,15 +119,8 @@ impl Drawn {
             load_reversals: Some(120),
             gap_m: gap_um.map(|um| um * 1e-6),
             gap_se_m: gap_um.map(|_| self.stated * self.error_um * 1e-6),
-            is_doubtful,
+            is_doubtful: false,
         });
-    }
-
-    /// A calm history; returns its gap, µm.
-    pub(crate) fn calm(&mut self, count: usize) -> f64 {
-        let um = self.between(40.0, 90.0);
-        self.logs(count, |_| um);
-        um
     }
 
     pub(crate) fn moved(&mut self) {

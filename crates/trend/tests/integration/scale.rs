@@ -3,13 +3,17 @@
 use trend::{Assessment, FleetPrior, Observation, SerialExecutor, Series, Settings, assess};
 
 use crate::histories::{self, Drawn, LIMIT_M};
-use crate::states::{CALM, Kind, URGENT, drawn};
+use crate::states::{CALM, Kind, LINE, URGENT, drawn};
 
-const RESET: Kind = ("worn, then reset", None, |d| {
-    let um = d.calm(20);
-    d.logs(200, |t| um + 50.0 * t);
-    d.logs(60, |_| um);
-});
+const RESET: Kind = (
+    "worn, then reset",
+    None,
+    &[
+        |d| d.stay((20, 20), (40.0, 60.0)),
+        |d| d.rise((200, 200), (0.7, 0.8), LINE),
+        |d| d.above((60, 60), (0.0, 0.0)),
+    ],
+);
 
 /// Some units of each kind of history, every third without stated errors, with every length multiplied by a factor.
 fn assessments(factor: f64) -> Vec<Assessment> {

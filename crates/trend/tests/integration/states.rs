@@ -4,210 +4,154 @@ use trend::{State, assess};
 
 use crate::histories::{Drawn, LIMIT_UM, prior, settings};
 
-/// Name, the state that is due at least (`None` where the records alone give it), and what draws the history.
-pub(crate) type Kind = (&'static str, Option<State>, fn(&mut Drawn));
+/// Name, the state that is due at least (`None` where the records alone give it), and what happens to the unit, in order.
+pub(crate) type Kind = (&'static str, Option<State>, &'static [fn(&mut Drawn)]);
 
 const UNITS: u64 = 100;
 
-fn young_or_old(d: &mut Drawn) -> f64 {
-    let count = if d.every > 1 { d.count(6, 60) } else { d.count(8, 300) };
-    d.calm(count)
+/// The power of an even rise.
+pub(crate) const LINE: (f64, f64) = (1.0, 1.0);
+
+fn young_or_old(d: &mut Drawn) {
+    d.stay(if d.every > 1 { (6, 60) } else { (8, 300) }, (40.0, 90.0));
 }
 
-fn jump(d: &mut Drawn, least: usize, most: usize) {
-    let um = d.between(155.0, 300.0).max(LIMIT_UM + 8.0 * d.error_um);
-    d.some_logs(least, most, |_| um);
+fn one_of_the_last_three_is_wild(d: &mut Drawn) {
+    let (back, off_um) = (d.count(1, 3), 30.0 * (d.between(0.0, 2.0).floor() - 0.5));
+    let at = d.rows.len() - back;
+    d.rows[at].gap_m = d.rows[at].gap_m.map(|gap_m| gap_m + 1e-6 * off_um);
 }
 
-fn rise(d: &mut Drawn, from_um: f64, (least, most): (usize, usize), (low, high): (f64, f64), power: f64) {
-    let (to_um, count) = (LIMIT_UM * d.between(low, high), d.count(least, most));
-    d.logs(count, |t| from_um + (to_um - from_um) * t.powf(power));
+fn rise_in_stairs(d: &mut Drawn) {
+    let (um, step_um, every) = (d.um, d.between(5.0, 12.0), d.count(2, 4));
+    let steps = ((0.93 * LIMIT_UM - um) / step_um) as usize;
+    (1..=steps).for_each(|step| d.logs(every, |_| um + step_um * step as f64));
+}
+
+fn all_flagged(d: &mut Drawn) {
+    let count = d.count(1, 6);
+    d.logs(count, |_| 70.0);
+    d.doubt(count);
+}
+
+fn jump_below_the_limit(d: &mut Drawn) {
+    let least_um = (0.15 * LIMIT_UM).max(6.0 * d.error_um) + 5.0 * d.error_um;
+    d.above((1, 10), (least_um, least_um.max(0.93 * LIMIT_UM - d.um)));
+}
+
+fn wild_records(d: &mut Drawn) {
+    for _ in 0..d.count(1, 3) {
+        d.jump(1, 1);
+        d.above((2, 60), (0.0, 0.0));
+    }
 }
 
 /// The kinds that must be acted on.
 pub(crate) const URGENT: [Kind; 27] = [
-    ("one above the limit", None, |d| {
-        young_or_old(d);
-        jump(d, 1, 1);
-    }),
-    ("jump above the limit", None, |d| {
-        young_or_old(d);
-        jump(d, 2, 8);
-    }),
-    ("linear rise, now above", None, |d| {
-        let um = young_or_old(d);
-        rise(d, um, (2, 40), (1.02, 1.3), 1.0);
-    }),
-    ("accelerating rise, now above", None, |d| {
-        let (um, power) = (young_or_old(d), d.between(1.5, 3.0));
-        rise(d, um, (10, 80), (1.02, 1.3), power);
-    }),
-    ("all records above", None, |d| {
-        jump(d, 2, 7);
-    }),
-    ("one record in all, above", None, |d| {
-        jump(d, 1, 1);
-    }),
-    ("sparse logs, jump", None, |d| {
-        d.every = 24;
-        young_or_old(d);
-        jump(d, 2, 5);
-    }),
-    ("sparse logs, rise", None, |d| {
-        d.every = 24;
-        let um = young_or_old(d);
-        rise(d, um, (3, 8), (1.02, 1.3), 1.0);
-    }),
-    ("large errors, above", None, |d| {
-        d.error_um = d.between(4.0, 9.0);
-        young_or_old(d);
-        let um = d.between(170.0, 260.0);
-        d.some_logs(3, 8, |_| um);
-    }),
-    ("hours from the limit", Some(State::Plan), |d| {
-        let um = young_or_old(d);
-        rise(d, um, (4, 20), (0.88, 0.985), 1.0);
-    }),
-    ("accelerating, hours from the limit", Some(State::Plan), |d| {
-        let um = young_or_old(d);
-        rise(d, um, (6, 20), (0.88, 0.985), 2.0);
-    }),
-    ("hours from the limit, one of the last three records wild", Some(State::Plan), |d| {
-        let um = young_or_old(d);
-        rise(d, um, (10, 20), (0.88, 0.96), 1.0);
-        let (back, off_um) = (d.count(1, 3), 30.0 * (d.between(0.0, 2.0).floor() - 0.5));
-        let at = d.rows.len() - back;
-        d.rows[at].gap_m = d.rows[at].gap_m.map(|gap_m| gap_m + 1e-6 * off_um);
-    }),
-    ("rise in stairs", Some(State::Plan), |d| {
-        let um = young_or_old(d);
-        let (step_um, every) = (d.between(5.0, 12.0), d.count(2, 4));
-        let steps = ((0.93 * LIMIT_UM - um) / step_um) as usize;
-        (1..=steps).for_each(|step| d.logs(every, |_| um + step_um * step as f64));
-    }),
-    ("first records of an installation, all flagged", Some(State::Unassessed), |d| {
-        young_or_old(d);
-        d.moved();
-        let count = d.count(1, 6);
-        d.logs(count, |_| 70.0);
-        d.doubt(count);
-    }),
-    ("one above the limit, then an impossible record", Some(State::Plan), |d| {
-        young_or_old(d);
-        jump(d, 1, 1);
-        d.log(-40.0);
-    }),
-    ("jump that no line swallows", Some(State::Watch), |d| {
-        d.error_um = d.between(3.0, 5.0);
-        let um = d.between(45.0, 55.0);
-        d.some_logs(5, 8, |_| um);
-        let rise_um = d.between(18.0, 22.0) * d.error_um;
-        d.logs(1, |_| um + rise_um);
-    }),
-    ("jump below the limit, then a record off its level", Some(State::Watch), |d| {
-        let um = d.between(40.0, 60.0);
-        d.some_logs(8, 60, |_| um);
-        d.some_logs(4, 8, |_| um + 45.0);
-        d.log(um + 45.0 + 12.0 * d.error_um.max(1.0));
-    }),
-    ("two records, the second a jump", Some(State::Watch), |d| {
-        let um = d.between(40.0, 60.0);
-        d.logs(1, |_| um);
-        d.logs(1, |_| um + 60.0);
-    }),
-    ("jump at an installation", None, |d| {
-        young_or_old(d);
-        d.moved();
-        jump(d, 1, 8);
-    }),
-    ("jump after a booked re-shim", None, |d| {
-        young_or_old(d);
-        d.reshimmed();
-        jump(d, 1, 8);
-    }),
-    ("jump after a long pause", None, |d| {
-        young_or_old(d);
-        d.paused(150);
-        jump(d, 1, 8);
-    }),
-    ("above, refused since", Some(State::Act), |d| {
-        young_or_old(d);
-        jump(d, 2, 8);
-        let count = d.count(1, 80);
-        d.refused(count);
-    }),
-    ("flagged records above", None, |d| {
-        young_or_old(d);
-        jump(d, 1, 5);
-        let last = d.rows.len().min(3);
-        d.doubt(last);
-    }),
-    ("one low record after an exceedance", Some(State::Act), |d| {
-        let um = young_or_old(d);
-        jump(d, 2, 8);
-        d.log(um);
-    }),
-    ("above but for an outlier", None, |d| {
-        let um = young_or_old(d);
-        jump(d, 4, 8);
-        d.log(um);
-        d.logs(2, |_| 200.0);
-    }),
-    ("slow wear to the limit", Some(State::Plan), |d| {
-        let um = d.between(40.0, 60.0);
-        rise(d, um, (200, 400), (1.01, 1.05), 1.0);
-    }),
-    ("jump that stays below the limit", Some(State::Watch), |d| {
-        let um = young_or_old(d);
-        let least_um = (0.15 * LIMIT_UM).max(6.0 * d.error_um) + 5.0 * d.error_um;
-        let um = um + d.between(least_um, least_um.max(0.93 * LIMIT_UM - um));
-        d.some_logs(1, 10, |_| um);
-    }),
+    ("one above the limit", None, &[young_or_old, |d| d.jump(1, 1)]),
+    ("jump above the limit", None, &[young_or_old, |d| d.jump(2, 8)]),
+    ("linear rise, now above", None, &[young_or_old, |d| d.rise((2, 40), (1.02, 1.3), LINE)]),
+    ("accelerating rise, now above", None, &[young_or_old, |d| d.rise((10, 80), (1.02, 1.3), (1.5, 3.0))]),
+    ("all records above", None, &[|d| d.jump(2, 7)]),
+    ("one record in all, above", None, &[|d| d.jump(1, 1)]),
+    ("sparse logs, jump", None, &[|d| d.every = 24, young_or_old, |d| d.jump(2, 5)]),
+    ("sparse logs, rise", None, &[|d| d.every = 24, young_or_old, |d| d.rise((3, 8), (1.02, 1.3), LINE)]),
+    (
+        "large errors, above",
+        None,
+        &[|d| d.error_um = d.between(4.0, 9.0), young_or_old, |d| d.stay((3, 8), (170.0, 260.0))],
+    ),
+    ("hours from the limit", Some(State::Plan), &[young_or_old, |d| d.rise((4, 20), (0.88, 0.985), LINE)]),
+    (
+        "accelerating, hours from the limit",
+        Some(State::Plan),
+        &[young_or_old, |d| d.rise((6, 20), (0.88, 0.985), (2.0, 2.0))],
+    ),
+    (
+        "hours from the limit, one of the last three records wild",
+        Some(State::Plan),
+        &[young_or_old, |d| d.rise((10, 20), (0.88, 0.96), LINE), one_of_the_last_three_is_wild],
+    ),
+    ("rise in stairs", Some(State::Plan), &[young_or_old, rise_in_stairs]),
+    (
+        "first records of an installation, all flagged",
+        Some(State::Unassessed),
+        &[young_or_old, Drawn::moved, all_flagged],
+    ),
+    (
+        "one above the limit, then an impossible record",
+        Some(State::Plan),
+        &[young_or_old, |d| d.jump(1, 1), |d| d.logs(1, |_| -40.0)],
+    ),
+    (
+        "jump that no line swallows",
+        Some(State::Watch),
+        &[
+            |d| d.error_um = d.between(3.0, 5.0),
+            |d| d.stay((5, 8), (45.0, 55.0)),
+            |d| d.above((1, 1), (18.0 * d.error_um, 22.0 * d.error_um)),
+        ],
+    ),
+    (
+        "jump below the limit, then a record off its level",
+        Some(State::Watch),
+        &[
+            |d| d.stay((8, 60), (40.0, 60.0)),
+            |d| d.above((4, 8), (45.0, 45.0)),
+            |d| d.above((1, 1), [45.0 + 12.0 * d.error_um.max(1.0); 2].into()),
+        ],
+    ),
+    (
+        "two records, the second a jump",
+        Some(State::Watch),
+        &[|d| d.stay((1, 1), (40.0, 60.0)), |d| d.above((1, 1), (60.0, 60.0))],
+    ),
+    ("jump at an installation", None, &[young_or_old, Drawn::moved, |d| d.jump(1, 8)]),
+    ("jump after a booked re-shim", None, &[young_or_old, Drawn::reshimmed, |d| d.jump(1, 8)]),
+    ("jump after a long pause", None, &[young_or_old, |d| d.paused(150), |d| d.jump(1, 8)]),
+    ("above, refused since", Some(State::Act), &[young_or_old, |d| d.jump(2, 8), |d| d.refused(1, 80)]),
+    ("flagged records above", None, &[young_or_old, |d| d.jump(1, 5), |d| d.doubt(d.rows.len().min(3))]),
+    (
+        "one low record after an exceedance",
+        Some(State::Act),
+        &[young_or_old, |d| d.jump(2, 8), |d| d.above((1, 1), (0.0, 0.0))],
+    ),
+    (
+        "above but for an outlier",
+        None,
+        &[young_or_old, |d| d.jump(4, 8), |d| d.above((1, 1), (0.0, 0.0)), |d| d.logs(2, |_| 200.0)],
+    ),
+    (
+        "slow wear to the limit",
+        Some(State::Plan),
+        &[|d| d.um = d.between(40.0, 60.0), |d| d.rise((200, 400), (1.01, 1.05), LINE)],
+    ),
+    ("jump that stays below the limit", Some(State::Watch), &[young_or_old, jump_below_the_limit]),
 ];
 
 /// The kinds that call for nothing.
 pub(crate) const CALM: [Kind; 7] = [
-    ("calm", None, |d| {
-        young_or_old(d);
-    }),
-    ("calm, sparse logs", None, |d| {
-        d.every = 24;
-        young_or_old(d);
-    }),
-    ("calm, large errors", None, |d| {
-        d.error_um = d.between(3.0, 6.0);
-        let um = d.between(40.0, 60.0);
-        d.some_logs(2, 300, |_| um);
-    }),
-    ("outliers that were not confirmed", None, |d| {
-        let um = young_or_old(d);
-        for _ in 0..d.count(1, 3) {
-            jump(d, 1, 1);
-            d.some_logs(2, 60, |_| um);
-        }
-    }),
-    ("few records", None, |d| {
-        let count = d.count(1, 8);
-        d.calm(count);
-    }),
-    ("moved, with a bias", None, |d| {
-        let um = young_or_old(d);
-        d.moved();
-        let (bias_um, count) = (d.between(-4.0, 4.0), d.count(1, 60));
-        d.logs(count, |_| um + bias_um);
-    }),
-    ("slow wear far from the limit", None, |d| {
-        let um = d.between(30.0, 50.0);
-        let (grown_um, count) = (d.between(0.0, 10.0), d.count(60, 300));
-        d.logs(count, |t| um + grown_um * t);
-    }),
+    ("calm", None, &[young_or_old]),
+    ("calm, sparse logs", None, &[|d| d.every = 24, young_or_old]),
+    ("calm, large errors", None, &[|d| d.error_um = d.between(3.0, 6.0), |d| d.stay((2, 300), (40.0, 60.0))]),
+    ("outliers that were not confirmed", None, &[young_or_old, wild_records]),
+    ("few records", None, &[|d| d.stay((1, 8), (40.0, 90.0))]),
+    ("moved, with a bias", None, &[young_or_old, Drawn::moved, |d| d.above((1, 60), (-4.0, 4.0))]),
+    (
+        "slow wear far from the limit",
+        None,
+        &[
+            |d| d.um = d.between(30.0, 50.0),
+            |d| d.rise((60, 300), (d.um / LIMIT_UM, (d.um + 10.0) / LIMIT_UM), LINE),
+        ],
+    ),
 ];
 
 /// Histories of a kind, with the due state of each.
 pub(crate) fn drawn(kind: Kind, number: u64) -> Vec<(Drawn, State)> {
     let one = |seed: u64| {
         let mut drawn = Drawn::new(1000 * number + seed, 1);
-        (kind.2)(&mut drawn);
+        kind.2.iter().for_each(|happens| happens(&mut drawn));
         let due = drawn.due().max(kind.1.unwrap_or(State::Normal));
         (drawn, due)
     };
@@ -250,7 +194,8 @@ fn the_level_is_that_of_the_last_records() {
     let mut held = 0;
     for seed in 0..300 {
         let mut d = Drawn::new(seed + 5000, 1);
-        let um = young_or_old(&mut d);
+        young_or_old(&mut d);
+        let um = d.um;
         let (to_um, logs) = (um + d.between(0.0, 50.0), d.count(1, 60));
         d.logs(logs, |t| um + (to_um - um) * t);
         let level = assess(&d.series(), d.now_us(), &settings(), None).unwrap().level.unwrap();
