@@ -16,16 +16,14 @@ thread_local! {
 
 /// An empty column with room for so many values.
 pub(crate) fn acquire(values: usize) -> Vec<f64> {
-    let kept = POOL.with_borrow_mut(|pool| {
-        let fits = pool.iter().position(|column| column.capacity() >= values);
-        fits.map(|at| pool.swap_remove(at))
-    });
+    let fits = |column: &Vec<f64>| column.capacity() >= values;
+    let kept = POOL.with_borrow_mut(|pool| pool.iter().position(fits).map(|at| pool.swap_remove(at)));
     kept.unwrap_or_else(|| Vec::with_capacity(values))
 }
 
 /// Takes a column back.
 pub(crate) fn release(mut column: Vec<f64>) {
-    if column.capacity() == 0 || column.capacity() > MAX_VALUES {
+    if !(1..=MAX_VALUES).contains(&column.capacity()) {
         return;
     }
     column.clear();
@@ -47,8 +45,7 @@ mod tests {
         column.push(1.0);
         let address = column.as_ptr();
         release(column);
-        let longer = acquire(1000);
-        assert_ne!(longer.as_ptr(), address);
+        assert!(acquire(1000).capacity() >= 1000);
         let again = acquire(50);
         assert_eq!((again.as_ptr(), again.len()), (address, 0));
         // Few are kept, and none beyond the usual length.

@@ -24,7 +24,6 @@ use crate::mapping::units::Unit;
 use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
 use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
-use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::DAY_S;
 
 pub use identity_sources::{folder_value, path_identity, path_position, path_tail};
@@ -265,7 +264,7 @@ const UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 
 /// A column of numbers; none where it cannot be read.
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
-    match file.append_numbers(name, RowSelection::ALL, &mut values) {
+    match file.append_numbers(name, None, &mut values) {
         Ok(()) => values.finish().0,
         Err(_) => Vec::new(),
     }

@@ -15,15 +15,12 @@ pub(crate) fn file_length(file: &File) -> io::Result<u64> {
 /// Fills the buffer from some byte on.
 pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io::Result<()> {
     while !buffer.is_empty() {
-        match read_at(file, buffer, at) {
-            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-            Ok(count) => {
-                buffer = &mut buffer[count..];
-                at += count as u64;
-            }
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(e),
+        let count = read_at(file, buffer, at)?;
+        if count == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
         }
+        buffer = &mut buffer[count..];
+        at += count as u64;
     }
     Ok(())
 }

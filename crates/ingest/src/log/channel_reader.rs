@@ -213,7 +213,7 @@ impl<'s> ChannelSampling<'s> {
         let is_mended = is_text || !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
             // Rows that were put in order are not those of the file.
-            let wanted = if self.line.kept.is_none() { wanted } else { RowSelection::ALL };
+            let wanted = if self.line.kept.is_none() { wanted } else { None };
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = seen.filter(|_| self.line.kept.is_none());
@@ -256,7 +256,7 @@ impl<'s> ChannelSampling<'s> {
     }
 
     fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {
-        self.sheet.numbers(samples, None, RowSelection::ALL).map(|(values, _)| values)
+        self.sheet.numbers(samples, None, None).map(|(values, _)| values)
     }
 
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
@@ -272,7 +272,7 @@ impl<'s> ChannelSampling<'s> {
         if self.every == 1 {
             return self.readings(geometry, wanted);
         }
-        let read = self.readings(geometry, RowSelection::ALL)?;
+        let read = self.readings(geometry, None)?;
         let (_, instants) = self.instants()?;
         let values = self.placed(&instants, &read.values, &instants, Interpolation::Line);
         Ok(Channel { values, seen: None, ..read })
@@ -303,12 +303,12 @@ pub(crate) fn follow(
     // A nanosecond is no shift.
     let is_shifted = (own.map.shift_s() - master.map.shift_s()).abs() >= 1e-9;
     let is_direct = shared && !is_shifted && (own.every == 1 || is_slow_load);
-    let read = own.readings(geometry, if is_direct { wanted } else { RowSelection::ALL });
+    let read = own.readings(geometry, if is_direct { wanted } else { None });
     let Channel { values, turn_m, .. } = match read {
         Ok(read) if is_direct => return Ok(read),
         Err(error) if shared && own.has_own_list(master, &error)? => {
             own.line = own.line_of()?;
-            own.readings(geometry, RowSelection::ALL)?
+            own.readings(geometry, None)?
         }
         read => read?,
     };

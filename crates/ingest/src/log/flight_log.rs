@@ -23,7 +23,6 @@ use crate::log::types::{ActuatorChannels, ActuatorColumns, LogFiles};
 use crate::mapping::column_pattern::ColumnPattern;
 use crate::mapping::{ChannelMapping, Channels, IdentityField, IdentityMapping, Mapping, Role, SampleFilter};
 use crate::parquet::log_file::LogFile;
-use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::TimeOrigin;
 use crate::time::zero_order_hold::zero_order_hold;
 
@@ -496,8 +495,7 @@ impl Log {
             // A state stands until the next one comes, as a slow load does.
             let position = at.position.as_str();
             let own = ChannelSampling::new(sheet, &map, &name, position);
-            let Channel { mut values, .. } =
-                channel_reader::follow(master, own, Role::Load, geometry, RowSelection::ALL)?;
+            let Channel { mut values, .. } = channel_reader::follow(master, own, Role::Load, geometry, None)?;
             zero_order_hold(&mut values, &line.segments, line.step_s);
             segments = condition.within(&values, &segments, line.step_s);
         }

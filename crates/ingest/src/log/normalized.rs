@@ -19,7 +19,6 @@ use crate::log::identity::{Identity, IdentityFields};
 use crate::log::types::ActuatorChannels;
 use crate::mapping::IdentityField;
 use crate::parquet::log_file::LogFile;
-use crate::parquet::row_selection::RowSelection;
 use crate::parquet::writer::{Column, Encoding, write_encoded};
 use crate::time::clock::TimestampRepairs;
 
@@ -120,7 +119,7 @@ impl Normalized {
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error> {
     let mut values = ColumnBuilder::with_capacity(file.rows().min(1 << 26), None).with_stats();
-    file.append_numbers(name, RowSelection::ALL, &mut values)?;
+    file.append_numbers(name, None, &mut values)?;
     let (values, seen) = values.finish();
     let seen = seen.unwrap_or_else(|| ChannelStats::of(&values));
     Ok((values, seen))

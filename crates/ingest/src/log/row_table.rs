@@ -116,12 +116,12 @@ impl RowTable {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
         let room = if self.holds_all(samples) { self.rows().min(1 << 26) } else { 0 };
         let mut values = ColumnBuilder::with_capacity(room, to_si);
-        if to_si.is_some() && wanted.is_all() {
+        if to_si.is_some() && wanted.is_none() {
             values = values.with_stats();
         }
         if self.holds_all(samples) {
             // In a list a row is no sample.
-            let wanted = if self.is_listed(&samples.leaf) { RowSelection::ALL } else { wanted };
+            let wanted = if self.is_listed(&samples.leaf) { None } else { wanted };
             for file in &self.files {
                 file.append_numbers(&samples.leaf, wanted, &mut values)?;
             }
@@ -305,9 +305,7 @@ impl RowTable {
         }
         if is_every_row && !ticks.is_whole && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
             let mut reals = ColumnBuilder::with_capacity(self.rows().min(1 << 26), None);
-            self.files
-                .iter()
-                .try_for_each(|file| file.append_numbers(column, RowSelection::ALL, &mut reals))?;
+            self.files.iter().try_for_each(|file| file.append_numbers(column, None, &mut reals))?;
             let mut reader = TimestampParser::new(column, ticks, 0);
             reader.seconds = reals.finish().0;
             return Ok(reader.stamps());

@@ -27,7 +27,7 @@ impl SampleSelection {
     }
 
     pub(crate) fn wanted(&self) -> RowSelection<'_> {
-        if self.apart == 0 { RowSelection::ALL } else { RowSelection::of(&self.segments) }
+        (self.apart > 0).then_some(&self.segments)
     }
 
     /// Removes samples that do not count, so the result does not depend on the page layout.

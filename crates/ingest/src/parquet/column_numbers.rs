@@ -12,7 +12,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use crate::channel::column_builder::{BATCH, ColumnBuilder};
 use crate::parquet::page_reader::Pages;
 use crate::parquet::raw_footer::caught;
-use crate::parquet::row_selection::RowSelection;
+use crate::parquet::row_selection::{RowSelection, intersects};
 
 /// Whether the numbers of a chunk are read here.
 pub(crate) fn is_plain(chunk: &ColumnChunkMetaData) -> bool {
@@ -50,19 +50,16 @@ where
     let counts = pages.values();
     let mut reader = ColumnReaderImpl::<T>::new(column, Box::new(pages) as Box<dyn PageReader>);
     let (mut values, mut levels) = (Vec::with_capacity(BATCH), Vec::with_capacity(BATCH));
-    let (mut row, mut unwanted) = (into.len(), 0);
     for count in counts {
-        let end = row + count;
-        if !wanted.intersects(row..end) {
-            (row, unwanted) = (end, unwanted + count);
-            continue;
+        let end = into.len() + count;
+        if !intersects(wanted, &(into.len()..end)) {
+            into.append_nulls(reader.skip_records(count)?);
         }
-        skip(&mut reader, &mut unwanted, into)?;
-        while row < end {
+        while into.len() < end {
             values.clear();
             levels.clear();
             let marks = is_nullable.then_some(&mut levels);
-            let (read, _, _) = reader.read_records(BATCH.min(end - row), marks, None, &mut values)?;
+            let (read, _, _) = reader.read_records(BATCH.min(end - into.len()), marks, None, &mut values)?;
             if read == 0 {
                 return Ok(());
             }
@@ -74,20 +71,7 @@ where
                 let value = levels.iter().map(value);
                 into.extend(value.map(|value| value.map_or(f64::NAN, |value| (*value).into())));
             }
-            row += read;
         }
-    }
-    skip(&mut reader, &mut unwanted, into)
-}
-
-fn skip<T: DataType>(
-    reader: &mut ColumnReaderImpl<T>,
-    rows: &mut usize,
-    into: &mut ColumnBuilder,
-) -> Result<()> {
-    if *rows > 0 {
-        into.append_nulls(reader.skip_records(*rows)?);
-        *rows = 0;
     }
     Ok(())
 }
@@ -149,7 +133,7 @@ mod tests {
             let from = from.min(values.len());
             let stretch = [from..values.len(), values.len()..values.len()];
             let mut read = ColumnBuilder::with_capacity(0, None);
-            LogFile::open(&path).unwrap().append_numbers("x", RowSelection::of(&stretch), &mut read).unwrap();
+            LogFile::open(&path).unwrap().append_numbers("x", Some(&stretch), &mut read).unwrap();
             let read = read.finish().0;
             prop_assert_eq!(read.len(), values.len());
             let bits = |value: f64| if value.is_nan() { u64::MAX } else { value.to_bits() };

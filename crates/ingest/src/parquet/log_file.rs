@@ -29,7 +29,7 @@ use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
 use crate::parquet::raw_footer::{self, Claims, Footer, caught, not_parquet};
-use crate::parquet::row_selection::RowSelection;
+use crate::parquet::row_selection::{RowSelection, intersects};
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
@@ -291,7 +291,7 @@ impl LogFile {
         self.want(&[leaf], self.groups())?;
         for group in self.groups() {
             let (before, declared) = (into.len(), self.rows_of(group));
-            if !wanted.intersects(before..before + declared) {
+            if !intersects(wanted, &(before..before + declared)) {
                 into.append_nulls(declared);
                 continue;
             }

@@ -75,8 +75,7 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
             return Err(format!("a page claims {size} bytes where its chunk has {left} left"));
         }
         at = body_start + size as u64;
-        let page = Page { values: claimed(&header)?, header, body_start };
-        check_size(&page.header, chunk, page.values.into())?;
+        let page = Page { values: check_size(&header, chunk)?, header, body_start };
         if !page.is_dictionary() {
             values = values.saturating_add(page.values.into());
         }
@@ -91,48 +90,42 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
     Ok(found)
 }
 
-/// The number of values that a page claims.
-fn claimed(header: &PageHeader) -> Result<u32, String> {
-    let v1 = header.data_page_header.as_ref().map(|h| h.num_values);
-    let v2 = header.data_page_header_v2.as_ref().map(|h| h.num_values);
-    let dictionary = header.dictionary_page_header.as_ref().map(|h| h.num_values);
-    let count = v1.or(v2).or(dictionary).unwrap_or(0);
-    u32::try_from(count).map_err(|_| format!("a page claims {count} values"))
-}
-
-fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData, count: i64) -> Result<(), String> {
-    let size = i64::from(header.uncompressed_page_size);
-    let most = match width(chunk) {
-        Some(width) => count.saturating_mul(width + 4).saturating_add(SLACK_BYTES).min(PAGE_BYTES),
+/// Compares the size that a page claims with its values, and returns how many it claims.
+fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Result<u32, String> {
+    let is_required = chunk.column_descr().max_def_level() == 0;
+    // Values, nulls among them as far as the header tells, and encoding.
+    let claimed = match header.type_ {
+        PageType::DATA_PAGE => {
+            let page = header.data_page_header.as_ref();
+            page.map(|page| (page.num_values, is_required.then_some(0), page.encoding))
+        }
+        PageType::DATA_PAGE_V2 => {
+            let page = header.data_page_header_v2.as_ref();
+            page.map(|page| (page.num_values, Some(page.num_nulls), page.encoding))
+        }
+        _ => header.dictionary_page_header.as_ref().map(|page| (page.num_values, Some(0), Encoding::PLAIN)),
+    };
+    let (count, nulls, encoding) = claimed.unwrap_or((0, None, Encoding::PLAIN));
+    let values = u32::try_from(count).map_err(|_| format!("a page claims {count} values"))?;
+    let (width, size) = (width(chunk), i64::from(header.uncompressed_page_size));
+    let most = match width {
+        Some(width) => {
+            i64::from(values).saturating_mul(width + 4).saturating_add(SLACK_BYTES).min(PAGE_BYTES)
+        }
         None => bounds::text_page_bytes(header.compressed_page_size.into()),
     };
     if !(0..=most).contains(&size) {
-        return Err(format!("a page of {count} values claims {size} bytes"));
+        return Err(format!("a page of {values} values claims {size} bytes"));
     }
-    // A text takes the four bytes of its length at least.
-    let width = width(chunk).unwrap_or(4);
-    match present(header, chunk) {
-        Some(present) if present.saturating_mul(width) > size => {
-            Err(format!("a page of {size} bytes claims {present} values of {width} bytes"))
-        }
-        _ => Ok(()),
+    // Each value lies in the page at its full width, where neither nulls nor an encoding hide it. A text takes the four
+    // bytes of its length at least.
+    let is_split = encoding == Encoding::BYTE_STREAM_SPLIT && width.is_some();
+    let (nulls, width) = (nulls.filter(|_| is_split || encoding == Encoding::PLAIN), width.unwrap_or(4));
+    let present = nulls.map_or(0, |nulls| i64::from(count) - i64::from(nulls));
+    if present.saturating_mul(width) > size {
+        return Err(format!("a page of {size} bytes claims {present} values of {width} bytes"));
     }
-}
-
-/// Values that surely lie in the page at their full width; nothing where nulls or an encoding hide it.
-fn present(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Option<i64> {
-    let is_text = chunk.column_type() == Type::BYTE_ARRAY;
-    let full = |encoding: Encoding| {
-        encoding == Encoding::PLAIN || encoding == Encoding::BYTE_STREAM_SPLIT && !is_text
-    };
-    if let Some(dictionary) = &header.dictionary_page_header {
-        return Some(i64::from(dictionary.num_values));
-    }
-    if let Some(v2) = header.data_page_header_v2.as_ref().filter(|h| full(h.encoding)) {
-        return Some(i64::from(v2.num_values) - i64::from(v2.num_nulls));
-    }
-    let needed = chunk.column_descr().max_def_level() == 0;
-    header.data_page_header.as_ref().filter(|h| needed && full(h.encoding)).map(|h| i64::from(h.num_values))
+    Ok(values)
 }
 
 /// Bytes of a value, where all values have the same; a truth value is a bit.

@@ -258,21 +258,18 @@ fn plausible(
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
 /// neighbours; returns how many got one.
 fn fill_missing(seconds: &mut [f64], rate_hz: f64) -> usize {
-    let (mut filled, mut before) = (0, None::<usize>);
+    let (mut filled, mut before) = (0, None);
     for row in 0..seconds.len() {
         if seconds[row].is_nan() {
             continue;
         }
-        if let Some(last) = before {
-            let rows = row - last;
-            let between = seconds[row] - seconds[last];
-            if rows > 1 && (between * rate_hz - rows as f64).abs() < 0.5 {
-                let start = seconds[last];
-                (1..rows).for_each(|k| seconds[last + k] = start + between * k as f64 / rows as f64);
-                filled += rows - 1;
-            }
+        let last = before.replace(row).unwrap_or(row);
+        let (rows, start) = (row - last, seconds[last]);
+        let between = seconds[row] - start;
+        if rows > 1 && (between * rate_hz - rows as f64).abs() < 0.5 {
+            (1..rows).for_each(|k| seconds[last + k] = start + between * k as f64 / rows as f64);
+            filled += rows - 1;
         }
-        before = Some(row);
     }
     filled
 }

@@ -1,6 +1,6 @@
 //! Timestamps of a time column: integers, reals, Arrow timestamps or text, to seconds since the first one.
 
-use arrow::array::{Array, ArrayRef, AsArray};
+use arrow::array::{ArrayRef, AsArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::{Timestamp, civil};
@@ -89,11 +89,7 @@ impl<'a> TimestampParser<'a> {
                 self.push_whole(tick);
             }
         } else if self.ticks.is_whole {
-            let whole = match array.data_type() {
-                // A time of the day in 32 bits becomes a number of 32 bits only.
-                DataType::Time32(_) => cast(array, &DataType::Int32).and_then(|a| cast(&a, &DataType::Int64)),
-                _ => cast(array, &DataType::Int64),
-            };
+            let whole = cast(array, &DataType::Int64);
             let whole = whole.map_err(|_| wrong_type(self.column, array, "time stamps"))?;
             whole.as_primitive::<Int64Type>().iter().for_each(|tick| self.push_whole(tick));
         } else {
