@@ -131,7 +131,10 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     if at_rails.is_empty() {
         return 0;
     }
-    let speed = 0.5 * mean_step(values);
+    // Half the mean of the steps that are steps at all.
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let (sum, steps) = steps.fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
+    let speed = 0.5 * (sum / steps.max(1) as f64);
     let mut count = [0, 0];
     let mut samples = 0;
     for run in at_rails {
@@ -145,13 +148,6 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
         }
     }
     if count.iter().any(|c| *c > 1) { samples } else { 0 }
-}
-
-/// Mean of the steps that are steps at all.
-fn mean_step(values: &[f64]) -> f64 {
-    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
-    let (sum, count) = steps.fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
-    sum / count.max(1) as f64
 }
 
 /// Single samples far from the line of their neighbours.

@@ -41,10 +41,7 @@ impl ByteSource {
 
 /// A whole file, at its beginning: for tables, all of which is read.
 pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
-    if object_io::is_address(path) {
-        return Ok(object_io::read_all(path)?);
-    }
-    open_local(path)
+    if object_io::is_address(path) { Ok(object_io::read_all(path)?) } else { open_local(path) }
 }
 
 /// Opens a regular file; opening a named pipe would wait for its writer for ever.

@@ -56,25 +56,23 @@ fn is_one_of(error: &io::Error, numbers: [i32; 2]) -> bool {
 pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     let mut delays = DELAYS.into_iter();
     loop {
-        let error = match operation() {
-            Ok(value) => {
-                FAILED_READ.take();
-                return Ok(value);
-            }
-            Err(error) => error,
+        let result = operation();
+        let Err(error) = &result else {
+            FAILED_READ.take();
+            return result;
         };
-        match delays.next().filter(|_| is_transient(&error)) {
-            Some(delay) => std::thread::sleep(delay),
-            None => {
-                let is_of_system = error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound;
-                if is_transient(&error) || is_of_system {
-                    let number = error.raw_os_error();
-                    let copy = number.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
-                    FAILED_READ.set(Some(copy));
-                }
-                return Err(error);
-            }
+        if is_transient(error)
+            && let Some(delay) = delays.next()
+        {
+            std::thread::sleep(delay);
+            continue;
         }
+        let number = error.raw_os_error();
+        if is_transient(error) || number.is_some() && error.kind() != io::ErrorKind::NotFound {
+            let copy = number.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
+            FAILED_READ.set(Some(copy));
+        }
+        return result;
     }
 }
 

@@ -501,10 +501,10 @@ pub(crate) fn with_codes(
     footer: &ArrowReaderMetadata,
     is_coded: impl Fn(&str) -> bool,
 ) -> Result<ArrowReaderMetadata, ParquetError> {
+    let codes = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
     let field = |field: &Arc<Field>| {
         let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
-        let codes = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        let coded = || Arc::new(field.as_ref().clone().with_data_type(codes()));
+        let coded = || Arc::new(field.as_ref().clone().with_data_type(codes.clone()));
         if is_text && is_coded(field.name()) { coded() } else { Arc::clone(field) }
     };
     let schema = Schema::new(footer.schema().fields().iter().map(field).collect::<Vec<_>>());

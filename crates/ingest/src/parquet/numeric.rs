@@ -30,10 +30,10 @@ fn real(column: &str, array: &ArrayRef) -> Result<ArrayRef, ErrorKind> {
     }
     // The cast makes null of a text that is no number.
     let texts = as_text(column, array)?;
-    let is_lost = |(row, text): &(usize, &str)| real.is_null(*row) && !text.trim().is_empty();
-    let mut texts = texts.as_string::<i32>().iter().enumerate().filter_map(|(row, text)| Some((row, text?)));
-    match texts.find(is_lost) {
-        Some((_, text)) => {
+    let is_number = |row: usize, text: &str| real.is_valid(row) || text.trim().is_empty();
+    let mut rows = texts.as_string::<i32>().iter().enumerate();
+    match rows.find_map(|(row, text)| text.filter(|text| !is_number(row, text))) {
+        Some(text) => {
             let (column, found) = (column.to_owned(), format!("texts such as `{text}`"));
             Err(ErrorKind::ColumnType { column, found, wanted: "numbers" })
         }

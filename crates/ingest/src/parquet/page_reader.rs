@@ -27,7 +27,7 @@ const LEAST_BATCH: usize = 64;
 
 thread_local! {
     /// Pages come one after the other: a new context for each would cost more than many pages do.
-    static ZSTD: RefCell<Option<Decompressor<'static>>> = const { RefCell::new(None) };
+    static ZSTD: RefCell<Option<Decompressor<'static>>> = RefCell::new(Decompressor::new().ok());
 }
 
 fn fail<T>(detail: impl Into<String>) -> Result<T> {
@@ -302,12 +302,7 @@ fn stream(left: usize, into: &mut Vec<u8>, unpacked: impl Read) -> Option<()> {
 
 /// Into fresh memory, which need not be set to zeros: no more than its capacity is filled.
 fn zstd(left: usize, into: &mut Vec<u8>, packed: &[u8]) -> Option<()> {
-    let mut unpacked = ZSTD.with_borrow_mut(|zstd| {
-        if zstd.is_none() {
-            *zstd = Decompressor::new().ok();
-        }
-        zstd.as_mut()?.decompress(packed, left).ok()
-    })?;
+    let mut unpacked = ZSTD.with_borrow_mut(|zstd| zstd.as_mut()?.decompress(packed, left).ok())?;
     if into.is_empty() {
         *into = unpacked;
     } else {
