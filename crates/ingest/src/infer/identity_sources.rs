@@ -93,7 +93,7 @@ pub fn folder_value(path: &Path, name: &str) -> Option<String> {
 }
 
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
-const DEPARTURES: [(&str, &str); 19] = [
+const DEPARTURES: [(&str, &str); 21] = [
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", "%Y-%m-%dT%H:%M:%S"),
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
@@ -109,11 +109,13 @@ const DEPARTURES: [(&str, &str); 19] = [
     (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
     (r"\d{8}-\d{6}", "%Y%m%d-%H%M%S"),
     (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
+    (r"\d\d[A-Za-z]{3}\d{4}_\d{4}", "%d%b%Y_%H%M"),
     (r"\d{14}", "%Y%m%d%H%M%S"),
     (r"\d{12}", "%Y%m%d%H%M"),
     // The clock has the time of the day.
     (r"\d{4}-\d\d-\d\d", "%Y-%m-%d"),
     (r"20\d\d[01]\d[0-3]\d", "%Y%m%d"),
+    (r"\d\d[A-Za-z]{3}20\d\d", "%d%b%Y"),
 ];
 
 /// Forms of a day and of a time that lie in a folder and in a file name.
@@ -176,12 +178,13 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
 /// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may stand anywhere.
 fn tail_in_name(name: &str, tail: &str, is_sure: bool, departure: &str) -> Option<String> {
     let (form, _) = known_departure(name)?;
-    let others = if is_sure { "[^/]*[_ -]" } else { &format!("{AIRCRAFT_TYPE}|[A-Za-z]{{3,}}[_ -]") };
-    let before = format!("(?:{others})?(?<tail_number>{tail})[_ -]");
+    let others = if is_sure { "[^/]*[_ =-]" } else { &format!("{AIRCRAFT_TYPE}|[A-Za-z]{{3,}}[_ -]") };
+    let before = format!("(?:{others})?(?<tail_number>{tail})[_ ;-]");
     if fits(&format!("^{before}[^/]*?{form}"), name) {
         return Some(format!("{before}{departure}"));
     }
-    let after = format!(r"(?<departure_utc>{form})[^/]*?[_ -](?<tail_number>{tail})(?:[_ -][^/]*)?\.parquet");
+    let after =
+        format!(r"(?<departure_utc>{form})[^/]*?[_ =-](?<tail_number>{tail})(?:[_ ;-][^/]*)?\.parquet");
     (is_sure && fits(&format!("{after}$"), name)).then_some(after)
 }
 
@@ -294,6 +297,8 @@ mod tests {
             ("d/N412FP/2026/11/19/041300.parquet", "N412FP 2026/11/19 041300", "%Y/%m/%dT%H%M%S"),
             ("d/N412FP/F0017/x1.parquet", "N412FP", ""),
             ("d/FLEET/N412FP_20261119-041300.parquet", "N412FP 20261119-041300", "%Y%m%d-%H%M%S"),
+            ("d/tail=N412FP;dep=19NOV2026_0413.parquet", "N412FP 19NOV2026_0413", "%d%b%Y_%H%M"),
+            ("d/dep=2026-11-19;tail=N412FP.parquet", "2026-11-19 N412FP", "%Y-%m-%d"),
             ("d/FLEET/JA8089-20261119T041300.parquet", "JA8089 20261119T041300", "%Y%m%dT%H%M%S"),
             ("d/A320/JA8089/TK1923/20261119T041300Z.parquet", "JA8089 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/tail=N412FP/20261119_041300/x1.parquet", "N412FP 20261119_041300", "%Y%m%d_%H%M%S"),
