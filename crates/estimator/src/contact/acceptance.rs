@@ -16,12 +16,12 @@ const VAGUE: f64 = 0.1;
 /// Flags of an estimate of a part whose stiffness, N/m, is known.
 pub(crate) fn flags(
     found: &ContactEstimate,
-    frame: &Scaling,
+    scaling: &Scaling,
     part_stiffness_n_per_m: f64,
     is_soft: bool,
 ) -> Vec<QualityFlag> {
-    let agrees = agrees_with_midrange(found, frame.unknown_force_n);
-    let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
+    let agrees = agrees_with_midrange(found, scaling.unknown_force_n);
+    let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * scaling.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
     let is_preloaded = found.preload_n.is_some();
@@ -35,7 +35,7 @@ pub(crate) fn flags(
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > 0.45),
         (QualityFlag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
         (QualityFlag::SoftContact, is_soft && !is_preloaded),
-        (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
+        (QualityFlag::Imprecise, found.gap_se_m > VAGUE * scaling.windup_m()),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()
 }

@@ -39,7 +39,7 @@ pub(crate) struct BlockMeans {
     pub(crate) dx_m: Vec<f64>,
     /// F, N: as logged, then brought to the motor's clock.
     pub(crate) load_n: Vec<f64>,
-    /// Loads, N, beyond which the load cell is at its end: no row is made of such blocks.
+    /// Loads that do not lie at an end of the load cell's range, N: no row is made of blocks with other loads.
     pub(crate) in_range_n: Range<f64>,
     /// e^−(v/v_s)²: how near the motor is to rest.
     pub(crate) slowness: Vec<f64>,
@@ -162,9 +162,9 @@ impl BlockMeans {
         self.len() >= blocks * 3 / 2
     }
 
-    /// Takes in what a search needs of a flight: of one that has more than some number of blocks, windows in which the load
-    /// changes sides most often, and others spread over the flight; in longer blocks where the load hardly vibrates. δX
-    /// and the load are there once [delays are applied](Self::apply_delays).
+    /// Takes in an excerpt of a flight, of `most` of its blocks: all of them where they are few, else windows. Where the
+    /// load hardly vibrates, blocks are joined to longer ones. δX and the load follow when [delays are
+    /// applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
         let count =
             if whole.is_calm { ((2.0 * CALM_PERIOD_S / whole.period_s).round() as usize).max(1) } else { 1 };
@@ -246,7 +246,7 @@ impl BlockMeans {
     fn find_slowness(&mut self) {
         let slowness = |k| {
             let square = (self.speed_m_per_s(k) / 3e-3).powi(2);
-            // The exponential's own series up to the fourth power, below: no more than 0.02 off, and no call.
+            // One over the series of the exponential up to the fourth power: off by 0.02 at most, and faster.
             let series = 1.0 + square * (1.0 + square * (0.5 + square * (1.0 / 6.0 + square / 24.0)));
             if square.is_finite() { series.recip() } else { 0.0 }
         };

@@ -16,11 +16,11 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
     let overlap_m = -gap_m;
     let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n;
     let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
+    let light = is_overlap.then(|| contact.search.line.design.light.iter())?;
     // A closed loop, of the lightly loaded rows that the straight fit never saw, overlaps by less than half of what the
     // extrapolated flanks do.
-    let loop_m = || travel_m(contact, 0.0, &contact.search.line.design.light.iter());
-    let closes = || loop_m().is_some_and(|(loop_m, _)| loop_m > -0.5 * overlap_m);
-    (is_overlap && closes()).then(|| (force_n(overlap_m), force_n(gap_se_m)))
+    let closes = travel_m(contact, 0.0, &light)?.0 > -0.5 * overlap_m;
+    closes.then(|| (force_n(overlap_m), force_n(gap_se_m)))
 }
 
 /// Width of the loop of δX against the load at zero load and its standard error, m: what lies between the branch on which a
@@ -50,8 +50,8 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows within 25 % of it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
-pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
-    let load = load_n / frame.load_n;
+pub(crate) fn lost_motion_m(contact: &FlankFit, scaling: &Scaling, load_n: f64) -> Option<(f64, f64)> {
+    let load = load_n / scaling.load_n;
     let rows = contact.search.line.design.firm.iter().chain(&contact.search.line.design.light);
     travel_m(contact, load, &rows.filter(move |row| (row.x[FORCE].abs() - load).abs() < 0.25 * load))
 }

@@ -63,10 +63,11 @@ const IMPOSSIBLE_SIGMA: f64 = 5.0;
 pub fn estimate(
     samples: &Samples<'_>,
     prior: &PartPrior,
-    room: &mut ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
-    Ok(look(samples, prior, room).map(|(frame, contact)| Box::new(report(room, &frame, prior, &contact))))
+    Ok(look(samples, prior, workspace)
+        .map(|(scaling, contact)| Box::new(report(workspace, &scaling, prior, &contact))))
 }
 
 /// Why a flight does not allow an estimate, as far as the channels show it without a regression: for the published
@@ -81,11 +82,11 @@ pub fn estimate(
 pub fn find_rejection(
     samples: &Samples<'_>,
     prior: &PartPrior,
-    room: &mut ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<Option<Rejection>, Error> {
     check(samples, prior)?;
-    let found = prepare(samples, prior, room).and_then(|(frame, signs)| {
-        flank_fit::check_both_sides(&room.whole, &frame, signs.shows_gap)?;
+    let found = prepare(samples, prior, workspace).and_then(|(scaling, signs)| {
+        flank_fit::check_both_sides(&workspace.whole, &scaling, signs.shows_gap)?;
         if signs.follows_load { Ok(()) } else { Err(Rejection::MotionUnexplained) }
     });
     Ok(found.err())
@@ -98,9 +99,9 @@ pub fn find_rejection(
 /// As [`estimate`].
 pub fn plot_data(samples: &Samples<'_>, prior: &PartPrior) -> Result<Option<ContactPlot>, Error> {
     check(samples, prior)?;
-    let mut room = ContactWorkspace::default();
-    let found = look(samples, prior, &mut room).ok();
-    Ok(found.map(|(frame, contact)| ContactPlot::of(room.whole.period_s, &frame, &contact)))
+    let mut workspace = ContactWorkspace::default();
+    let found = look(samples, prior, &mut workspace).ok();
+    Ok(found.map(|(scaling, contact)| ContactPlot::of(workspace.whole.period_s, &scaling, &contact)))
 }
 
 fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
@@ -115,39 +116,38 @@ fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
 fn prepare(
     samples: &Samples<'_>,
     prior: &PartPrior,
-    room: &mut ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, SignCheck), Rejection> {
     if samples.step_s > LONGEST_STEP_S {
         return Err(Rejection::RateTooLow);
     }
-    room.whole.gather(samples, prior)?;
-    let mut frame = Scaling::of(&room.whole, prior)?;
-    let found =
-        if prior.output_locked { SignCheck::NONE } else { sign_check::check(&room.whole, &mut frame)? };
-    Ok((frame, found))
+    workspace.whole.gather(samples, prior)?;
+    let mut scaling = Scaling::of(&workspace.whole, prior)?;
+    let signs = sign_check::check(&workspace.whole, &mut scaling)?;
+    Ok((scaling, signs))
 }
 
 fn look(
     samples: &Samples<'_>,
     prior: &PartPrior,
-    room: &mut ContactWorkspace,
+    workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, FlankFit), Rejection> {
-    let (frame, _) = prepare(samples, prior, room)?;
-    let contact = flank_fit::fit(room, &frame)?;
+    let (scaling, _) = prepare(samples, prior, workspace)?;
+    let contact = flank_fit::fit(workspace, &scaling)?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
     // Channels of absurd size overflow the sums of the fit.
     if gap_m.is_finite() && gap_se_m.is_finite() && gives_way && is_possible {
-        Ok((frame, contact))
+        Ok((scaling, contact))
     } else {
         Err(Rejection::MotionUnexplained)
     }
 }
 
 fn report(
-    room: &ContactWorkspace,
-    frame: &Scaling,
+    workspace: &ContactWorkspace,
+    scaling: &Scaling,
     prior: &PartPrior,
     contact: &FlankFit,
 ) -> ContactEstimate {
@@ -165,7 +165,7 @@ fn report(
         gap_se_m,
         gap_bounds_m: (gap_m - NORMAL_95 * gap_se_m, gap_m + NORMAL_95 * gap_se_m),
         stiffness_n_per_m: compliance.recip(),
-        stiffness_se_n_per_m: error_m(&[(FORCE, 1.0)]) / frame.load_n / (compliance * compliance),
+        stiffness_se_n_per_m: error_m(&[(FORCE, 1.0)]) / scaling.load_n / (compliance * compliance),
         skew_s: state.skew_s,
         skew_se_s: error_m(&[(SPEED, 1.0)]) / SPEED_M_PER_S,
         load_zero_n: state.load_zero_n,
@@ -175,17 +175,17 @@ fn report(
         friction: state.friction,
         friction_se: Friction {
             dry_n: friction_error_n(&[(DRY, 1.0)]),
-            lost_share: friction_error_n(&[(SHARE, 1.0)]) / frame.load_n,
+            lost_share: friction_error_n(&[(SHARE, 1.0)]) / scaling.load_n,
         },
         friction_p95_se_n: friction_error_n(&[(DRY, 1.0), (SHARE, 1.0)]),
         gap_profile: contact.profile.as_ref().map(|profile| profile.places.clone()).unwrap_or_default(),
         preload_n,
-        loop_width_m: lost_motion::loop_width_m(contact, &room.whole, frame),
-        lost_motion_m: prior.reference_load_n.and_then(|n| lost_motion::lost_motion_m(contact, frame, n)),
-        load_p95_n: frame.load_n,
-        midrange_at_fit_m: flank_fit::midrange_at_fit_m(room, frame, contact),
+        loop_width_m: lost_motion::loop_width_m(contact, &workspace.whole, scaling),
+        lost_motion_m: prior.reference_load_n.and_then(|n| lost_motion::lost_motion_m(contact, scaling, n)),
+        load_p95_n: scaling.load_n,
+        midrange_at_fit_m: flank_fit::midrange_at_fit_m(workspace, scaling, contact),
         flags: Vec::new(),
     };
-    found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft);
+    found.flags = acceptance::flags(&found, scaling, prior.stiffness_n_per_m, contact.is_soft);
     found
 }

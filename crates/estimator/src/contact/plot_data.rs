@@ -49,15 +49,15 @@ pub struct ContactPlot {
 }
 
 impl ContactPlot {
-    pub(crate) fn of(period_s: f64, frame: &Scaling, contact: &FlankFit) -> Self {
+    pub(crate) fn of(period_s: f64, scaling: &Scaling, contact: &FlankFit) -> Self {
         let (design, fit) = (&contact.search.line.design, &contact.search.line.fit);
         let firm = design.firm.iter().zip(fit.trusts(&design.firm)).map(|(row, trust)| (row, Some(trust)));
         let light = design.light.iter().map(|row| (row, None));
         let touch = |(row, trust): (&DesignRow<COLUMNS>, Option<f64>)| Touch {
-            time_s: frame.time_s.0 + row.x[DRIFT] * frame.time_s.1,
+            time_s: scaling.time_s.0 + row.x[DRIFT] * scaling.time_s.1,
             duration_s: row.blocks * period_s,
             flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
-            force_n: row.x[FORCE] * frame.load_n,
+            force_n: row.x[FORCE] * scaling.load_n,
             dx_m: row.y_m - contact.other_m(row),
             trust,
         };
@@ -66,7 +66,7 @@ impl ContactPlot {
             let side = flank.sign();
             let forces_n = touches.iter().filter(|t| t.flank == flank).map(|t| t.force_n.abs());
             [0.0, forces_n.fold(0.0, f64::max)].map(|force_n| {
-                let force = force_n / frame.load_n;
+                let force = force_n / scaling.load_n;
                 let from_middle_m = 0.5 * fit.beta[GAP] + force * fit.beta[FORCE];
                 (side * force_n, fit.beta[ORIGIN] + side * from_middle_m + force * fit.beta[SIDE_FORCE])
             })

@@ -54,8 +54,8 @@ pub struct ContactEstimate {
     pub skew_s: f64,
     /// Its standard error, s.
     pub skew_se_s: f64,
-    /// F₀: what the load cell reads under no load, N. Without a gap, or without lightly loaded samples, its error is
-    /// large.
+    /// F₀: what the load cell reads under no load, N. A flight shows it where the screw crosses its gap; without a gap, or
+    /// without light loads, its standard error is large.
     pub load_zero_n: f64,
     /// Its standard error, N.
     pub load_zero_se_n: f64,

@@ -100,9 +100,9 @@ impl BlockMeans {
     /// The row of one complete block.
     #[inline(always)]
     pub(crate) fn row(&self, scaling: &Scaling, k: usize) -> DesignRow<COLUMNS> {
-        let [a, b, c, d, e, f, g] = self.coupling_columns(scaling, k);
-        let [h, i, j, l, m, n, o, p, q] = self.slow_columns(scaling, k);
-        let x = [1.0, a, b, c, d, e, f, g, h, i, j, l, m, n, o, p, q];
+        let mut x = [1.0; COLUMNS];
+        x[GAP..SPEED].copy_from_slice(&self.coupling_columns(scaling, k));
+        x[SPEED..].copy_from_slice(&self.slow_columns(scaling, k));
         DesignRow { x, y_m: self.dx_m[k], blocks: 1.0, stretch: self.stretch(k) }
     }
 

@@ -1,8 +1,9 @@
 //! The fit of both flanks: gap, stiffness and their standard errors.
 //!
 //! The gap is the distance of the two flanks, extrapolated along their stiff part to zero load. Flanks that are soft at
-//! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. Both fits are made; the closer
-//! they agree within their jackknife error, the more the one of more data counts.
+//! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. The gap lies between those of a
+//! fit of all loads and of one of higher loads. Where they differ by less than the jackknife error of their difference,
+//! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads.
 
 use std::ops::Range;
 
@@ -24,7 +25,7 @@ use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
 use crate::samples::Samples;
 
-/// Largest error of that zero that is to be expected, over the 95 % load.
+/// Largest error of the load cell's zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
 /// Blocks that the search begins with.
 const EXCERPT_BLOCKS: usize = 6000;
@@ -187,7 +188,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         whole.find_phases(scaling.per_period);
     }
     let iterations = if whole.len() < SHORT_BLOCKS { 2 } else { 1 };
-    let line = search(whole, scaling, best.line.state, (iterations, REWEIGHTINGS))?;
+    let line = search(whole, scaling, best.line.state, iterations, REWEIGHTINGS)?;
     Ok(SearchResult { line, ..best })
 }
 

@@ -36,7 +36,8 @@ pub(crate) fn search(
     blocks: &mut BlockMeans,
     scaling: &Scaling,
     mut state: FrictionState,
-    (iterations, rounds): (usize, usize),
+    iterations: usize,
+    rounds: usize,
 ) -> Result<GaussNewtonResult, Rejection> {
     let mut found = None;
     for _ in 0..iterations {
@@ -71,30 +72,29 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         mean: (usual - now) * here_m,
         sd: spread * here_m,
     };
-    let zero = |sd: f64| GaussianPrior { mean: 0.0, sd };
     std::array::from_fn(|column| match column {
         ORIGIN | GAP => GaussianPrior::NONE,
         // 1/K is the part's to 15 %; the flanks differ by twice 5 %, and it drifts by 3 % from the middle to the end.
         FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
-        SIDE_FORCE => zero(0.05 * windup_m),
-        FORCE_DRIFT => zero(0.03 * windup_m),
+        SIDE_FORCE => GaussianPrior::zero(0.05 * windup_m),
+        FORCE_DRIFT => GaussianPrior::zero(0.03 * windup_m),
         // Dry friction over the 95 % load, the share of load lost, and the excess of friction at rest: most likely and spread.
         DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
         STRIBECK => lack((0.0, 0.3), state.stribeck),
         // A screw that is locked has no delay: what is left is viscous friction, 0.1 ms.
-        SPEED if scaling.is_locked() => zero(1e-4 * SPEED_M_PER_S),
+        SPEED if scaling.is_locked() => GaussianPrior::zero(1e-4 * SPEED_M_PER_S),
         // The delays that remain once the channels are realigned: 5 ms.
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: 5e-3 * SPEED_M_PER_S },
         LOAD_RATE => {
             GaussianPrior { mean: -state.load_delay_s / LATE_S * here_m, sd: 5e-3 / LATE_S * here_m }
         }
         // The drift within a flight, linear and quadratic.
-        DRIFT => zero(50e-6),
-        _ if column < PLACE => zero(20e-6),
+        DRIFT => GaussianPrior::zero(50e-6),
+        _ if column < PLACE => GaussianPrior::zero(20e-6),
         // The transducer's error at the ends of the stroke, and errors that repeat with the position.
-        PLACE..PERIODIC => zero(60e-6),
-        _ => zero(20e-6),
+        PLACE..PERIODIC => GaussianPrior::zero(60e-6),
+        _ => GaussianPrior::zero(20e-6),
     })
 }
 

@@ -109,7 +109,7 @@ impl<'a> ParameterSearch<'a> {
 
     /// Iterates from a state; blocks, couplings and linear parts are those of the result.
     fn search(&mut self, state: FrictionState, iterations: usize) -> Result<GaussNewtonResult, Rejection> {
-        let found = search(self.blocks, self.scaling, state, (iterations, 1))?;
+        let found = search(self.blocks, self.scaling, state, iterations, 1)?;
         self.take_linear_parts(&found);
         Ok(found)
     }
@@ -122,7 +122,7 @@ impl<'a> ParameterSearch<'a> {
             .extend((0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta) - beta[ORIGIN]));
     }
 
-    /// Takes a state's fit when it fits better.
+    /// Iterates once from a state, and keeps the result where it fits better than the best; whether it does.
     fn improve(&mut self, best: &mut Candidate, state: FrictionState) -> bool {
         let Ok(found) = self.search(state, 1) else { return false };
         let misfit = self.misfit(&found, found.at.load_zero_n);

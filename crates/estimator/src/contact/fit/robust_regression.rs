@@ -26,7 +26,12 @@ pub(crate) struct GaussianPrior {
 }
 
 impl GaussianPrior {
-    pub(crate) const NONE: Self = Self { mean: 0.0, sd: f64::INFINITY };
+    pub(crate) const NONE: Self = Self::zero(f64::INFINITY);
+
+    /// Zero but for a spread, m.
+    pub(crate) const fn zero(sd: f64) -> Self {
+        Self { mean: 0.0, sd }
+    }
 }
 
 /// Coefficients of the first N columns, m.
@@ -43,7 +48,7 @@ pub(crate) struct RobustFit<const N: usize> {
 /// Reweighted least squares: `rounds` rounds from even weights; none where there are too few rows.
 ///
 /// A belief counts as residual variance over its own, times the factor by which dependence within
-/// stretches inflates the variance of a mean; otherwise thousands of dependent rows would talk it down.
+/// stretches inflates the variance of a mean; otherwise thousands of dependent rows would outweigh it.
 pub(crate) fn fit<const N: usize>(
     rows: &[DesignRow<N>],
     beliefs: &[GaussianPrior; N],
@@ -198,7 +203,7 @@ impl<const N: usize> RobustFit<N> {
         Some((whole, parts?))
     }
 
-    /// How far each row was believed: its weight over that of a row no residual of which is large.
+    /// How far each row was believed, from 0 to 1: its weight over the weight that it would have with a small residual.
     pub(crate) fn trusts(&self, rows: &[DesignRow<N>]) -> impl Iterator<Item = f64> {
         let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
@@ -217,14 +222,9 @@ impl<const N: usize> RobustFit<N> {
         let moved = |(row, w): (&DesignRow<N>, &f64)| w * self.residual_m(row) * dot(&influence, &row.x);
         let (total, stretches) = squares_of_stretches(rows, rows.iter().zip(&self.weights).map(moved));
         let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);
-        let lent = |i: usize| {
-            if self.beliefs[i].sd.is_finite() {
-                influence[i] * self.lent[i] * self.beliefs[i].sd
-            } else {
-                0.0
-            }
-        };
-        (total * freedom + (0..N).map(|i| lent(i).powi(2)).sum::<f64>()).sqrt()
+        let believed = (0..N).filter(|&i| self.beliefs[i].sd.is_finite());
+        let lent = believed.map(|i| (influence[i] * self.lent[i] * self.beliefs[i].sd).powi(2));
+        (total * freedom + lent.sum::<f64>()).sqrt()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::gap::load_band::quantiles;
 pub(crate) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(crate) const LATE_S: f64 = 0.01;
-/// Wind-ups that a gap must reach for the flight to show the zero of its load cell.
+/// Wind-ups below which a gap is too small to show the zero of the load cell.
 pub(crate) const UNSEEN_GAP: f64 = 0.1;
 /// Longest row, s: that of the search, which needs no fine rows.
 pub(crate) const SEARCH_ROW_S: f64 = 0.4;
@@ -33,9 +33,9 @@ pub(crate) struct Scaling {
     pub(crate) stiffness_n_per_m: f64,
     /// Middle and half length of the flight, s.
     pub(crate) time_s: (f64, f64),
-    /// Middle and half of the stroke seen, m.
+    /// Middle and half length of the stroke seen, m.
     pub(crate) place_m: (f64, f64),
-    /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
+    /// One over the load, over half of the stroke and over half of the time: a product takes a quarter of a division's time.
     pub(crate) per_load: f64,
     pub(crate) per_place: f64,
     pub(crate) per_time: f64,

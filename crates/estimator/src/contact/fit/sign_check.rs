@@ -33,38 +33,42 @@ impl SignCheck {
 ///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
-pub(crate) fn check(blocks: &BlockMeans, frame: &mut Scaling) -> Result<SignCheck, Rejection> {
+pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCheck, Rejection> {
+    // The motor's own load, on a bench, shows nothing of the mapping.
+    if scaling.is_locked() {
+        return Ok(SignCheck::NONE);
+    }
     // Every fourth block is used, and fewer of long flights.
     let stride = (blocks.len() / LOOKS).max(4);
-    let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
+    let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, scaling, k)).collect();
     let Some(found) = fit(&rows, &[GaussianPrior::NONE; 6], 4) else { return Ok(SignCheck::NONE) };
     let [_, side_m, load_m, slip_m, speed_m, place_m] = found.beta;
     let [side_se_m, load_se_m, place_se_m] =
         [1, 2, 5].map(|column| found.standard_error_m(&[(column, 1.0)], &rows));
     // Two positions of one screw have a slope of one. Slopes that differ by 1 % are another lead or unit, and less than 60 µm
     // at the ends of the travel may be the transducer's own error.
-    if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * frame.place_m.1).max(60e-6) {
+    if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * scaling.place_m.1).max(60e-6) {
         return Err(Rejection::PositionRatio);
     }
     let windup_m = side_m + load_m;
     let doubt_m = SIGNIFICANT * side_se_m.hypot(load_se_m);
-    // A wind-up of 30 % of the part's against its sign counts as flipped.
-    if windup_m + doubt_m > -0.3 * frame.windup_m() {
-        let shows_gap = side_m > (UNSEEN_GAP * frame.windup_m()).max(3.0 * side_se_m);
-        let (load_doubt_m, part_m) = (SIGNIFICANT * load_se_m, frame.windup_m());
+    // A wind-up that is negative for certain, by 30 % of the part's, is that of flipped or exchanged channels.
+    if windup_m + doubt_m > -0.3 * scaling.windup_m() {
+        let shows_gap = side_m > (UNSEEN_GAP * scaling.windup_m()).max(3.0 * side_se_m);
+        let (load_doubt_m, part_m) = (SIGNIFICANT * load_se_m, scaling.windup_m());
         let is_softer = load_m - load_doubt_m > 3.0 * part_m;
         let is_stiffer = load_m > load_doubt_m && load_m + load_doubt_m < part_m / 3.0;
         if is_softer || is_stiffer {
-            frame.stiffness_n_per_m = frame.load_n / load_m;
+            scaling.stiffness_n_per_m = scaling.load_n / load_m;
         }
         return Ok(SignCheck { follows_load: windup_m > doubt_m, shows_gap });
     }
     Err(if slip_m + speed_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
 }
 
-fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<6>> {
-    let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.speed_m_per_s(k));
-    let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
+fn row(blocks: &BlockMeans, scaling: &Scaling, k: usize) -> Option<DesignRow<6>> {
+    let (load, speed) = (blocks.load_n[k] / scaling.load_n, blocks.speed_m_per_s(k));
+    let place = (blocks.motor_m[k] - scaling.place_m.0) / scaling.place_m.1;
     // Slower than 1 mm/s the screw may stick.
     let slip = if speed.abs() > 1e-3 { speed.signum() } else { 0.0 };
     let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];

@@ -39,12 +39,11 @@ pub(crate) fn stroke_profile(
     }
     let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
     let known = priors(scaling, &line.at);
-    let at_knot = |sd| GaussianPrior { mean: 0.0, sd };
     // The gap, and the transducer's error, at a knot spread by so much about what the whole stroke has.
     let beliefs: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
         0..COLUMNS => known[column],
-        _ if column < COLUMNS + KNOTS => at_knot(60e-6),
-        _ => at_knot(10e-6),
+        _ if column < COLUMNS + KNOTS => GaussianPrior::zero(60e-6),
+        _ => GaussianPrior::zero(10e-6),
     });
     let found = fit(&rows, &beliefs, REWEIGHTINGS)?;
     let shares = time_shares(blocks, scaling);
@@ -62,7 +61,7 @@ pub(crate) fn stroke_profile(
     let excess_m = value_m(&at) - mean_m;
     let is_certain = excess_m > CERTAIN * error_m(0.0, &excess) && excess_m > 0.1 * mean_m.abs();
     let place = |knot: usize| GapAtPlace {
-        at_m: scaling.place_m.0 + scaling.place_m.1 * place_of(knot),
+        at_m: scaling.place_m.0 + scaling.place_m.1 * (2.0 * knot as f64 / (KNOTS - 1) as f64 - 1.0),
         gap_m: value_m(&only(knot)),
         gap_se_m: error_m(1.0, &only(knot)),
     };
@@ -96,11 +95,6 @@ fn with_knots(row: &DesignRow<COLUMNS>) -> DesignRow<ALL> {
         x[COLUMNS + KNOTS + knot] = share;
     }
     DesignRow { x, y_m: row.y_m, blocks: row.blocks, stretch: row.stretch }
-}
-
-/// Place of a knot, from −1 to 1.
-fn place_of(knot: usize) -> f64 {
-    2.0 * knot as f64 / (KNOTS - 1) as f64 - 1.0
 }
 
 /// How much each knot counts at a place from −1 to 1: linear between neighbours.

@@ -1,4 +1,4 @@
-//! What the coupling does over a flight: followed from block to block once, so that all else goes side by side.
+//! The coupling over a flight, integrated from block to block: all that depends on the block before is computed here.
 
 use std::ops::Range;
 

@@ -102,7 +102,7 @@ pub(crate) struct ScrewState {
     /// ∂c/∂F_d, ∂c/∂η and ∂c/∂p once the screw presses a flank, kept since it slipped last.
     pub(crate) memory: [f64; 3],
     pub(crate) coupling: Coupling,
-    /// Whether it slipped last, so that no earlier state matters.
+    /// Whether it slipped in this block, so that no earlier state matters.
     pub(crate) has_slipped: bool,
 }
 

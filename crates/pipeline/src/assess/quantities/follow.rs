@@ -232,7 +232,7 @@ fn take_off_moves(subjects: &mut [Subject<'_>]) {
     }
 }
 
-/// Takes off the curve that the units of each part share: of those that do not depart from it by themselves.
+/// Takes the curve that the units of a part share off each of them. Units that depart from it have no part in the curve.
 fn take_off_curves<'a>(
     subjects: &mut [Subject<'a>],
     fit: &(dyn Fn(&Subject<'a>) -> Option<QuantityChanges> + Sync),
@@ -251,7 +251,7 @@ fn take_off_curves<'a>(
     }
 }
 
-/// The curve of each part, of some of its units.
+/// The common curve of each part, from those units that `follow` marks.
 fn curves(subjects: &[Subject<'_>], follow: &[bool]) -> BTreeMap<Option<String>, CommonCurve> {
     let mut tails: BTreeMap<Option<&str>, usize> = BTreeMap::new();
     let mut parts: BTreeMap<Option<String>, Vec<(usize, &[QuantityValue])>> = BTreeMap::new();
