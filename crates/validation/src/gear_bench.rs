@@ -140,11 +140,10 @@ fn samples<'a>(
 fn filter(step_s: f64) -> Result<Filter, estimator::Error> {
     let noise = SensorNoise {
         screw_rms_m: 1e-4,
-        screw_resolution_m: 0.0,
         motor_rms_m: 1e-4,
-        motor_resolution_m: 0.0,
         unknown_force_n: 2.0,
         bandwidth_hz: 10.0,
+        ..SensorNoise::default()
     };
     Filter::new(&ActuatorModel::linear(STIFFNESS_NM_PER_RAD, 5.0, 0.01)?, step_s, &NoiseModel::Sensors(noise))
 }

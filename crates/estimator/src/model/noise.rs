@@ -33,7 +33,7 @@ pub enum NoiseModel {
 }
 
 /// Sensor facts, m at the screw axis, and the bandwidth in which the backlash may move.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SensorNoise {
     /// Noise of the screw position, rms, m.
     pub screw_rms_m: f64,

@@ -47,11 +47,9 @@ impl Set {
     fn sensors(&self) -> NoiseModel {
         NoiseModel::Sensors(SensorNoise {
             screw_rms_m: self.number("sigma_y"),
-            screw_resolution_m: 0.0,
-            motor_rms_m: 0.0,
-            motor_resolution_m: 0.0,
             unknown_force_n: self.number("sigma_force"),
             bandwidth_hz: self.number("bandwidth_hz"),
+            ..SensorNoise::default()
         })
     }
 

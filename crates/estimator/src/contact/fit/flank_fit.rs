@@ -152,11 +152,9 @@ fn midrange_of_m(blocks: &BlockMeans, scaling: &Scaling, fit: &FlankFit) -> Opti
     );
     let noise = NoiseModel::Sensors(SensorNoise {
         screw_rms_m: fit.search.scale_m,
-        screw_resolution_m: 0.0,
-        motor_rms_m: 0.0,
-        motor_resolution_m: 0.0,
         unknown_force_n: scaling.unknown_force_n,
         bandwidth_hz: 10.0,
+        ..SensorNoise::default()
     });
     let filter = Filter::new(&actuator.ok()?, blocks.period_s, &noise).ok()?;
     let samples = Samples {

@@ -36,21 +36,22 @@ pub(crate) fn search(
     blocks: &mut BlockMeans,
     scaling: &Scaling,
     mut state: FrictionState,
-    iterations: usize,
+    mut iterations: usize,
     rounds: usize,
 ) -> Result<GaussNewtonResult, Rejection> {
-    let mut found = None;
-    for _ in 0..iterations {
+    loop {
         blocks.apply_delays(&state);
         integrate(blocks, &state, scaling.motor_sense);
         let design = blocks.rows(scaling);
         rejection_of_contact(less_pressed(design.firm.iter(), blocks.period_s))?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
-        found = Some(GaussNewtonResult { design, fit, at: state, state: after });
+        iterations -= 1;
+        if iterations == 0 {
+            return Ok(GaussNewtonResult { design, fit, at: state, state: after });
+        }
         state = after;
     }
-    found.ok_or(Rejection::TooShort)
 }
 
 /// The reason of a flight whose less pressed flank is pressed for a time, s.

@@ -40,44 +40,44 @@ pub(crate) struct RobustFit<const N: usize> {
     pub(crate) beta: [f64; N],
     inverse: SMatrix<f64, N, N>,
     weights: Vec<f64>,
-    /// Precision lent by each belief, in units of the rows' weights.
+    /// Weight of each prior, in units of the rows' weights.
     lent: [f64; N],
-    beliefs: [GaussianPrior; N],
+    priors: [GaussianPrior; N],
 }
 
 /// Reweighted least squares: `rounds` rounds from even weights; none where there are too few rows.
 ///
-/// A belief counts as residual variance over its own, times the factor by which dependence within
+/// The weight of a prior is the variance of residuals over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would outweigh it.
 pub(crate) fn fit<const N: usize>(
     rows: &[DesignRow<N>],
-    beliefs: &[GaussianPrior; N],
-    rounds: usize,
+    priors: &[GaussianPrior; N],
+    mut rounds: usize,
 ) -> Option<RobustFit<N>> {
     if rows.len() <= N {
         return None;
     }
     let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
     let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
-    // Before the noise is known, beliefs only tell dependent columns apart.
-    let hint = beliefs.map(|b| if b.sd.is_finite() { 1e-9 } else { 0.0 });
+    // Before the noise is known, priors weigh next to nothing: they only separate dependent columns.
+    let hint = priors.map(|p| if p.sd.is_finite() { 1e-9 } else { 0.0 });
     let (mut weights, mut lent) = (even.clone(), hint);
-    for round in 1.. {
+    loop {
         let (normal, right) = normal_equations(rows, &weights);
-        let (beta, factor) = solve_normal(normal, right, beliefs, &lent)?;
+        let (beta, factor) = solve_normal(normal, right, priors, &lent)?;
         let found =
-            RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs };
-        if round > rounds {
+            RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, priors: *priors };
+        if rounds == 0 {
             return Some(found);
         }
+        rounds -= 1;
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
         let spread_m = spread(residuals_m.iter().copied()).max(LEAST_SPREAD_M);
-        let trusts = residuals_m.iter().map(|e| trust(e.abs() / spread_m, round == rounds));
+        let trusts = residuals_m.iter().map(|e| trust(e.abs() / spread_m, rounds == 0));
         weights = even.iter().zip(trusts).map(|(w, trust)| w * trust).collect();
         let noise = variance_of_a_row(rows, &weights, &residuals_m);
-        lent = beliefs.map(|b| if b.sd.is_finite() { noise / (b.sd * b.sd) } else { 0.0 });
+        lent = priors.map(|p| if p.sd.is_finite() { noise / (p.sd * p.sd) } else { 0.0 });
     }
-    None
 }
 
 /// Weight of a residual. Outliers are rejected only in the last round: before, a bad start could reject a
@@ -153,13 +153,13 @@ fn normal_equations<const N: usize>(
 fn solve_normal<const N: usize>(
     mut normal: SMatrix<f64, N, N>,
     mut right: SVector<f64, N>,
-    beliefs: &[GaussianPrior; N],
+    priors: &[GaussianPrior; N],
     lent: &[f64; N],
 ) -> Option<(SVector<f64, N>, Cholesky<f64, Const<N>>)> {
     for i in 0..N {
         normal[(i, i)] += lent[i];
-        right[i] += lent[i] * beliefs[i].mean;
-        // A column no row touches, such as friction that never acts, keeps its belief or stays zero.
+        right[i] += lent[i] * priors[i].mean;
+        // A column no row touches, such as friction that never acts, keeps its prior or stays zero.
         if normal[(i, i)] <= 0.0 {
             normal[(i, i)] = 1.0;
         }
@@ -196,7 +196,7 @@ impl<const N: usize> RobustFit<N> {
             total = (total.0 + normal, total.1 + right);
         }
         let refitted =
-            |(normal, right)| solve_normal(normal, right, &self.beliefs, &self.lent).map(|f| f.0[column]);
+            |(normal, right)| solve_normal(normal, right, &self.priors, &self.lent).map(|f| f.0[column]);
         let whole = refitted(total)?;
         let parts: Option<Vec<f64>> =
             parts.iter().map(|part| refitted((total.0 - part.0, total.1 - part.1))).collect();
@@ -222,8 +222,8 @@ impl<const N: usize> RobustFit<N> {
         let moved = |(row, w): (&DesignRow<N>, &f64)| w * self.residual_m(row) * dot(&influence, &row.x);
         let (total, stretches) = squares_of_stretches(rows, rows.iter().zip(&self.weights).map(moved));
         let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);
-        let believed = (0..N).filter(|&i| self.beliefs[i].sd.is_finite());
-        let lent = believed.map(|i| (influence[i] * self.lent[i] * self.beliefs[i].sd).powi(2));
+        let believed = (0..N).filter(|&i| self.priors[i].sd.is_finite());
+        let lent = believed.map(|i| (influence[i] * self.lent[i] * self.priors[i].sd).powi(2));
         (total * freedom + lent.sum::<f64>()).sqrt()
     }
 }

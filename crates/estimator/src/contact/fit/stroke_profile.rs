@@ -5,7 +5,7 @@
 
 use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE, dot};
-use crate::contact::fit::gauss_newton::{GaussNewtonResult, priors};
+use crate::contact::fit::gauss_newton::{self, GaussNewtonResult};
 use crate::contact::fit::robust_regression::{GaussianPrior, REWEIGHTINGS, fit};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::types::GapAtPlace;
@@ -38,14 +38,14 @@ pub(crate) fn stroke_profile(
         return None;
     }
     let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
-    let known = priors(scaling, &line.at);
+    let known = gauss_newton::priors(scaling, &line.at);
     // The gap, and the transducer's error, at a knot spread by so much about what the whole stroke has.
-    let beliefs: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
+    let priors: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
         0..COLUMNS => known[column],
         _ if column < COLUMNS + KNOTS => GaussianPrior::zero(60e-6),
         _ => GaussianPrior::zero(10e-6),
     });
-    let found = fit(&rows, &beliefs, REWEIGHTINGS)?;
+    let found = fit(&rows, &priors, REWEIGHTINGS)?;
     let shares = time_shares(blocks, scaling);
     let value_m = |weights: &[f64; KNOTS]| -> f64 { found.beta[GAP] + dot(weights, &found.beta[COLUMNS..]) };
     let error_m = |gap: f64, weights: &[f64; KNOTS]| {

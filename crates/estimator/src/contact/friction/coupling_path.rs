@@ -10,37 +10,28 @@ use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, 
 /// Parts of a segment that are integrated side by side.
 const LANES: usize = 8;
 
-/// Integrates the coupling of every block over all segments under one set of parameters.
+/// Integrates the coupling of every block over all segments under one set of parameters: eight parts of a segment in parallel
+/// lanes, each from an arbitrary state; then from the true start of each part until the sequential integration meets what
+/// the lane found.
 pub(crate) fn integrate(blocks: &mut BlockMeans, state: &FrictionState, motor_sense: f64) {
-    let mut couplings = std::mem::take(&mut blocks.couplings);
-    couplings.resize(blocks.len(), Coupling::UNKNOWN);
+    let mut found = std::mem::take(&mut blocks.couplings);
+    found.resize(blocks.len(), Coupling::UNKNOWN);
     let params = CouplingParams::new(state, motor_sense);
     for segment in &blocks.segments {
-        integrate_segment(params, blocks, segment.clone(), &mut couplings);
-    }
-    blocks.couplings = couplings;
-}
-
-/// Integrates eight parts of a segment in parallel lanes, each from an arbitrary state; then from the true start of each part
-/// until the sequential integration meets what the lane found.
-fn integrate_segment(
-    params: CouplingParams,
-    blocks: &BlockMeans,
-    segment: Range<usize>,
-    found: &mut [Coupling],
-) {
-    let part = segment.len() / LANES;
-    let ends = integrate_lanes(params, blocks, segment.start, part, found);
-    let rest = segment.start + LANES * part..segment.end;
-    let mut screw = None;
-    for (lane, start) in (segment.start..rest.start).step_by(part.max(1)).enumerate() {
-        if recompute_until_match(params, &mut screw, blocks, start..start + part, found) {
-            screw = Some(ends.get(lane));
+        let part = segment.len() / LANES;
+        let ends = integrate_lanes(params, blocks, segment.start, part, &mut found);
+        let rest = segment.start + LANES * part..segment.end;
+        let mut screw = None;
+        for (lane, start) in (segment.start..rest.start).step_by(part.max(1)).enumerate() {
+            if recompute_until_match(params, &mut screw, blocks, start..start + part, &mut found) {
+                screw = Some(ends.get(lane));
+            }
         }
+        // No lane covers the rest of the segment, which may hold another integration.
+        found[rest.clone()].fill(Coupling::UNKNOWN);
+        recompute_until_match(params, &mut screw, blocks, rest, &mut found);
     }
-    // No lane covers the rest of the segment, which may hold another integration.
-    found[rest.clone()].fill(Coupling::UNKNOWN);
-    recompute_until_match(params, &mut screw, blocks, rest, found);
+    blocks.couplings = found;
 }
 
 /// Integrates through a part until its values are those found before: once the screw has slipped, its force determines
