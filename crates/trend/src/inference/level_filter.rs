@@ -102,25 +102,19 @@ impl Filter {
         season: &Pass,
         basis_values: &[[f64; N]],
     ) -> [Regression; N] {
-        let [mut sff, mut sfy, mut sfs, mut end, mut start] = [[0.0; N]; 5];
+        let mut lanes = [Regression::default(); N];
         let others = gaps.weighted.iter().zip(&season.weighted);
         for ((step, basis_values), (gap, wave)) in self.steps.iter().zip(basis_values).zip(others) {
-            for i in 0..N {
-                let e = basis_values[i] - end[i];
-                end[i] += step.gain * e;
-                start[i] += step.to_start * e;
-                sff[i] += step.precision * e * e;
-                sfy[i] += gap * e;
-                sfs[i] += wave * e;
+            for (lane, value) in lanes.iter_mut().zip(basis_values) {
+                let e = value - lane.end;
+                lane.end += step.gain * e;
+                lane.start += step.to_start * e;
+                lane.sff += step.precision * e * e;
+                lane.sfy += gap * e;
+                lane.sfs += wave * e;
             }
         }
-        std::array::from_fn(|i| Regression {
-            sff: sff[i],
-            sfy: sfy[i],
-            sfs: sfs[i],
-            end: end[i],
-            start: start[i],
-        })
+        lanes
     }
 
     /// Filters one sequence, with two other passes.
