@@ -171,7 +171,10 @@ impl<'a> AxisPrior<'a> {
     /// Within an iteration the weights of the laws and lives move; a better known gap of a new unit
     /// takes effect in the next one.
     fn em_iterate(self, executor: &impl Executor) -> Self {
-        let fitted = |segment: &Segment<'_>| Some(posterior(segment, &self.learned)?.drop_negligible());
+        let fitted = |segment: &Segment<'_>| {
+            let fitted = posterior(segment, &self.learned)?;
+            Some(Posterior { components: fitted.significant_components().copied().collect(), ..fitted })
+        };
         let units: Vec<Posterior> =
             executor.map(&segments(&self.histories), fitted).into_iter().flatten().collect();
         let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);

@@ -13,13 +13,10 @@
 //! let day_us = |day: i64| day * 86_400_000_000;
 //! let flight = |day: i64| Observation {
 //!     departure_us: day_us(day),
-//!     installation: 0,
 //!     flight_hours: Some(1.5),
-//!     tail_hours_end: None,
-//!     load_reversals: None,
 //!     gap_m: Some(30e-6 + 1e-8 * day as f64 + 1e-6 * (day as f64).sin()),
 //!     gap_se_m: Some(1e-6),
-//!     is_doubtful: false,
+//!     ..Observation::default()
 //! };
 //! let series = Series::new((0..500).map(flight), &UsageDefaults::default())?;
 //!

@@ -22,7 +22,7 @@ const BELIEVED: f64 = 6.5;
 /// Estimates on each side of the near window, in which a bend of the wear is no step.
 const NEAR: usize = 20;
 
-/// Estimates of one side's slope.
+/// Estimates of one side's slope, and on each side of a change of installation.
 const SIDE: usize = 60;
 
 /// Standard errors, and share of the step, required in the near window.
@@ -89,13 +89,12 @@ pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepC
 ///
 /// Half of the mean is the variance of what one installation adds to every gap measured in it.
 pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f64, f64) {
-    const REACH: usize = 60;
     let largest_m = LARGEST_BIAS * limit_m;
     let sums = PrefixSums::new(estimates, limit_m);
     let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
         .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
     changes.fold((0.0, 0.0), |(squares, count), at| {
-        let step = sums.offset(&(0..estimates.len()), at, REACH);
+        let step = sums.offset(&(0..estimates.len()), at, SIDE);
         let se_m = step.se_m();
         if step.step_m.abs() > largest_m || se_m > 0.5 * largest_m {
             return (squares, count);

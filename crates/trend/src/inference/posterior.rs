@@ -43,20 +43,8 @@ pub(crate) struct Posterior {
 impl Posterior {
     /// The components whose weight can move a quantile.
     pub(crate) fn significant_components(&self) -> impl Iterator<Item = &Component> {
-        let least = self.negligible();
-        self.components.iter().filter(move |n| n.weight > least)
-    }
-
-    /// Drops the components whose weight cannot move a quantile.
-    pub(crate) fn drop_negligible(mut self) -> Self {
-        let least = self.negligible();
-        self.components.retain(|n| n.weight > least);
-        self
-    }
-
-    /// Weight, a share of the largest, below which a component cannot move a quantile.
-    fn negligible(&self) -> f64 {
-        2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max)
+        let negligible = 2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max);
+        self.components.iter().filter(move |n| n.weight > negligible)
     }
 }
 
@@ -222,7 +210,7 @@ fn try_lives(
     };
     let step = (high - low) / (count - 1) as f64;
     let age_now = candidate.age + fit.segment.now - fit.segment.begin;
-    let height_now = candidate.law.value(age_now);
+    let (height_now, ln_age) = (candidate.law.value(age_now), candidate.age.ln());
     let age_assumption = match candidate.law {
         _ if fit.segment.known_age.is_some() => AgeAssumption::NotNeeded,
         WearLaw::Onset { .. } => AgeAssumption::NotNeeded,
@@ -252,7 +240,7 @@ fn try_lives(
             onset_pending: false,
             weight: 0.0,
         };
-        let grid = step.ln() + candidate.ln_cell + ln_density_in_grid(candidate, &component);
+        let grid = step.ln() + candidate.ln_cell + ln_density_in_grid(candidate, ln_age, &component);
         Component { weight: log_likelihood + grid + fit.logs.of(&component), ..component }
     };
     (0..count).map(component).collect()
@@ -264,13 +252,13 @@ const WORN_SHARE: f64 = 0.9;
 const OVERDUE: f64 = 20.0;
 
 /// Log density of a candidate's time constant and of its age at first sight, given its life: the same for every fleet.
-fn ln_density_in_grid(candidate: &Candidate, component: &Component) -> f64 {
+fn ln_density_in_grid(candidate: &Candidate, ln_age: f64, component: &Component) -> f64 {
     let life = candidate.ln_life.map_or(0.0, |(ln_life, sd)| {
         let z = (component.ln_life - ln_life) / sd;
         ln_peak_density(sd) - 0.5 * z * z
     });
     if component.age_assumption == AgeAssumption::Worn {
-        let used = candidate.ln_age - WORN_SHARE.ln() - component.ln_life;
+        let used = ln_age - WORN_SHARE.ln() - component.ln_life;
         return life - WORN_SHARE.ln() - component.ln_life - OVERDUE * used.max(0.0);
     }
     life

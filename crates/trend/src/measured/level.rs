@@ -9,7 +9,7 @@ const WINDOW: usize = 12;
 const LEAST_LINE: usize = 5;
 
 /// Standard errors from which a single record among others is not counted.
-const WILD: f64 = 5.0;
+pub(crate) const WILD: f64 = 5.0;
 
 /// Standard errors, and share of the limit, by which a lone last record must lie below the level to be unconfirmed.
 const FALL_ERRORS: f64 = 4.0;

@@ -1,7 +1,7 @@
 //! Local line: the rise of the last records, and when it meets the limit.
 
 use crate::math::NORMAL_95;
-use crate::measured::level::Line;
+use crate::measured::level::{Line, WILD};
 use crate::measured::record::Record;
 use crate::settings::Settings;
 
@@ -13,20 +13,17 @@ const SLOPE_ERRORS: f64 = 4.0;
 const RISE_SHARE: f64 = 0.05;
 const RISE_ERRORS: f64 = 5.0;
 
-/// Standard errors by which every record is above the one before where they rise along no line.
+/// Standard errors by which a record is above the one before: every one where they rise along no line, the last one where
+/// its rate counts.
 const EACH_ERRORS: f64 = 4.0;
 
-/// Records of a window for each one that may be left out as wild, and the standard errors by which it is.
+/// Records of a window for each one that may be left out as wild.
 const PER_WILD: usize = 5;
-const WILD: f64 = 5.0;
 
 /// Share of the records' variance about their mean that a line leaves where they rise evenly, if not by their errors.
 const UNEVEN: f64 = 0.12;
 /// Fewest records that rise evenly.
 const LEAST_EVEN: usize = 6;
-
-/// Standard errors by which the last record is above the one before where its rate counts.
-const LAST_ERRORS: f64 = 4.0;
 
 /// The share of the time by the line after which the limit may be met where the rate still grows.
 const ACCELERATION: f64 = 0.75;
@@ -77,7 +74,7 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     // Where they rise, the last two show whether they rise faster now.
     if let (Some(rise), [.., before, last]) = (&mut found, sound) {
         let (step_m, hours) = (last.gap_m - before.gap_m, last.hours - before.hours);
-        if before.period == last.period && step_m > LAST_ERRORS * before.error_m.hypot(last.error_m) {
+        if before.period == last.period && step_m > EACH_ERRORS * before.error_m.hypot(last.error_m) {
             let p05_hours = ACCELERATION * (settings.limit_m - last.gap_m).max(0.0) * hours / step_m;
             rise.p05_hours = rise.p05_hours.min(p05_hours);
         }

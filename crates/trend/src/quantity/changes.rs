@@ -81,8 +81,7 @@ pub struct QuantityChanges {
 ///     usage_hours: 2.0 * k as f64,
 ///     value: if k < 30 { 0.1e-3 } else { 2.1e-3 } + 50e-6 * (1.7 * k as f64).sin(),
 ///     se: 10e-6,
-///     temperature_c: None,
-///     ln_load: None,
+///     ..QuantityValue::default()
 /// };
 /// let values: Vec<QuantityValue> = (0..40).map(value).collect();
 /// let found = changes::fit(&values, 1e-6).ok_or("too few values")?;

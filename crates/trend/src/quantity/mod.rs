@@ -13,7 +13,7 @@ pub use crate::math::median;
 pub const MIN_FLIGHTS: usize = 8;
 
 /// A quantity of one unit in one flight, in any unit of measurement.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct QuantityValue {
     /// Departure, µs since 1970 UTC.
     pub departure_us: i64,

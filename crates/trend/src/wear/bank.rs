@@ -104,8 +104,7 @@ pub(crate) struct Candidate {
     pub(crate) law: WearLaw,
     /// Age at first sight, hours.
     pub(crate) age: f64,
-    /// Logarithms of its age and of the cells of the grid that it stands for, in age and in its own parameter.
-    pub(crate) ln_age: f64,
+    /// Logarithm of the cells of the grid that it stands for, in age and in its own parameter.
     pub(crate) ln_cell: f64,
     /// Standard deviation of the height at first sight within the cell of ages.
     pub(crate) age_spread: f64,
@@ -253,7 +252,6 @@ impl Candidate {
         Self {
             law,
             age,
-            ln_age: age.ln(),
             ln_cell: law_cell.ln() + if is_known { 0.0 } else { age_cell.ln() },
             age_spread: if is_known { 0.0 } else { law.derivative(age) * age_cell / 12.0_f64.sqrt() },
             ln_life: ln_life.map(|(hours, (mean, sd))| (hours.ln() + mean, sd)),

@@ -6,7 +6,7 @@ use crate::histories::{self, DAY_US};
 use crate::random::Random;
 
 /// A unit that flies 2 h a day.
-fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
+pub(crate) fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
     let measured_um = |day: i64| gap_um(2.0 * (day + 1) as f64) + Random::new(day as u64).normal();
     let rows = (0..days).map(|day| histories::row(day, DAY_US, 2.0, measured_um(day), 1.0));
     Series::new(rows, &UsageDefaults { unit_hours_at_start: Some(0.0), ..UsageDefaults::default() }).unwrap()

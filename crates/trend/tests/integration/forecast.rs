@@ -1,25 +1,19 @@
 //! The plotted forecast agrees with the assessment, and its level follows the true gap.
 
-use trend::{Crossing, Forecast, Series, Settings, assess, forecast};
+use trend::{Crossing, Forecast, Settings, assess, forecast};
 
-use crate::histories::{self, DAY_US};
-use crate::random::Random;
+use crate::assessment::unit;
+use crate::histories::DAY_US;
 
-const HOURS: f64 = 2.0;
 const LIMIT_M: f64 = 60e-6;
 
 /// 20 µm when new, 30 µm in 1,000 h.
-fn true_um(day: i64) -> f64 {
-    20.0 + 30.0 * HOURS * (day + 1) as f64 / 1000.0
-}
-
-fn series(days: i64) -> Series {
-    let measured_um = |day| true_um(day) + Random::new(day as u64).normal();
-    histories::series((0..days).map(|day| histories::row(day, DAY_US, HOURS, measured_um(day), 1.0)))
+fn true_um(hours: f64) -> f64 {
+    20.0 + 0.03 * hours
 }
 
 fn drawn(days: i64, hours: &[f64]) -> (Crossing, Forecast) {
-    let (series, settings, now) = (series(days), Settings::for_limit(LIMIT_M), days * DAY_US);
+    let (series, settings, now) = (unit(days, true_um), Settings::for_limit(LIMIT_M), days * DAY_US);
     let crossing = assess(&series, now, &settings, None).unwrap().crossing.unwrap();
     (crossing, forecast(&series, now, &settings, None, hours.iter().copied()).unwrap())
 }
@@ -42,7 +36,7 @@ fn the_forecast_meets_the_limit_at_the_assessed_crossing() {
 #[test]
 fn the_fan_begins_at_the_level_and_widens() {
     let (_, Forecast { ahead, .. }) = drawn(400, &[0.0, 100.0, 300.0, 900.0]);
-    assert!((ahead[0].1.m - true_um(399) * 1e-6).abs() < 2e-6, "{ahead:?}");
+    assert!((ahead[0].1.m - true_um(800.0) * 1e-6).abs() < 2e-6, "{ahead:?}");
     assert!(ahead.windows(2).all(|w| w[1].1.p95_m - w[1].1.p05_m > w[0].1.p95_m - w[0].1.p05_m), "{ahead:?}");
 }
 
@@ -50,7 +44,7 @@ fn the_fan_begins_at_the_level_and_widens() {
 fn the_level_through_past_flights_holds_the_truth() {
     let (_, Forecast { past, .. }) = drawn(400, &[]);
     let held = past.iter().filter(|(at, band)| {
-        let truth_m = (20.0 + 30.0 * HOURS * (*at as f64 / DAY_US as f64 + 1.0) / 1000.0) * 1e-6;
+        let truth_m = true_um(2.0 * (*at as f64 / DAY_US as f64 + 1.0)) * 1e-6;
         (band.p05_m..=band.p95_m).contains(&truth_m)
     });
     assert!(past.len() >= 40 && held.count() * 10 >= past.len() * 8, "{past:?}");
@@ -59,7 +53,7 @@ fn the_level_through_past_flights_holds_the_truth() {
 
 #[test]
 fn too_few_flights_draw_nothing() {
-    let (series, settings) = (series(5), Settings::for_limit(LIMIT_M));
+    let (series, settings) = (unit(5, true_um), Settings::for_limit(LIMIT_M));
     let drawn = forecast(&series, 10 * DAY_US, &settings, None, [0.0, 100.0]).unwrap();
     assert_eq!(drawn, Forecast::default());
 }

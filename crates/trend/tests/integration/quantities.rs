@@ -19,8 +19,7 @@ fn flights(random: &mut Random, count: usize, scatter: f64, rho: f64) -> Vec<Qua
                 usage_hours: 2.0 * k as f64,
                 value: 1.0 + error,
                 se: 0.3 * scatter,
-                temperature_c: None,
-                ln_load: None,
+                ..QuantityValue::default()
             }
         })
         .collect()
