@@ -10,8 +10,8 @@ use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
 use crate::prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
 use crate::statement::history::History;
+use crate::wear::AgeAssumption;
 use crate::wear::bank::WearLaw;
-use crate::wear::component::AgeAssumption;
 
 /// Largest number of units used: more change the prior little and cost as much as their own assessments.
 const MOST_UNITS: usize = 150;

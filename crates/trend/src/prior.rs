@@ -6,7 +6,7 @@ use crate::data::series::{DAY_US, Flight};
 use crate::data::steps::WEAR_NOISE;
 use crate::math::{NORMAL_95, ln_peak_density};
 use crate::wear::bank::{FAMILIES, WearLaw, default_shares};
-use crate::wear::component::{AgeAssumption, Component};
+use crate::wear::{AgeAssumption, Component};
 
 /// The gap of a new unit as a share of the limit, while nothing is known.
 const NEW_SHARE: f64 = 0.2;

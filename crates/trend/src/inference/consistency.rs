@@ -9,7 +9,7 @@ use crate::measured::level::measured_level;
 use crate::measured::record::Record;
 use crate::prior::FleetPrior;
 use crate::statement::history::History;
-use crate::wear::component::Component;
+use crate::wear::Component;
 
 /// Standard errors beyond which the level is not that of the records.
 const REACH: f64 = 5.0;

@@ -6,7 +6,7 @@ use crate::inference::segment_fit::{SegmentFit, linear_growth};
 use crate::math::ln_peak_density;
 use crate::prior::FleetPrior;
 use crate::wear::bank::{Candidate, WearLaw, candidates};
-use crate::wear::component::{AgeAssumption, Component};
+use crate::wear::{AgeAssumption, Component};
 
 /// Bins of the first pass, which drops most curves.
 const COARSE_BINS: usize = 12;

@@ -17,10 +17,12 @@ pub(crate) enum Exceedance {
 }
 
 /// Records at or above the limit, one after the other.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Run {
     first: usize,
     above: usize,
+    /// Whether one of those above is sound.
+    has_sound: bool,
     /// Records below the limit since.
     below: usize,
     is_confirmed: bool,
@@ -43,16 +45,12 @@ pub(crate) fn exceedance(
         if k > 0 && record.period != records[k - 1].period {
             (run, ended_at) = (None, None);
         }
-        let mut current = match run {
-            None if !is_above(record) => continue,
-            None => Run { first: k, above: 0, below: 0, is_confirmed: false, before_m: before(&records, k) },
-            Some(run) => run,
-        };
+        let begin = || Run { first: k, before_m: before(&records, k), ..Run::default() };
+        let Some(mut current) = run.take().or_else(|| is_above(record).then(begin)) else { continue };
         if is_above(record) {
-            current.above += 1;
-            current.below = 0;
-            let is_any_sound = records[current.first..=k].iter().any(|r| r.is_sound && is_above(r));
-            if !current.is_confirmed && current.above > 1 && is_any_sound {
+            (current.above, current.below) = (current.above + 1, 0);
+            current.has_sound |= record.is_sound;
+            if !current.is_confirmed && current.above > 1 && current.has_sound {
                 current.is_confirmed = true;
                 events.push(event(&records[current.first], &current, ChangePointKind::Exceedance));
             }
@@ -62,14 +60,12 @@ pub(crate) fn exceedance(
         current.below += 1;
         let least_m = (JUMP_SHARE * limit_m).max(JUMP_ERRORS * record.error_m);
         let has_returned = current.before_m.is_some_and(|before_m| record.gap_m <= before_m + least_m);
-        run = Some(current);
-        if current.below > 1 || (!current.is_confirmed && has_returned) {
-            if current.is_confirmed {
-                ended_at = Some(k);
-            } else {
-                events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
-            }
-            run = None;
+        if current.below == 1 && (current.is_confirmed || !has_returned) {
+            run = Some(current);
+        } else if current.is_confirmed {
+            ended_at = Some(k);
+        } else {
+            events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
         }
     }
     let is_held = |level: Level| {

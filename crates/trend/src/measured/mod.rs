@@ -58,11 +58,10 @@ impl Measured {
         let level = measured_level(&sound, settings.limit_m);
         let (exceedance, events) = exceedance(&all, level.filter(|_| has_sound), settings.limit_m);
         // The gap that is shown is that of the records which make the state.
-        let above =
-            |records: usize| measured_level(&sound[sound.len().saturating_sub(records)..], settings.limit_m);
         let level = match exceedance {
             Some(Exceedance::Confirmed { records }) if level.is_some_and(|l| l.gap_m < settings.limit_m) => {
-                above(records).or(level)
+                let above = &sound[sound.len().saturating_sub(records)..];
+                measured_level(above, settings.limit_m).or(level)
             }
             _ => level,
         };

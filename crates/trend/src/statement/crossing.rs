@@ -5,8 +5,8 @@ use crate::math::{GAUSS_HERMITE_5, WeightedSamples};
 use crate::prior::{FleetPrior, WAIT_QUANTILES};
 use crate::settings::Settings;
 use crate::statement::types::Crossing;
+use crate::wear::Component;
 use crate::wear::bank::WearLaw;
-use crate::wear::component::Component;
 
 /// The distribution of the hours left.
 pub(crate) struct RulDistribution {

@@ -3,8 +3,8 @@
 use crate::inference::posterior::Posterior;
 use crate::math::{WeightedSamples, normal_cdf};
 use crate::statement::types::Rate;
+use crate::wear::Component;
 use crate::wear::bank::{WearClass, WearLaw};
-use crate::wear::component::Component;
 
 /// Growth that counts as visible, a share of the limit.
 const VISIBLE: f64 = 0.02;

@@ -64,12 +64,15 @@ impl Drawn {
         low + (self.random.uniform() * (high - low + 1) as f64) as usize
     }
 
+    /// One log of a gap, µm.
+    pub(crate) fn log(&mut self, um: f64) {
+        let measured_um = um + self.error_um * self.random.normal();
+        self.flown(Some(measured_um));
+    }
+
     /// Logs of a gap that grows from one value to another, µm.
     pub(crate) fn logs(&mut self, count: usize, gap_um: impl Fn(f64) -> f64) {
-        for k in 0..count {
-            let um = gap_um((k + 1) as f64 / count as f64) + self.error_um * self.random.normal();
-            self.flown(Some(um));
-        }
+        (0..count).for_each(|k| self.log(gap_um((k + 1) as f64 / count as f64)));
     }
 
     /// Logs of one gap, µm, which is remembered; gap and number are drawn between two.

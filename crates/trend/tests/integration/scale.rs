@@ -3,21 +3,11 @@
 use trend::{Assessment, FleetPrior, Observation, SerialExecutor, Series, Settings, assess};
 
 use crate::histories::{self, Drawn, LIMIT_M};
-use crate::states::{CALM, Kind, LINE, URGENT, drawn};
-
-const RESET: Kind = (
-    "worn, then reset",
-    None,
-    &[
-        |d| d.stay((20, 20), (40.0, 60.0)),
-        |d| d.rise((200, 200), (0.7, 0.8), LINE),
-        |d| d.above((60, 60), (0.0, 0.0)),
-    ],
-);
+use crate::states::{CALM, URGENT, drawn};
 
 /// Some units of each kind of history, every third without stated errors, with every length multiplied by a factor.
 fn assessments(factor: f64) -> Vec<Assessment> {
-    let kinds = URGENT.iter().chain(&CALM).chain([&RESET; 4]).zip(0..);
+    let kinds = URGENT.iter().chain(&CALM).zip(0..);
     let units: Vec<Drawn> = kinds
         .flat_map(|(kind, number)| drawn(*kind, number).into_iter().take(2))
         .map(|unit| unit.0)

@@ -1,16 +1,17 @@
 //! States of drawn histories: none less urgent than due, and hardly a false alarm.
 
-use trend::{State, assess};
+use trend::State::{self, Act, Normal, Plan, Unassessed, Watch};
+use trend::assess;
 
 use crate::histories::{Drawn, LIMIT_UM, prior, settings};
 
-/// Name, the state that is due at least (`None` where the records alone give it), and what happens to the unit, in order.
-pub(crate) type Kind = (&'static str, Option<State>, &'static [fn(&mut Drawn)]);
+/// Name, the state that is due at least (`Normal` where the records alone give it), and what happens to the unit, in order.
+type Kind = (&'static str, State, &'static [fn(&mut Drawn)]);
 
 const UNITS: u64 = 100;
 
 /// The power of an even rise.
-pub(crate) const LINE: (f64, f64) = (1.0, 1.0);
+const LINE: (f64, f64) = (1.0, 1.0);
 
 fn young_or_old(d: &mut Drawn) {
     d.stay(if d.every > 1 { (6, 60) } else { (8, 300) }, (40.0, 90.0));
@@ -47,45 +48,37 @@ fn wild_records(d: &mut Drawn) {
 }
 
 /// The kinds that must be acted on.
-pub(crate) const URGENT: [Kind; 27] = [
-    ("one above the limit", None, &[young_or_old, |d| d.jump(1, 1)]),
-    ("jump above the limit", None, &[young_or_old, |d| d.jump(2, 8)]),
-    ("linear rise, now above", None, &[young_or_old, |d| d.rise((2, 40), (1.02, 1.3), LINE)]),
-    ("accelerating rise, now above", None, &[young_or_old, |d| d.rise((10, 80), (1.02, 1.3), (1.5, 3.0))]),
-    ("all records above", None, &[|d| d.jump(2, 7)]),
-    ("one record in all, above", None, &[|d| d.jump(1, 1)]),
-    ("sparse logs, jump", None, &[|d| d.every = 24, young_or_old, |d| d.jump(2, 5)]),
-    ("sparse logs, rise", None, &[|d| d.every = 24, young_or_old, |d| d.rise((3, 8), (1.02, 1.3), LINE)]),
+pub(crate) const URGENT: [Kind; 28] = [
+    ("one above the limit", Normal, &[young_or_old, |d| d.jump(1, 1)]),
+    ("jump above the limit", Normal, &[young_or_old, |d| d.jump(2, 8)]),
+    ("linear rise, now above", Normal, &[young_or_old, |d| d.rise((2, 40), (1.02, 1.3), LINE)]),
+    ("accelerating rise, now above", Normal, &[young_or_old, |d| d.rise((10, 80), (1.02, 1.3), (1.5, 3.0))]),
+    ("all records above", Normal, &[|d| d.jump(2, 7)]),
+    ("one record in all, above", Normal, &[|d| d.jump(1, 1)]),
+    ("sparse logs, jump", Normal, &[|d| d.every = 24, young_or_old, |d| d.jump(2, 5)]),
+    ("sparse logs, rise", Normal, &[|d| d.every = 24, young_or_old, |d| d.rise((3, 8), (1.02, 1.3), LINE)]),
     (
         "large errors, above",
-        None,
+        Normal,
         &[|d| d.error_um = d.between(4.0, 9.0), young_or_old, |d| d.stay((3, 8), (170.0, 260.0))],
     ),
-    ("hours from the limit", Some(State::Plan), &[young_or_old, |d| d.rise((4, 20), (0.88, 0.985), LINE)]),
-    (
-        "accelerating, hours from the limit",
-        Some(State::Plan),
-        &[young_or_old, |d| d.rise((6, 20), (0.88, 0.985), (2.0, 2.0))],
-    ),
+    ("hours from the limit", Plan, &[young_or_old, |d| d.rise((4, 20), (0.88, 0.985), LINE)]),
+    ("accelerating, near the limit", Plan, &[young_or_old, |d| d.rise((6, 20), (0.88, 0.985), (2.0, 2.0))]),
     (
         "hours from the limit, one of the last three records wild",
-        Some(State::Plan),
+        Plan,
         &[young_or_old, |d| d.rise((10, 20), (0.88, 0.96), LINE), one_of_the_last_three_is_wild],
     ),
-    ("rise in stairs", Some(State::Plan), &[young_or_old, rise_in_stairs]),
-    (
-        "first records of an installation, all flagged",
-        Some(State::Unassessed),
-        &[young_or_old, Drawn::moved, all_flagged],
-    ),
+    ("rise in stairs", Plan, &[young_or_old, rise_in_stairs]),
+    ("first records of an installation, all flagged", Unassessed, &[young_or_old, Drawn::moved, all_flagged]),
     (
         "one above the limit, then an impossible record",
-        Some(State::Plan),
-        &[young_or_old, |d| d.jump(1, 1), |d| d.logs(1, |_| -40.0)],
+        Plan,
+        &[young_or_old, |d| d.jump(1, 1), |d| d.log(-40.0)],
     ),
     (
         "jump that no line swallows",
-        Some(State::Watch),
+        Watch,
         &[
             |d| d.error_um = d.between(3.0, 5.0),
             |d| d.stay((5, 8), (45.0, 55.0)),
@@ -94,52 +87,57 @@ pub(crate) const URGENT: [Kind; 27] = [
     ),
     (
         "jump below the limit, then a record off its level",
-        Some(State::Watch),
+        Watch,
         &[
             |d| d.stay((8, 60), (40.0, 60.0)),
             |d| d.above((4, 8), (45.0, 45.0)),
-            |d| d.above((1, 1), [45.0 + 12.0 * d.error_um.max(1.0); 2].into()),
+            |d| d.log(d.um + 45.0 + 12.0 * d.error_um.max(1.0)),
         ],
     ),
-    (
-        "two records, the second a jump",
-        Some(State::Watch),
-        &[|d| d.stay((1, 1), (40.0, 60.0)), |d| d.above((1, 1), (60.0, 60.0))],
-    ),
-    ("jump at an installation", None, &[young_or_old, Drawn::moved, |d| d.jump(1, 8)]),
-    ("jump after a booked re-shim", None, &[young_or_old, Drawn::reshimmed, |d| d.jump(1, 8)]),
-    ("jump after a long pause", None, &[young_or_old, |d| d.paused(150), |d| d.jump(1, 8)]),
-    ("above, refused since", Some(State::Act), &[young_or_old, |d| d.jump(2, 8), |d| d.refused(1, 80)]),
-    ("flagged records above", None, &[young_or_old, |d| d.jump(1, 5), |d| d.doubt(d.rows.len().min(3))]),
-    (
-        "one low record after an exceedance",
-        Some(State::Act),
-        &[young_or_old, |d| d.jump(2, 8), |d| d.above((1, 1), (0.0, 0.0))],
-    ),
+    ("two records, the second a jump", Watch, &[|d| d.stay((1, 1), (40.0, 60.0)), |d| d.log(d.um + 60.0)]),
+    ("jump at an installation", Normal, &[young_or_old, Drawn::moved, |d| d.jump(1, 8)]),
+    ("jump after a booked re-shim", Normal, &[young_or_old, Drawn::reshimmed, |d| d.jump(1, 8)]),
+    ("jump after a long pause", Normal, &[young_or_old, |d| d.paused(150), |d| d.jump(1, 8)]),
+    ("above, refused since", Act, &[young_or_old, |d| d.jump(2, 8), |d| d.refused(1, 80)]),
+    ("flagged records above", Normal, &[young_or_old, |d| d.jump(1, 5), |d| d.doubt(d.rows.len().min(3))]),
+    ("one low record after an exceedance", Act, &[young_or_old, |d| d.jump(2, 8), |d| d.log(d.um)]),
     (
         "above but for an outlier",
-        None,
-        &[young_or_old, |d| d.jump(4, 8), |d| d.above((1, 1), (0.0, 0.0)), |d| d.logs(2, |_| 200.0)],
+        Normal,
+        &[young_or_old, |d| d.jump(4, 8), |d| d.log(d.um), |d| d.logs(2, |_| 200.0)],
     ),
     (
         "slow wear to the limit",
-        Some(State::Plan),
+        Plan,
         &[|d| d.um = d.between(40.0, 60.0), |d| d.rise((200, 400), (1.01, 1.05), LINE)],
     ),
-    ("jump that stays below the limit", Some(State::Watch), &[young_or_old, jump_below_the_limit]),
+    ("jump that stays below the limit", Watch, &[young_or_old, jump_below_the_limit]),
+    (
+        "worn, then reset without an entry",
+        Watch,
+        &[
+            |d| d.stay((20, 60), (40.0, 60.0)),
+            |d| d.rise((100, 300), (0.7, 0.8), LINE),
+            |d| d.above((8, 30), (0.0, 0.0)),
+        ],
+    ),
 ];
 
 /// The kinds that call for nothing.
 pub(crate) const CALM: [Kind; 7] = [
-    ("calm", None, &[young_or_old]),
-    ("calm, sparse logs", None, &[|d| d.every = 24, young_or_old]),
-    ("calm, large errors", None, &[|d| d.error_um = d.between(3.0, 6.0), |d| d.stay((2, 300), (40.0, 60.0))]),
-    ("outliers that were not confirmed", None, &[young_or_old, wild_records]),
-    ("few records", None, &[|d| d.stay((1, 8), (40.0, 90.0))]),
-    ("moved, with a bias", None, &[young_or_old, Drawn::moved, |d| d.above((1, 60), (-4.0, 4.0))]),
+    ("calm", Normal, &[young_or_old]),
+    ("calm, sparse logs", Normal, &[|d| d.every = 24, young_or_old]),
+    (
+        "calm, large errors",
+        Normal,
+        &[|d| d.error_um = d.between(3.0, 6.0), |d| d.stay((2, 300), (40.0, 60.0))],
+    ),
+    ("outliers that were not confirmed", Normal, &[young_or_old, wild_records]),
+    ("few records", Normal, &[|d| d.stay((1, 8), (40.0, 90.0))]),
+    ("moved, with a bias", Normal, &[young_or_old, Drawn::moved, |d| d.above((1, 60), (-4.0, 4.0))]),
     (
         "slow wear far from the limit",
-        None,
+        Normal,
         &[
             |d| d.um = d.between(30.0, 50.0),
             |d| d.rise((60, 300), (d.um / LIMIT_UM, (d.um + 10.0) / LIMIT_UM), LINE),
@@ -152,7 +150,7 @@ pub(crate) fn drawn(kind: Kind, number: u64) -> Vec<(Drawn, State)> {
     let one = |seed: u64| {
         let mut drawn = Drawn::new(1000 * number + seed, 1);
         kind.2.iter().for_each(|happens| happens(&mut drawn));
-        let due = drawn.due().max(kind.1.unwrap_or(State::Normal));
+        let due = drawn.due().max(kind.1);
         (drawn, due)
     };
     (0..UNITS).map(one).collect()
