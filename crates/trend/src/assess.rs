@@ -131,8 +131,8 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
         rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
         wear: wear_status(growth_probability),
         growth_probability: Some(growth_probability),
-        check_probability: Some(remaining.within(settings.check_interval_hours)),
-        over_limit_probability: Some(remaining.within(elapsed_hours)),
+        check_probability: Some(remaining.hours.share_below(settings.check_interval_hours)),
+        over_limit_probability: Some(remaining.hours.share_below(elapsed_hours)),
         ..Assessment::default()
     }
 }

@@ -242,7 +242,8 @@ impl SeasonParams {
 /// Log densities of a prior.
 pub(crate) struct LogPrior<'a> {
     prior: &'a FleetPrior,
-    shares: [f64; FAMILIES],
+    /// Of each family of laws.
+    pub(crate) shares: [f64; FAMILIES],
     life: f64,
     fresh: f64,
     worn: f64,
@@ -250,11 +251,6 @@ pub(crate) struct LogPrior<'a> {
 }
 
 impl LogPrior<'_> {
-    /// Of a family of laws.
-    pub(crate) fn share(&self, family: usize) -> f64 {
-        self.shares[family]
-    }
-
     /// Of a component's law, ln life, age and onset, as far as they depend on the fleet.
     pub(crate) fn of(&self, component: &Component) -> f64 {
         let FleetPrior { onsets_per_hour, ln_life, ln_life_sd, .. } = *self.prior;

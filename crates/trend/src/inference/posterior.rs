@@ -192,7 +192,7 @@ fn scored_candidate<'a>(
     let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
     let new_m2 = spread + (best_m * candidate.age_spread).powi(2);
     let bound = log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2
-        + fit.logs.share(candidate.law.family());
+        + fit.logs.shares[candidate.law.family()];
     ScoredCandidate { candidate, pass, best_m, information, bound }
 }
 

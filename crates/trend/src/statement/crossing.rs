@@ -10,7 +10,7 @@ use crate::wear::bank::WearLaw;
 
 /// The distribution of the hours left.
 pub(crate) struct RulDistribution {
-    hours: WeightedSamples,
+    pub(crate) hours: WeightedSamples,
     horizon_hours: f64,
     /// Factor of the interval's width.
     width: f64,
@@ -74,11 +74,6 @@ impl RulDistribution {
             "quantiles of the hours left decrease: {p05_hours:?} {middle:?} {p95_hours:?}"
         );
         Crossing { p05_hours, p50_hours: middle, p95_hours }
-    }
-
-    /// Probability that the limit is met within some hours.
-    pub(crate) fn within(&self, hours: f64) -> f64 {
-        self.hours.share_below(hours)
     }
 }
 

@@ -24,12 +24,8 @@ pub(crate) fn growth_probability(posterior: &Posterior, limit_m: f64) -> f64 {
     let sd_m = posterior.growth_m2.sqrt();
     let grown_m = |n: &Component| n.level_m - n.new_m - n.amplitude_m * n.law.value(n.age_begin);
     let grown = |n: &Component| n.weight * normal_cdf((grown_m(n) - visible_m) / sd_m);
-    probability(posterior.components.iter().map(grown).sum())
-}
-
-/// Rounded sums of weights may be a little more than one.
-fn probability(sum: f64) -> f64 {
-    sum.min(1.0)
+    // Rounded sums of weights may be a little more than one, here and below.
+    posterior.components.iter().map(grown).sum::<f64>().min(1.0)
 }
 
 /// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
@@ -40,7 +36,7 @@ pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
         _ => None,
     };
     let starts = WeightedSamples::new(posterior.components.iter().filter_map(start));
-    (starts.total > 0.5).then(|| (starts.quantile(0.5), probability(starts.total)))
+    (starts.total > 0.5).then(|| (starts.quantile(0.5), starts.total.min(1.0)))
 }
 
 /// Most probable class of wear laws, and its probability; for a wearing unit, of the classes other than none.
@@ -57,5 +53,5 @@ pub(crate) fn law(posterior: &Posterior, is_wearing: bool) -> Option<(WearClass,
         }
     }
     let likeliest = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    likeliest.map(|(law, share)| (law, probability(share)))
+    likeliest.map(|(law, share)| (law, share.min(1.0)))
 }
