@@ -92,20 +92,7 @@ fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) ->
             }
             found
         }
-        (None, Some(rise)) => Assessment {
-            crossing: Some(within(rise, settings.horizon_hours)),
-            method: Some(ForecastMethod::Line),
-            rate: Some(Rate {
-                p05_m_per_hour: rise.m_per_hour - NORMAL_95 * rise.m_per_hour_se,
-                m_per_hour: rise.m_per_hour,
-                p95_m_per_hour: rise.m_per_hour + NORMAL_95 * rise.m_per_hour_se,
-            }),
-            wear: WearStatus::Wearing,
-            growth_probability: Some(1.0),
-            check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
-            over_limit_probability: Some(chance_by(elapsed_hours, &rise)).filter(|_| elapsed_hours > 0.0),
-            ..Assessment::default()
-        },
+        (None, Some(rise)) => by_line(&rise, settings, elapsed_hours),
         (None, None) => Assessment::default(),
     };
     if matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held)) {
@@ -117,7 +104,31 @@ fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) ->
     found
 }
 
-/// The same by the mixture of wear laws.
+/// The part of an assessment that the line through the last records gives.
+fn by_line(rise: &Rise, settings: &Settings, elapsed_hours: f64) -> Assessment {
+    let within = |hours: f64| Some(hours).filter(|hours| *hours <= settings.horizon_hours);
+    let reach = NORMAL_95 * rise.m_per_hour_se;
+    Assessment {
+        crossing: Some(Crossing {
+            p05_hours: within(rise.p05_hours),
+            p50_hours: within(rise.p50_hours),
+            p95_hours: within(rise.p95_hours),
+        }),
+        method: Some(ForecastMethod::Line),
+        rate: Some(Rate {
+            p05_m_per_hour: rise.m_per_hour - reach,
+            m_per_hour: rise.m_per_hour,
+            p95_m_per_hour: rise.m_per_hour + reach,
+        }),
+        wear: WearStatus::Wearing,
+        growth_probability: Some(1.0),
+        check_probability: Some(chance_by(settings.check_interval_hours, rise)),
+        over_limit_probability: Some(chance_by(elapsed_hours, rise)).filter(|_| elapsed_hours > 0.0),
+        ..Assessment::default()
+    }
+}
+
+/// The part of an assessment that the mixture of wear laws gives.
 fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
     let ratio = fit.prior.hours_per_usage(unit.history.data.flights);
     // A rise that was taken off for the law is still there.
@@ -142,16 +153,6 @@ fn over_limit(level: Option<Level>, installation_sd_m: f64, limit_m: f64) -> Opt
     let level = level?;
     let error_m = level.se_m.hypot(installation_sd_m).max(f64::MIN_POSITIVE);
     Some(normal_cdf((level.gap_m - limit_m) / error_m))
-}
-
-/// The crossing without times beyond the horizon.
-fn within(rise: Rise, horizon_hours: f64) -> Crossing {
-    let within = |hours: f64| Some(hours).filter(|hours| *hours <= horizon_hours);
-    Crossing {
-        p05_hours: within(rise.p05_hours),
-        p50_hours: within(rise.p50_hours),
-        p95_hours: within(rise.p95_hours),
-    }
 }
 
 /// Probability that the line meets the limit within some hours: log-normal through its early and middle time.

@@ -174,21 +174,6 @@ fn local_rate(values: &[f64], at: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Three micrometres a flight at a third of one of noise: wear, all of it.
-    #[test]
-    fn a_unit_that_wears_fast_is_no_row_of_outliers() {
-        const WIGGLE: [f64; 10] = [0.2, -0.3, 0.1, 0.3, -0.2, 0.0, -0.1, 0.3, -0.3, 0.1];
-        let values: Vec<f64> =
-            (0..10).map(|k| 60.0 + 3.0 * f64::from(k) + WIGGLE[k as usize * 7 % 10]).collect();
-        let noise = Noise::of(
-            &values,
-            &[0.3; 10],
-            &Assumed { least: 1e-3, largest: 1e6, unstated: 1.0, differences: 4.0 },
-        );
-        assert!(noise.are_sound(&values, 3.0).into_iter().all(|is_sound| is_sound));
-        assert!(noise.factor < 3.0, "{}", noise.factor);
-    }
-
     /// Eight neighbours share one normal error of the stated size: a batch mean varies by 1, not by 1/8.
     #[test]
     fn errors_that_neighbours_share_inflate_the_variance_of_means() {

@@ -252,19 +252,19 @@ impl<'a> Model<'a> {
     /// Removes the least significant regressor, if it is not significant in addition to the others.
     fn remove_worst(&mut self) -> bool {
         let Some((beta, covariance)) = self.solve() else { return false };
-        let gain = |column: usize| beta[column] * beta[column] / covariance[(column, column)];
-        let drift = self.has_drift.then(|| (gain(DRIFT) / DRIFT_GAIN, None));
-        let steps = (0..self.steps.len()).map(|k| (gain(FIRST_STEP + k) / STEP_GAIN, Some(k)));
-        match drift.into_iter().chain(steps).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((gain, which)) if gain < 1.0 => {
-                match which {
-                    None => self.has_drift = false,
-                    Some(k) => drop(self.steps.remove(k)),
-                }
-                true
-            }
-            _ => false,
+        let gain = |column: &usize| {
+            let needed = if *column == DRIFT { DRIFT_GAIN } else { STEP_GAIN };
+            beta[*column] * beta[*column] / covariance[(*column, *column)] / needed
+        };
+        let drift = self.has_drift.then_some(DRIFT);
+        let selected = drift.into_iter().chain(FIRST_STEP..FIRST_STEP + self.steps.len());
+        let worst = selected.min_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|column| gain(column) < 1.0);
+        match worst {
+            Some(DRIFT) => self.has_drift = false,
+            Some(column) => drop(self.steps.remove(column - FIRST_STEP)),
+            None => {}
         }
+        worst.is_some()
     }
 
     /// Drift per hour without the steps, and its standard error, also where it is not significant.
