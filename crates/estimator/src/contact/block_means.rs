@@ -162,8 +162,8 @@ impl BlockMeans {
         self.len() >= blocks * 3 / 2
     }
 
-    /// Takes in an excerpt of a flight, of `most` of its blocks: all of them where they are few, else windows. Where the
-    /// load hardly vibrates, blocks are joined to longer ones. δX and the load follow when [delays are
+    /// Takes in an excerpt of a flight: windows of `most` blocks together, or the whole of a flight that is hardly longer.
+    /// Where the load hardly vibrates, blocks are joined to longer ones. δX and the load follow when [delays are
     /// applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
         let count =

@@ -127,6 +127,7 @@ fn prepare(
     Ok((scaling, signs))
 }
 
+/// The fitted flanks, where they can be those of an actuator.
 fn look(
     samples: &Samples<'_>,
     prior: &PartPrior,

@@ -341,19 +341,11 @@ fn lost_motion_is_gap_and_windup() {
 #[test]
 fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
     let case = Case::with(100e-6, |c| c.sensors.screw.dropout_share = 0.05);
-    let flight = case.fly(4);
-    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
-    let half = dx_m.len() / 2;
-    let segments = [0..half, half + 100..dx_m.len()];
-    let samples = Samples {
-        step_s: case.profile.sample_rate_hz.recip(),
-        motor_m: &flight.motor_m,
-        dx_m: &dx_m,
-        load_n: &flight.load_n,
-        segments: &segments,
-    };
-    let prior = PartPrior::of_stiffness(5e7);
-    let found = fit(&samples, &prior).unwrap().unwrap();
+    let found = case.with_samples_of(&case.fly(4), |whole| {
+        let (half, end) = (whole.dx_m.len() / 2, whole.dx_m.len());
+        fit(&Samples { segments: &[0..half, half + 100..end], ..*whole }, &case.prior())
+    });
+    let found = found.unwrap().unwrap();
     assert!((found.gap_m / 100e-6 - 1.0).abs() < 5e-3, "{found:?}");
 }
 

@@ -35,6 +35,7 @@ const SHORT_BLOCKS: usize = 10 * EXCERPT_BLOCKS;
 const STIFF_SHARE: f64 = 0.3;
 /// Groups of rows that the jackknife leaves out in turn.
 const GROUPS: usize = 10;
+
 /// Scratch memory of a regression, reused from flight to flight.
 #[derive(Debug, Default)]
 pub struct ContactWorkspace {
@@ -123,7 +124,7 @@ pub(crate) fn check_both_sides(
 /// load zero and delays, drift and transducer error taken off. None where the filter gives none.
 ///
 /// One outlying stretch of S moves the mid-range: of the whole flight, where it is short, and of its excerpt the nearer
-/// value to the gap is taken. The statistic takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
+/// value to the gap is taken. Mass and damping of the screw move it by less than 0.1 %: those of a mode of 400 Hz serve.
 pub(crate) fn midrange_at_fit_m(
     workspace: &ContactWorkspace,
     scaling: &Scaling,
