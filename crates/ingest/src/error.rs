@@ -185,6 +185,12 @@ pub(crate) enum ErrorKind {
 }
 
 impl ErrorKind {
+    /// What is wrong with a table as a whole.
+    #[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error")]
+    pub(crate) fn table(detail: impl ToString) -> Self {
+        Self::Table { row: None, column: None, detail: detail.to_string() }
+    }
+
     /// The stable code; `docs/errors.md` has a paragraph for each.
     fn code(&self) -> &'static str {
         match self {
@@ -195,85 +201,75 @@ impl ErrorKind {
     }
 
     fn diagnostic(&self) -> Diagnostic {
-        let mut c = Diagnostic::new(self.code(), self);
-        self.place(&mut c);
-        c.found = self.found();
-        c.expected = self.expected();
         let remedy = self.named_remedy().or_else(|| self.get_message().map(str::to_owned));
-        c.hint = Some(remedy.unwrap_or_default());
+        let mut c = Diagnostic::new(self.code(), self).hint(remedy.unwrap_or_default());
+        c.column = self.column().cloned();
+        match self {
+            Self::Decode { row_group, .. } => c.row_group = *row_group,
+            Self::Table { row, .. } => c.row = *row,
+            Self::NoPosition { columns, .. } => c.found = Some(format!("columns {}", shortened(columns))),
+            Self::IdentityMissing { looked, .. } => {
+                c.found = Some(format!("looked in {}", join_places(looked)));
+            }
+            Self::IdentityChanges { row, found, before, .. } => {
+                (c.row, c.found) = (Some(*row), Some(format!("`{found}` after `{before}`")));
+            }
+            Self::TimeUnit { found, .. } => {
+                c.found = Some(found.clone());
+                c.expected = Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"".into());
+            }
+            Self::TimeGoesBack { row, before_s, after_s, max_back_s, times, .. } => {
+                c.row = Some(*row);
+                c.found = Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"));
+                let most = format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)");
+                c.expected = Some(most);
+            }
+            Self::SeveralFlights { row, before_s, after_s, end_s, max_gap_s, .. } => {
+                c.row = Some(*row);
+                c.found = Some(format!(
+                    "samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"
+                ));
+                c.expected = Some(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)"));
+            }
+            Self::TimeStandsStill { rows, .. } => c.found = Some(format!("{rows} rows with one stamp")),
+            Self::TimeImplausible { least_s, most_s, .. } => {
+                c.expected = Some(format!("{least_s:e} to {most_s:e} s"));
+            }
+            Self::RateContradicts { declared_hz, seen_hz, .. } => {
+                c.found = Some(format!("{seen_hz:.6} Hz by the median step"));
+                c.expected = Some(format!("{declared_hz} Hz (`clock.rate_hz`)"));
+            }
+            Self::MetadataContradicts { key, noted, known, .. } => {
+                c.found = Some(format!("`{key}` = {noted} in the Arrow metadata"));
+                c.expected = Some(format!("`{key}` = {known}"));
+            }
+            Self::UnitForPart { wanted, .. } => c.expected = Some((*wanted).into()),
+            _ => {}
+        }
         c
     }
 
-    fn place(&self, c: &mut Diagnostic) {
+    fn column(&self) -> Option<&String> {
         match self {
-            Self::Decode { column, row_group, .. } => {
-                c.column = Some(column.clone());
-                c.row_group = *row_group;
-            }
-            Self::RowCount { column, .. }
+            Self::Decode { column, .. }
+            | Self::RowCount { column, .. }
             | Self::DuplicateColumn { column, .. }
             | Self::ColumnMissing { column, .. }
             | Self::TableColumn { column, .. }
             | Self::ColumnType { column, .. }
             | Self::MetadataContradicts { column, .. }
             | Self::TimeUnit { column, .. }
+            | Self::TimeGoesBack { column, .. }
+            | Self::SeveralFlights { column, .. }
             | Self::RateContradicts { column, .. }
             | Self::TimeImplausible { column, .. }
             | Self::TimeStandsStill { column, .. }
             | Self::AllMissing { column, .. }
             | Self::ListLengths { column, .. }
             | Self::ClocksDiffer { column, .. }
-            | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
-            Self::TimeGoesBack { column, row, .. }
-            | Self::SeveralFlights { column, row, .. }
-            | Self::IdentityChanges { column, row, .. } => {
-                c.column = Some(column.clone());
-                c.row = Some(*row);
-            }
-            Self::Table { row, column, .. } => {
-                c.row = *row;
-                c.column.clone_from(column);
-            }
-            _ => {}
-        }
-    }
-
-    fn found(&self) -> Option<String> {
-        match self {
-            Self::NoPosition { columns, .. } => Some(format!("columns {}", shortened(columns))),
-            Self::TimeUnit { found, .. } => Some(found.clone()),
-            Self::TimeGoesBack { before_s, after_s, times, .. } => {
-                Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"))
-            }
-            Self::SeveralFlights { before_s, after_s, end_s, .. } => Some(format!(
-                "samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"
-            )),
-            Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
-            Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
-            Self::MetadataContradicts { key, noted, .. } => {
-                Some(format!("`{key}` = {noted} in the Arrow metadata"))
-            }
-            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", join_places(looked))),
-            Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
-            _ => None,
-        }
-    }
-
-    fn expected(&self) -> Option<String> {
-        match self {
-            Self::TimeGoesBack { max_back_s, .. } => {
-                Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
-            }
-            Self::SeveralFlights { max_gap_s, .. } => {
-                Some(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)"))
-            }
-            Self::TimeImplausible { least_s, most_s, .. } => Some(format!("{least_s:e} to {most_s:e} s")),
-            Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
-            Self::TimeUnit { .. } => {
-                Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"".into())
-            }
-            Self::MetadataContradicts { key, known, .. } => Some(format!("`{key}` = {known}")),
-            Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
+            | Self::UnitForPart { column, .. }
+            | Self::IdentityChanges { column, .. } => Some(column),
+            Self::Table { column, .. } => column.as_ref(),
             _ => None,
         }
     }
@@ -346,22 +342,23 @@ fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c St
 
 /// Message of the operating system, reworded for the usual cases, and the remedy.
 fn unreadable(source: &io::Error) -> (String, &'static str) {
-    let (message, remedy) = match source.kind() {
-        io::ErrorKind::NotFound => ("no such file", "check the name, and that the disk or share is mounted"),
+    let other = || format!("the file cannot be read: {source}");
+    match source.kind() {
+        io::ErrorKind::NotFound => {
+            ("no such file".into(), "check the name, and that the disk or share is mounted")
+        }
         io::ErrorKind::PermissionDenied => (
-            "permission denied",
+            "permission denied".into(),
             "run as a user with read access, or change the file mode; the next run tries again",
         ),
         io::ErrorKind::IsADirectory => {
-            ("this is a folder, not a file", "name the file, or the files in it: `FOLDER/*.parquet`")
+            ("this is a folder, not a file".into(), "name the file, or the files in it: `FOLDER/*.parquet`")
         }
         _ if transient::is_file_limit(source) => {
-            ("", "allow more open files (`ulimit -n 4096`); the next run tries again")
+            (other(), "allow more open files (`ulimit -n 4096`); the next run tries again")
         }
-        _ => ("", "check the disk or share; the next run tries again"),
-    };
-    let other = || format!("the file cannot be read: {source}");
-    (if message.is_empty() { other() } else { message.to_owned() }, remedy)
+        _ => (other(), "check the disk or share; the next run tries again"),
+    }
 }
 
 /// How the type of a column of structs begins.

@@ -70,7 +70,7 @@ impl FlightLog {
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(in_log)?;
-        log.announce(&used).map_err(in_log)?;
+        log.announce(&used);
         let mappings =
             map_actuators.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
         let positions = map_actuators.into_iter().map(|(at, _)| at).collect();
@@ -250,7 +250,7 @@ pub(crate) fn for_each_unidentified(
     let positions = log.actuators(&channels, Some(&own)).map_err(in_log)?;
     let used: Vec<_> =
         positions.iter().filter(|at| at.lacking.is_empty()).map(|at| (&channels, at)).collect();
-    log.announce(&used).map_err(in_log)?;
+    log.announce(&used);
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
         let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
         take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
@@ -416,9 +416,7 @@ pub fn identify_companion(
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
-        let fallback = |fields: &IdentityFields, start| {
-            config.flights.facts(path, fields, start, &config.document.identity)
-        };
+        let fallback = |fields: &IdentityFields, departure| config.flights.facts(path, fields, departure);
         let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
         check_tail(&id, display_name, config)?;
@@ -449,10 +447,9 @@ fn check_tail(identity: &Identity, display_name: &str, config: &Config) -> Resul
 
 /// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
-    let identity = &config.document.identity;
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
-    let (path, _) = flight_rows::split_path(path, identity);
-    log.identity(|fields, start| config.flights.facts(&path, fields, start, identity))
+    let (path, _) = flight_rows::split_path(path, &config.document.identity);
+    log.identity(|fields, departure| config.flights.facts(&path, fields, departure))
 }
 
 type Mapped = (ActuatorColumns, Arc<Mapping>);

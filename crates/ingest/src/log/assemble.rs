@@ -32,10 +32,13 @@ pub(crate) fn assemble(
     read: RawChannels,
     line: &TimeBase,
     temperature_c: Option<f64>,
-    mut flags: Vec<String>,
 ) -> ActuatorChannels {
     let RawChannels { mut motor, mut screw, load, is_relative, output_locked, selection } = read;
-    let SampleSelection { segments, apart, .. } = selection;
+    let SampleSelection { segments, apart } = selection;
+    let channels = Role::NEEDED.iter().zip([&motor, &screw, &load]);
+    let alternatives = channels.filter(|(_, channel)| channel.is_alternative);
+    let mut flags: Vec<String> =
+        alternatives.map(|(role, _)| format!("{}_alternative", role.as_str())).collect();
     if !is_relative {
         flags.extend(restored(Role::Motor, &mut motor, &screw, &load, &segments));
         flags.extend(restored(Role::Screw, &mut screw, &motor, &load, &segments));

@@ -20,15 +20,6 @@ use crate::time::resample::{Interpolation, TimeSeries, decimated_rows, interpola
 /// The least share of samples that a redundant channel must hold to be called alive.
 const ALIVE_SHARE: f64 = 0.5;
 
-/// Whether a channel can serve: at least half of its samples are there, but for so many that are not asked for, and it
-/// moves.
-pub(crate) fn lives(values: &[f64], apart: usize) -> bool {
-    let needed = (ALIVE_SHARE * (values.len() - apart) as f64).ceil() as usize;
-    let present = || values.iter().copied().filter(|v| v.is_finite());
-    let first = present().next();
-    present().take(needed).count() == needed && present().any(|v| Some(v) != first)
-}
-
 /// A channel in SI.
 #[derive(Debug)]
 pub(crate) struct Channel {
@@ -39,22 +30,26 @@ pub(crate) struct Channel {
     pub(crate) turn_m: Option<f64>,
     /// Its column, where a log has one.
     pub(crate) column: Option<String>,
+    /// Whether the column is not the first of redundant ones.
+    pub(crate) is_alternative: bool,
+    /// Samples that no condition leaves: NaN.
+    pub(crate) apart: usize,
+}
+
+impl Channel {
+    /// Whether the channel can serve: at least half of the samples that conditions leave are there, and it moves.
+    pub(crate) fn is_alive(&self) -> bool {
+        let needed = (ALIVE_SHARE * (self.values.len() - self.apart) as f64).ceil() as usize;
+        let present = || self.values.iter().copied().filter(|v| v.is_finite());
+        let first = present().next();
+        present().take(needed).count() == needed && present().any(|v| Some(v) != first)
+    }
 }
 
 impl From<Vec<f64>> for Channel {
     fn from(values: Vec<f64>) -> Self {
-        Self { values, seen: None, turn_m: None, column: None }
+        Self { values, seen: None, turn_m: None, column: None, is_alternative: false, apart: 0 }
     }
-}
-
-/// What the clock of a channel depends on: channels of one sheet that agree in it share one.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TimeBaseKey {
-    listed_leaf: Option<String>,
-    rows: Vec<(String, String)>,
-    time_column: Option<String>,
-    shift_s: f64,
-    rate_hz: Option<f64>,
 }
 
 /// How the samples of a channel lie in time.
@@ -62,8 +57,8 @@ pub(crate) struct TimeBaseKey {
 pub(crate) struct ChannelSampling<'s> {
     pub(crate) sheet: &'s RowTable,
     pub(crate) map: &'s ChannelMapping,
-    samples: SampleSelector,
-    time_column: Option<String>,
+    pub(crate) samples: SampleSelector,
+    pub(crate) time_column: Option<String>,
     valid: Option<SampleSelector>,
     /// Rows between samples where the channel is slower than its rows; else 1.
     every: usize,
@@ -93,16 +88,12 @@ impl<'s> ChannelSampling<'s> {
         Ok(self)
     }
 
-    /// What its clock depends on, within its sheet.
-    pub(crate) fn clock_key(&self) -> TimeBaseKey {
+    /// All that the instants of its samples depend on: channels of one log that agree in it share them.
+    pub(crate) fn clock_key(&self) -> String {
         let SampleSelector { leaf, rows } = &self.samples;
-        TimeBaseKey {
-            listed_leaf: self.sheet.is_listed(leaf).then(|| leaf.clone()),
-            rows: rows.clone(),
-            time_column: self.time_column.clone(),
-            shift_s: self.map.shift_s(),
-            rate_hz: self.map.rate_hz,
-        }
+        let listed_leaf = self.sheet.is_listed(leaf).then_some(leaf);
+        let ChannelMapping { group, rate_hz, .. } = self.map;
+        format!("{:?}", (group, listed_leaf, rows, &self.time_column, self.map.shift_s(), rate_hz))
     }
 
     /// Whether the pages of its column hold the rows that are declared, where a row is a sample.

@@ -13,15 +13,15 @@ use crate::channel::stats::span;
 use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
-use crate::log::channel_reader::{self, Channel, ChannelSampling, TimeBaseKey};
+use crate::log::channel_reader::{self, Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
-use crate::log::normalized::Normalized;
+use crate::log::normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
 use crate::log::types::{ActuatorChannels, ActuatorColumns, LogFiles};
 use crate::mapping::column_pattern::ColumnPattern;
-use crate::mapping::{ChannelMapping, Channels, IdentityField, IdentityMapping, Mapping, Role, SampleFilter};
+use crate::mapping::{ChannelMapping, Channels, IdentityField, IdentityMapping, Mapping, Role};
 use crate::parquet::log_file::LogFile;
 use crate::time::clock::TimeOrigin;
 use crate::time::zero_order_hold::zero_order_hold;
@@ -32,18 +32,10 @@ pub struct Log {
     /// The main log, and the files of each group that has some.
     tables: BTreeMap<Option<String>, RowTable>,
     mapping: Arc<Mapping>,
-    normalized: Option<Normalized>,
-    /// What the conditions left of the actuator before: most ask the same of every one.
-    selected: Mutex<Option<(SelectionKey, SampleSelection)>>,
-}
-
-/// Cache key of a sample selection: the filters, the samples and timestamps they apply to, and their clock.
-#[derive(Debug, PartialEq)]
-struct SelectionKey {
-    when: Vec<SampleFilter>,
-    of: Vec<(SampleSelector, Option<String>)>,
-    group: Option<String>,
-    clock: TimeBaseKey,
+    /// Identity fields of a normalized log.
+    normalized: Option<IdentityFields>,
+    /// What the conditions left of the actuator before, with all that it depends on: most actuators share it.
+    selected: Mutex<Option<(String, SampleSelection)>>,
 }
 
 impl Log {
@@ -70,7 +62,7 @@ impl Log {
         let Some(main) = tables.get(&None) else {
             return Err(Error::new(Path::new(""), std::io::Error::from(std::io::ErrorKind::NotFound).into()));
         };
-        let normalized = Normalized::of(&main.files[0])?;
+        let normalized = normalized::facts(&main.files[0])?;
         let mut log = Self { tables, mapping: Arc::clone(mapping), normalized, selected: Mutex::new(None) };
         log.order_pieces()?;
         Ok(log)
@@ -140,8 +132,9 @@ impl Log {
         Ok(true)
     }
 
-    /// Which flight this is; `known` fills what the log itself leaves open, from what it holds and from the first instant
-    /// of its clock. That instant is read only where the log holds no departure and `known` finds no flight without it.
+    /// Which flight this is; `known` fills what the log itself leaves open, from the other fields and the departure, which
+    /// may be the first instant of its clock. That instant is read only where the log holds no departure and `known` finds
+    /// no flight without it.
     ///
     /// # Errors
     /// When tail or departure stand nowhere, cannot be read, or change within the log.
@@ -149,53 +142,52 @@ impl Log {
         &self,
         known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
     ) -> Result<Identity, Error> {
-        if let Some(normalized) = &self.normalized {
-            let own = IdentityMapping::default();
-            return identity::read(&normalized.facts, &own, None).map_err(|f| self.main().error(f));
+        let fail = |fault| self.main().error(fault);
+        if let Some(facts) = &self.normalized {
+            let departure = facts.get(&IdentityField::DepartureUtc).and_then(|text| text.parse().ok());
+            return identity::read(facts, &IdentityMapping::default(), departure).map_err(fail);
         }
         let mapping = &self.mapping.identity;
-        let known =
-            |facts: &IdentityFields, start| known(&identity::registered(facts, mapping, start), start);
-        let fail = |fault| self.main().error(fault);
         let mut facts = facts(self.main(), mapping)?;
-        let date =
-            facts.get(&IdentityField::DepartureUtc).and_then(|text| identity::date_alone(text, mapping));
-        if date.is_some() {
-            // A day has several flights: the time comes from the flights table, or from the clock.
-            facts.remove(&IdentityField::DepartureUtc);
-        }
-        // Adds what the flights table knows; its departure, an instant or a date, is not in the form of the log's.
-        let fill = |facts: &mut IdentityFields, mut found: IdentityFields| {
+        let stated = facts.remove(&IdentityField::DepartureUtc).filter(|text| !text.trim().is_empty());
+        // A day has several flights: the time of a date comes from the flights table, or from the clock.
+        let mut date = stated.as_ref().and_then(|text| identity::date_alone(text, mapping));
+        let stated = stated.filter(|_| date.is_none());
+        let mut departure =
+            stated.map(|text| identity::instant(text.trim(), mapping)).transpose().map_err(fail)?;
+        // Adds what the flights table knows; returns the departure that it states.
+        let fill = |facts: &mut IdentityFields, at: Option<Timestamp>| {
+            let mut found = known(&identity::registered(facts, mapping, at), at);
             let departure = found.remove(&IdentityField::DepartureUtc);
-            for (fact, text) in found {
-                facts.entry(fact).or_insert(text);
-            }
-            departure.filter(|_| !facts.contains_key(&IdentityField::DepartureUtc))
+            found.append(facts);
+            *facts = found;
+            departure
         };
-        let instant = |text: Option<String>| text?.parse::<Timestamp>().ok();
         // Of several flights of one id, the one near noon of the date is that of the date.
-        let noon = date.and_then(|date| date.at(12, 0, 0, 0).to_zoned(TimeZone::UTC).ok());
-        let found = known(&facts, noon.map(|noon| noon.timestamp()));
-        let of_table = fill(&mut facts, found);
-        let date = of_table.as_ref().and_then(|text| text.parse().ok()).or(date);
-        let departure = instant(of_table);
-        if departure.is_some() || facts.contains_key(&IdentityField::DepartureUtc) {
-            return identity::read(&facts, mapping, departure).map_err(fail);
+        let noon = date.and_then(|date| TimeZone::UTC.to_timestamp(date.at(12, 0, 0, 0)).ok());
+        let of_table = fill(&mut facts, departure.or(noon));
+        if departure.is_none() {
+            departure = of_table.as_ref().and_then(|text| text.parse().ok());
+            date = of_table.and_then(|text| text.parse().ok()).or(date);
         }
-        let clock = self.clock_span()?;
-        let absolute = clock.and_then(|clock| clock.start(mapping)).transpose().map_err(fail)?;
-        let mut start = match (date, facts.get(&IdentityField::LandingUtc)) {
-            (Some(date), _) => Some(identity::departure_on(date, absolute, clock, mapping).map_err(fail)?),
-            (None, Some(landing)) if absolute.is_none() => {
-                Some(identity::departure_before(landing, &facts, clock, mapping).map_err(fail)?)
+        if departure.is_none() {
+            let clock = self.clock_span()?;
+            let absolute = clock.map_or(Ok(None), |clock| clock.start(mapping)).map_err(fail)?;
+            departure = match (date, facts.get(&IdentityField::LandingUtc)) {
+                (Some(date), _) => {
+                    Some(identity::departure_on(date, absolute, clock, mapping).map_err(fail)?)
+                }
+                (None, Some(landing)) if absolute.is_none() => {
+                    Some(identity::departure_before(landing, &facts, clock, mapping).map_err(fail)?)
+                }
+                _ => absolute,
+            };
+            if departure.is_some() {
+                let of_table = fill(&mut facts, departure);
+                departure = of_table.and_then(|text| text.parse().ok()).or(departure);
             }
-            _ => absolute,
-        };
-        if start.is_some() {
-            let found = known(&facts, start);
-            start = instant(fill(&mut facts, found)).or(start);
         }
-        identity::read(&facts, mapping, start).map_err(fail)
+        identity::read(&facts, mapping, departure).map_err(fail)
     }
 
     /// The earliest and the latest stamp of the log, if it has a time column.
@@ -233,7 +225,7 @@ impl Log {
         if self.normalized.is_some() {
             let of = |position: &Position| ActuatorColumns {
                 position: position.clone(),
-                columns: Normalized::COLUMNS.map(|name| Some(name.to_owned())),
+                columns: normalized::COLUMNS.map(|name| Some(name.to_owned())),
                 lacking: Vec::new(),
             };
             return Ok(own.map(of).into_iter().collect());
@@ -347,15 +339,8 @@ impl Log {
 
     /// Announces the samples of actuators that will be read. Where rows belong to actuators or channels, one pass
     /// over the files then gathers the rows of all of them.
-    ///
-    /// # Errors
-    /// When channels are named by a column, and it cannot be read.
-    pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<(), Error> {
-        for table in self.tables.values().filter(|table| table.layout.name_column.is_some()) {
-            table.names()?;
-        }
+    pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) {
         self.each_use(used, |sheet, position, samples| sheet.announce(samples, position));
-        Ok(())
     }
 
     /// Hands over the samples that these actuators need, with their table and their position.
@@ -394,7 +379,7 @@ impl Log {
         for (sheet, mut leaves) in self.leaves(used) {
             leaves.extend(self.mapping.identity.columns.values().cloned());
             if self.normalized.is_some() {
-                leaves.extend(Normalized::COLUMNS.map(str::to_owned));
+                leaves.extend(normalized::COLUMNS.map(str::to_owned));
             }
             let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
             for file in &sheet.files {
@@ -415,175 +400,12 @@ impl Log {
         channels: &Channels,
         geometry: Geometry,
     ) -> Result<ActuatorChannels, Error> {
-        if let Some(normalized) = &self.normalized {
-            return normalized.read_actuator(&self.main().files[0], at.position.clone(), geometry);
+        if self.normalized.is_some() {
+            return normalized::read_actuator(&self.main().files[0], at.position.clone(), geometry);
         }
-        let read = self.read_channels(ChannelRequest { at, channels, geometry });
-        for sheet in self.tables.values() {
-            sheet.release(at.position.as_str());
-        }
+        let read = ActuatorReader { log: self, at, channels, geometry }.read();
+        self.tables.values().for_each(|sheet| sheet.release(at.position.as_str()));
         read
-    }
-
-    fn read_channels(&self, sought: ChannelRequest<'_>) -> Result<ActuatorChannels, Error> {
-        let ChannelRequest { at, channels, .. } = sought;
-        let ReferenceChannel { channel: motor, master, selection, mut flags } = self.motor(sought)?;
-        let read = |role: Role, from: &SampleSelection| self.follower(role, sought, &master, from);
-        let output_locked = channels.output.is_locked();
-        let (screw, screw_flags) = if output_locked {
-            (selection.cut(vec![0.0; motor.values.len()].into()), Vec::new())
-        } else {
-            read(Role::Screw, &selection)?
-        };
-        let (load, load_flags) = read(Role::Load, &selection)?;
-        // The mean of the flight, whatever counts of it.
-        let whole = SampleSelection::whole(&master.line);
-        let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
-        let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
-        flags.extend(screw_flags.into_iter().chain(load_flags));
-        let read =
-            RawChannels { motor, screw, load, is_relative: channels.is_relative(), output_locked, selection };
-        Ok(assemble(at.position.clone(), read, &master.line, temperature_c, flags))
-    }
-
-    /// The segments of the motor's clock in which every sample filter holds; cached for equal keys.
-    fn selected(
-        &self,
-        sought: ChannelRequest<'_>,
-        master: &ChannelSampling<'_>,
-    ) -> Result<SampleSelection, Error> {
-        let ChannelRequest { at, channels, .. } = sought;
-        if channels.when.is_empty() {
-            return Ok(SampleSelection::whole(&master.line));
-        }
-        let position = at.position.as_str();
-        let named = |column: &String| column_at(column, &at.position);
-        let of = |when: &SampleFilter| {
-            let samples = self.sheet_of(&ChannelMapping::from(when))?.samples(&named(&when.column), position);
-            Ok((samples, when.time_column.as_ref().map(named)))
-        };
-        let asked = SelectionKey {
-            when: channels.when.clone(),
-            of: channels.when.iter().map(of).collect::<Result<_, Error>>()?,
-            group: master.map.group.clone(),
-            clock: master.clock_key(),
-        };
-        let mut before = self.selected.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == asked) {
-            return Ok(selection.clone());
-        }
-        let selection = self.select(sought, master)?;
-        *before = Some((asked, selection.clone()));
-        Ok(selection)
-    }
-
-    fn select(
-        &self,
-        sought: ChannelRequest<'_>,
-        master: &ChannelSampling<'_>,
-    ) -> Result<SampleSelection, Error> {
-        let ChannelRequest { at, channels, geometry } = sought;
-        let line = &master.line;
-        let mut segments = line.segments.clone();
-        for condition in &channels.when {
-            let map = ChannelMapping::from(condition);
-            let name = column_at(&map.column, &at.position);
-            let sheet = self.sheet_of(&map)?;
-            if !self.names_for(&map)?.contains(&name) {
-                return Err(sheet.lacks(&name));
-            }
-            // A state stands until the next one comes, as a slow load does.
-            let position = at.position.as_str();
-            let own = ChannelSampling::new(sheet, &map, &name, position);
-            let Channel { mut values, .. } = channel_reader::follow(master, own, Role::Load, geometry, None)?;
-            zero_order_hold(&mut values, &line.segments, line.step_s);
-            segments = condition.within(&values, &segments, line.step_s);
-        }
-        Ok(SampleSelection::of(segments, line))
-    }
-
-    /// The motor position, whose clock all other channels follow.
-    fn motor<'c>(&'c self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'c>, Error> {
-        let ChannelRequest { at, channels, geometry } = sought;
-        let read = |map: &'c ChannelMapping, name: &str| {
-            let sheet = self.sheet_of(map)?;
-            let master = ChannelSampling::new(sheet, map, name, at.position.as_str()).with_clock()?;
-            if !channels.when.is_empty() {
-                // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
-                master.check_rows()?;
-            }
-            let selection = self.selected(sought, &master)?;
-            let read = selection.cut(master.own(geometry, selection.wanted())?);
-            Ok((read, selection.apart, (master, selection)))
-        };
-        let (channel, (master, selection), flags) = self.first_alive(Role::Motor, sought, read)?;
-        self.check_one_flight(&master)?;
-        Ok(ReferenceChannel { channel, master, selection, flags })
-    }
-
-    /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
-    fn check_one_flight(&self, sampling: &ChannelSampling<'_>) -> Result<(), Error> {
-        let identity = &self.mapping.identity;
-        let fields = [IdentityField::FlightId, IdentityField::DepartureUtc];
-        // Where a file holds many flights, a flight number may come again on another day.
-        if !identity.by_row && fields.iter().any(|field| identity.columns.contains_key(field)) {
-            return Ok(());
-        }
-        let (sheet, map) = (sampling.sheet, sampling.map);
-        let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
-        sampling.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
-    }
-
-    /// A channel on the motor's clock, and its flags.
-    fn follower(
-        &self,
-        role: Role,
-        sought: ChannelRequest<'_>,
-        master: &ChannelSampling<'_>,
-        selection: &SampleSelection,
-    ) -> Result<(Channel, Vec<String>), Error> {
-        let read = |map: &ChannelMapping, name: &str| {
-            let own = ChannelSampling::new(self.sheet_of(map)?, map, name, sought.at.position.as_str());
-            let read = channel_reader::follow(master, own, role, sought.geometry, selection.wanted())?;
-            Ok((selection.cut(read), selection.apart, ()))
-        };
-        self.first_alive(role, sought, read).map(|(channel, (), flags)| (channel, flags))
-    }
-
-    /// The first of redundant channels that is alive, else the first one, with what `read` gave beside it, and a flag
-    /// where it is not the first. `read` gives a channel, how many of its samples no filter left, and the rest.
-    fn first_alive<'c, T>(
-        &self,
-        role: Role,
-        sought: ChannelRequest<'c>,
-        read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, usize, T), Error>,
-    ) -> Result<(Channel, T, Vec<String>), Error> {
-        let ChannelRequest { at, channels, .. } = sought;
-        let map = channels.of(role).unwrap_or(&channels.motor_position);
-        let choices = self.present(map, &at.position)?;
-        let mut found = None;
-        for (k, (map, name)) in choices.iter().enumerate() {
-            let (channel, apart, rest) = read(map, name)?;
-            let is_alive = choices.len() == 1 || channel_reader::lives(&channel.values, apart);
-            if is_alive || found.is_none() {
-                found = Some((channel, apart, rest, k));
-            }
-            if is_alive {
-                break;
-            }
-        }
-        let Some((mut channel, apart, rest, k)) = found else {
-            let name = column_at(&map.column, &at.position);
-            return Err(self.sheet(map).unwrap_or(self.main()).lacks(&name));
-        };
-        let counted = channel.values.len() - apart;
-        if (counted > 0 || apart == 0) && !channel.values.iter().any(|v| v.is_finite()) {
-            let (column, rows) = (choices[k].1.clone(), counted as u64);
-            return Err(self.main().error(ErrorKind::AllMissing { column, rows }));
-        }
-        channel.column = Some(choices[k].1.clone());
-        let flags = if k == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] };
-        Ok((channel, rest, flags))
     }
 
     fn sheet_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
@@ -593,20 +415,152 @@ impl Log {
     }
 }
 
-/// The actuator that is read: its columns, how its channels are read, and what its angles turn.
+/// An actuator that is read: its columns, how its channels are read, and what its angles turn.
 #[derive(Clone, Copy)]
-struct ChannelRequest<'c> {
+struct ActuatorReader<'c> {
+    log: &'c Log,
     at: &'c ActuatorColumns,
     channels: &'c Channels,
     geometry: Geometry,
 }
 
-/// The motor position's values, their sampling, the selected samples, and quality flags.
-struct ReferenceChannel<'c> {
-    channel: Channel,
-    master: ChannelSampling<'c>,
-    selection: SampleSelection,
-    flags: Vec<String>,
+impl<'c> ActuatorReader<'c> {
+    fn read(self) -> Result<ActuatorChannels, Error> {
+        let (motor, (master, selection)) = self.motor()?;
+        let output_locked = self.channels.output.is_locked();
+        let screw = if output_locked {
+            selection.cut(vec![0.0; motor.values.len()].into())
+        } else {
+            self.follower(Role::Screw, &master, &selection)?
+        };
+        let load = self.follower(Role::Load, &master, &selection)?;
+        // The mean of the flight, whatever counts of it.
+        let whole = SampleSelection::whole(&master.line);
+        let temperature = self.channels.temperature.as_ref();
+        let temperature = temperature.and_then(|_| self.follower(Role::Temperature, &master, &whole).ok());
+        let temperature_c = temperature.and_then(|read| mean(&read.values));
+        let is_relative = self.channels.is_relative();
+        let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
+        Ok(assemble(self.at.position.clone(), read, &master.line, temperature_c))
+    }
+
+    /// The motor position, and its sampling and selected samples, which all other channels follow.
+    fn motor(self) -> Result<(Channel, (ChannelSampling<'c>, SampleSelection)), Error> {
+        let read = |map: &'c ChannelMapping, name: &str| {
+            let master = self.sampling(map, name)?.with_clock()?;
+            if !self.channels.when.is_empty() {
+                // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
+                master.check_rows()?;
+            }
+            let selection = self.selected(&master)?;
+            Ok((selection.cut(master.own(self.geometry, selection.wanted())?), (master, selection)))
+        };
+        let (channel, (master, selection)) = self.first_alive(Role::Motor, read)?;
+        self.check_one_flight(&master)?;
+        Ok((channel, (master, selection)))
+    }
+
+    /// A channel on the motor's clock.
+    fn follower(
+        self,
+        role: Role,
+        master: &ChannelSampling<'_>,
+        selection: &SampleSelection,
+    ) -> Result<Channel, Error> {
+        let read = |map: &'c ChannelMapping, name: &str| {
+            let own = self.sampling(map, name)?;
+            let read = channel_reader::follow(master, own, role, self.geometry, selection.wanted())?;
+            Ok((selection.cut(read), ()))
+        };
+        self.first_alive(role, read).map(|(channel, ())| channel)
+    }
+
+    fn sampling<'m>(self, map: &'m ChannelMapping, name: &str) -> Result<ChannelSampling<'m>, Error>
+    where
+        'c: 'm,
+    {
+        Ok(ChannelSampling::new(self.log.sheet_of(map)?, map, name, self.at.position.as_str()))
+    }
+
+    /// The first of redundant channels that is alive, else the first one, with what `read` gave beside it.
+    fn first_alive<T>(
+        self,
+        role: Role,
+        read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, T), Error>,
+    ) -> Result<(Channel, T), Error> {
+        let map = self.channels.of(role).unwrap_or(&self.channels.motor_position);
+        let choices = self.log.present(map, &self.at.position)?;
+        let mut found = None;
+        for (k, (map, name)) in choices.iter().enumerate() {
+            let (mut channel, rest) = read(map, name)?;
+            let is_alive = choices.len() == 1 || channel.is_alive();
+            if is_alive || found.is_none() {
+                (channel.column, channel.is_alternative) = (Some(name.clone()), k > 0);
+                found = Some((channel, rest, name));
+            }
+            if is_alive {
+                break;
+            }
+        }
+        let Some((channel, rest, name)) = found else {
+            let name = column_at(&map.column, &self.at.position);
+            return Err(self.log.sheet(map).unwrap_or(self.log.main()).lacks(&name));
+        };
+        let counted = channel.values.len() - channel.apart;
+        if (counted > 0 || channel.apart == 0) && !channel.values.iter().any(|v| v.is_finite()) {
+            let (column, rows) = (name.clone(), counted as u64);
+            return Err(self.log.main().error(ErrorKind::AllMissing { column, rows }));
+        }
+        Ok((channel, rest))
+    }
+
+    /// The segments of the motor's clock in which every sample filter holds.
+    fn selected(self, master: &ChannelSampling<'_>) -> Result<SampleSelection, Error> {
+        let (line, filters) = (&master.line, &self.channels.when);
+        if filters.is_empty() {
+            return Ok(SampleSelection::whole(line));
+        }
+        let maps: Vec<ChannelMapping> = filters.iter().map(ChannelMapping::from).collect();
+        let mut conditions = Vec::with_capacity(maps.len());
+        for map in &maps {
+            let name = column_at(&map.column, &self.at.position);
+            let own = self.sampling(map, &name)?;
+            if !self.log.names_for(map)?.contains(&name) {
+                return Err(own.sheet.lacks(&name));
+            }
+            conditions.push(own);
+        }
+        let samples: Vec<_> = conditions.iter().map(|own| (&own.samples, &own.time_column)).collect();
+        let key = format!("{:?}", (filters, samples, master.clock_key()));
+        let mut before = self.log.selected.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == key) {
+            return Ok(selection.clone());
+        }
+        let mut segments = line.segments.clone();
+        for (filter, own) in filters.iter().zip(conditions) {
+            // A state stands until the next one comes, as a slow load does.
+            let read = channel_reader::follow(master, own, Role::Load, self.geometry, None)?;
+            let mut values = read.values;
+            zero_order_hold(&mut values, &line.segments, line.step_s);
+            segments = filter.within(&values, &segments, line.step_s);
+        }
+        let selection = SampleSelection::of(segments, line);
+        *before = Some((key, selection.clone()));
+        Ok(selection)
+    }
+
+    /// Whether the motor's clock is that of one flight, where no column names the flight of each row.
+    fn check_one_flight(self, master: &ChannelSampling<'_>) -> Result<(), Error> {
+        let identity = &self.log.mapping.identity;
+        let fields = [IdentityField::FlightId, IdentityField::DepartureUtc];
+        // Where a file holds many flights, a flight number may come again on another day.
+        if !identity.by_row && fields.iter().any(|field| identity.columns.contains_key(field)) {
+            return Ok(());
+        }
+        let (sheet, map) = (master.sheet, master.map);
+        let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
+        master.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
+    }
 }
 
 /// The column of a pattern at a position.

@@ -42,13 +42,18 @@ pub(crate) struct ClockSpan {
 
 impl ClockSpan {
     /// The earliest instant; `None` where the clock has none, or a local one without a mapped zone.
-    pub(crate) fn start(&self, mapping: &IdentityMapping) -> Option<Result<Timestamp, ErrorKind>> {
+    pub(crate) fn start(&self, mapping: &IdentityMapping) -> Result<Option<Timestamp>, ErrorKind> {
+        let earliest = |first: Timestamp| first.checked_add(duration(self.earliest_s)).ok();
         match self.origin {
-            TimeOrigin::Utc(first) => Some(Ok(first.checked_add(duration(self.earliest_s)).ok()?)),
+            TimeOrigin::Utc(first) => Ok(earliest(first)),
             TimeOrigin::Local(first) => {
-                local_to_utc(first.checked_add(duration(self.earliest_s)).ok()?, mapping).transpose()
+                let zone = mapping.time_zone.as_deref();
+                let Some((first, zone)) = earliest(first).zip(zone) else { return Ok(None) };
+                let local = TimeZone::UTC.to_datetime(first);
+                let skipped = |detail: String| invalid(IdentityField::DepartureUtc, &local, &detail);
+                unambiguous(local, zone).map(Some).map_err(skipped)
             }
-            TimeOrigin::Counted(_) | TimeOrigin::OfDay(_) | TimeOrigin::Start => None,
+            TimeOrigin::Counted(_) | TimeOrigin::OfDay(_) | TimeOrigin::Start => Ok(None),
         }
     }
 }
@@ -179,16 +184,14 @@ pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, Stri
     folders.iter().filter_map(stated).filter(is_value).collect()
 }
 
-/// The facts, with the registration where a logger calls the aircraft otherwise. `start` is the departure where the facts
-/// hold none.
+/// The facts of a flight at an instant, with the registration where a logger calls the aircraft otherwise.
 pub(crate) fn registered(
     facts: &IdentityFields,
     mapping: &IdentityMapping,
-    start: Option<Timestamp>,
+    at: Option<Timestamp>,
 ) -> IdentityFields {
     let mut facts = facts.clone();
-    let stated = facts.get(&IdentityField::DepartureUtc).and_then(|text| instant(text.trim(), mapping).ok());
-    let day = stated.or(start).map(|departure| TimeZone::UTC.to_datetime(departure).date());
+    let day = at.map(|at| TimeZone::UTC.to_datetime(at).date());
     if let Some(tail) = facts.get_mut(&IdentityField::TailNumber) {
         let alias = mapping.tail_aliases.iter().find(|alias| alias.is_of(tail.trim(), day));
         alias.into_iter().for_each(|alias| tail.clone_from(&alias.tail_number));
@@ -196,19 +199,16 @@ pub(crate) fn registered(
     facts
 }
 
-/// Reads the facts; what the log leaves open comes from its absolute clock.
+/// Reads the facts of a flight that departs at an instant.
 pub(crate) fn read(
     facts: &IdentityFields,
     mapping: &IdentityMapping,
-    clock_start: Option<Timestamp>,
+    departure: Option<Timestamp>,
 ) -> Result<Identity, ErrorKind> {
-    let facts = registered(facts, mapping, clock_start);
+    let facts = registered(facts, mapping, departure);
     let text = |fact: IdentityField| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
     let tail = text(IdentityField::TailNumber).ok_or_else(|| missing(IdentityField::TailNumber, mapping))?;
-    let departure_utc = match text(IdentityField::DepartureUtc) {
-        Some(departure) => instant(departure, mapping)?,
-        None => clock_start.ok_or_else(|| missing(IdentityField::DepartureUtc, mapping))?,
-    };
+    let departure_utc = departure.ok_or_else(|| missing(IdentityField::DepartureUtc, mapping))?;
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
     let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, &"", &e);
@@ -312,17 +312,6 @@ pub fn zone(name: &str) -> Result<TimeZone, String> {
     }
 }
 
-/// The instant of a local time that was read as if it were UTC; nothing when no zone is mapped.
-pub(crate) fn local_to_utc(
-    as_utc: Timestamp,
-    mapping: &IdentityMapping,
-) -> Result<Option<Timestamp>, ErrorKind> {
-    let Some(name) = mapping.time_zone.as_deref() else { return Ok(None) };
-    let local = TimeZone::UTC.to_datetime(as_utc);
-    let skipped = |detail: String| invalid(IdentityField::DepartureUtc, &local, &detail);
-    unambiguous(local, name).map(Some).map_err(skipped)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -356,7 +345,9 @@ mod tests {
             ),
         ] {
             let facts = from_path(Path::new(path), expression).unwrap();
-            let identity = read(&facts, &mapping(Some(format), Some("UTC")), None).unwrap();
+            let mapping = mapping(Some(format), Some("UTC"));
+            let at = instant(&facts[&IdentityField::DepartureUtc], &mapping).unwrap();
+            let identity = read(&facts, &mapping, Some(at)).unwrap();
             let found = [identity.tail_number.as_str(), identity.flight_id.as_str()];
             assert_eq!(found, ["N412FP", flight]);
             assert_eq!(identity.departure_utc.to_string(), departure);
@@ -383,8 +374,8 @@ mod tests {
         {
             let fault = instant(local, &there).unwrap_err();
             assert!(fault.to_string().contains(is), "{fault}");
-            let start: Timestamp = format!("{local}Z").parse().unwrap();
-            assert!(local_to_utc(start, &there).is_err());
+            let origin = TimeOrigin::Local(format!("{local}Z").parse().unwrap());
+            assert!(ClockSpan { origin, earliest_s: 0.0, latest_s: 1.0 }.start(&there).is_err());
         }
         assert_eq!(instant("2026-10-25T03:30:00", &there).unwrap().to_string(), "2026-10-25T02:30:00Z");
     }
@@ -404,13 +395,9 @@ mod tests {
         for (logged, day, tail) in
             [("QAR 7", "2026-03-31", "N1"), (" QAR 7", "2026-04-01", "N2"), ("N3", "2026-04-01", "N3")]
         {
-            let departure = format!("{day}T23:59:00Z");
-            let mut facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
-            let by_clock = read(&facts, &m, departure.parse().ok()).unwrap();
-            facts.insert(IdentityField::DepartureUtc, departure);
-            for found in [by_clock, read(&facts, &m, None).unwrap()] {
-                assert_eq!(found.tail_number.as_str(), tail, "{day}");
-            }
+            let facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
+            let found = read(&facts, &m, format!("{day}T23:59:00Z").parse().ok()).unwrap();
+            assert_eq!(found.tail_number.as_str(), tail, "{day}");
         }
     }
 

@@ -56,7 +56,7 @@ impl ChannelArrays<'_> {
             output_locked: false,
             selection: SampleSelection::whole(&line),
         };
-        Ok(assemble(position, read, &line, None, Vec::new()))
+        Ok(assemble(position, read, &line, None))
     }
 }
 

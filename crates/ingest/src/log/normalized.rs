@@ -25,96 +25,71 @@ use crate::time::clock::TimestampRepairs;
 const VERSION: &str = "1";
 const KEY: &str = "freeplay.normalized";
 
-/// Content of the footer of a normalized log.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Normalized {
-    /// Which flight it is, and which actuator.
-    pub(crate) facts: IdentityFields,
-    step_s: f64,
-    segments: Vec<Range<usize>>,
-    breaks: Vec<(usize, f64)>,
-    metres_per_radian: Option<f64>,
-    temperature_c: Option<f64>,
-    flags: Vec<String>,
-    /// Samples that no condition left.
-    apart: usize,
-    output_locked: bool,
+/// The columns, in the order of [`crate::ActuatorColumns`].
+pub(crate) const COLUMNS: [&str; 4] = ["motor_m", "dx_m", "load_n", "temperature_c"];
+
+/// Which flight and which actuator a normalized log holds; none where Freeplay did not write the file.
+pub(crate) fn facts(file: &LogFile) -> Result<Option<IdentityFields>, Error> {
+    let Some(version) = file.metadata(KEY) else { return Ok(None) };
+    if version != VERSION {
+        let detail = format!("it is of form {version}, and this program knows {VERSION}");
+        return Err(file.error(ErrorKind::Normalized { detail }));
+    }
+    let fact = |fact: &IdentityField| Some((*fact, noted(file, fact.as_str())?.to_owned()));
+    Ok(Some(IdentityField::ALL.iter().filter_map(fact).collect()))
 }
 
-impl Normalized {
-    /// The columns, in the order of [`crate::ActuatorColumns`].
-    pub(crate) const COLUMNS: [&'static str; 4] = ["motor_m", "dx_m", "load_n", "temperature_c"];
+/// A text of the footer that is not empty.
+fn noted<'f>(file: &'f LogFile, key: &str) -> Option<&'f str> {
+    file.metadata(&format!("freeplay.{key}")).filter(|text| !text.is_empty())
+}
 
-    /// The footer content of a file, if Freeplay normalized it.
-    pub(crate) fn of(file: &LogFile) -> Result<Option<Self>, Error> {
-        let Some(version) = file.metadata(KEY) else { return Ok(None) };
-        let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
-        if version != VERSION {
-            return Err(fail(format!("it is of form {version}, and this program knows {VERSION}")));
-        }
-        let text = |key: &str| file.metadata(&format!("freeplay.{key}")).filter(|t| !t.is_empty());
-        let number = |key: &str| text(key).and_then(|t| t.parse::<f64>().ok());
-        let step_s = number("step_s").ok_or_else(|| fail("`step_s` is missing".into()))?;
-        let segments = text("segments").map_or_else(|| Some(Vec::new()), |text| pairs(text, ".."));
-        let segments = segments.ok_or_else(|| fail("its stretches cannot be read".into()))?;
-        let fact = |fact: &IdentityField| Some((*fact, text(fact.as_str())?.to_owned()));
-        Ok(Some(Self {
-            facts: IdentityField::ALL.iter().filter_map(fact).collect(),
-            step_s,
-            segments: segments.into_iter().map(|(start, end)| start..end).collect(),
-            breaks: text("breaks").and_then(|text| pairs(text, ":")).unwrap_or_default(),
-            metres_per_radian: number("metres_per_radian"),
-            temperature_c: number("temperature_c"),
-            output_locked: text("output_locked") == Some("true"),
-            apart: text("apart").and_then(|t| t.parse().ok()).unwrap_or(0),
-            flags: text("flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
-        }))
+/// The channels as they were written.
+pub(crate) fn read_actuator(
+    file: &LogFile,
+    position: Position,
+    geometry: Geometry,
+) -> Result<ActuatorChannels, Error> {
+    let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
+    let number = |key: &str| noted(file, key).and_then(|text| text.parse::<f64>().ok());
+    let (now, then) = (geometry.metres_per_radian(), number("metres_per_radian"));
+    if now != then {
+        let said = |v: Option<f64>| v.map_or_else(|| "no lead".to_owned(), |v| format!("{v} m/rad"));
+        return Err(fail(format!("with {}, where the part has {}", said(then), said(now))));
     }
-
-    /// The channels as they were written.
-    pub(crate) fn read_actuator(
-        &self,
-        file: &LogFile,
-        position: Position,
-        geometry: Geometry,
-    ) -> Result<ActuatorChannels, Error> {
-        let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
-        let (now, then) = (geometry.metres_per_radian(), self.metres_per_radian);
-        if now != then {
-            let said = |v: Option<f64>| v.map_or_else(|| "no lead".to_owned(), |v| format!("{v} m/rad"));
-            return Err(fail(format!("with {}, where the part has {}", said(then), said(now))));
-        }
-        let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
-        let read = [motor?, dx?, load?];
-        if read.iter().any(|(_, seen)| seen.missing < self.apart) {
-            let fewer = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
-            return Err(fail(fewer));
-        }
-        if self.segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
-            return Err(fail("a segment ends after the last row".into()));
-        }
-        let quality = read
-            .each_ref()
-            .map(|(values, seen)| Quality::of(values, &self.segments, Some(*seen), self.step_s, self.apart));
-        let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
-        Ok(ActuatorChannels {
-            position,
-            step_s: self.step_s,
-            apart: self.apart,
-            output_locked: self.output_locked,
-            missing_share: quality[1].missing_share,
-            columns: std::array::from_fn(|k| Some(Self::COLUMNS[k].to_owned())),
-            quality,
-            motor_m,
-            dx_m,
-            load_n,
-            segments: self.segments.clone(),
-            breaks: self.breaks.clone(),
-            temperature_c: self.temperature_c,
-            flags: self.flags.clone(),
-            repairs: TimestampRepairs::default(),
-        })
+    let step_s = number("step_s").ok_or_else(|| fail("`step_s` is missing".into()))?;
+    let segments = noted(file, "segments").map_or_else(|| Some(Vec::new()), |text| pairs(text, ".."));
+    let segments = segments.ok_or_else(|| fail("its stretches cannot be read".into()))?;
+    let segments: Vec<Range<usize>> = segments.into_iter().map(|(start, end)| start..end).collect();
+    let apart = noted(file, "apart").and_then(|text| text.parse().ok()).unwrap_or(0);
+    let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
+    let read = [motor?, dx?, load?];
+    if read.iter().any(|(_, seen)| seen.missing < apart) {
+        return Err(fail(format!("a channel lacks fewer than the {apart} samples that are left out")));
     }
+    if segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
+        return Err(fail("a segment ends after the last row".into()));
+    }
+    let quality =
+        read.each_ref().map(|(values, seen)| Quality::of(values, &segments, Some(*seen), step_s, apart));
+    let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
+    Ok(ActuatorChannels {
+        position,
+        step_s,
+        apart,
+        output_locked: noted(file, "output_locked") == Some("true"),
+        missing_share: quality[1].missing_share,
+        columns: std::array::from_fn(|k| Some(COLUMNS[k].to_owned())),
+        quality,
+        motor_m,
+        dx_m,
+        load_n,
+        segments,
+        breaks: noted(file, "breaks").and_then(|text| pairs(text, ":")).unwrap_or_default(),
+        temperature_c: number("temperature_c"),
+        flags: noted(file, "flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
+        repairs: TimestampRepairs::default(),
+    })
 }
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error> {

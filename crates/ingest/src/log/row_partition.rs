@@ -3,7 +3,7 @@
 //! A row of such a file belongs to one channel, or to one actuator, and a column of texts names it. Other
 //! rows are dropped as they are decoded, and row groups whose statistics exclude every requested text are not decoded.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, UInt32Array};
@@ -57,8 +57,8 @@ pub(crate) struct Partition {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Rows that will be asked for, in this order, and by which positions.
-    announced: Vec<(Rows, BTreeSet<String>)>,
+    /// Rows that will be asked for, and by which positions.
+    announced: BTreeMap<Rows, BTreeSet<String>>,
     /// Leaves that will be asked for.
     leaves: BTreeSet<String>,
     gathered: HashMap<GatheredKey, Arc<Vec<ArrayRef>>>,
@@ -76,23 +76,19 @@ impl Partition {
         leaves: impl Iterator<Item = String>,
         position: &str,
     ) {
-        let (mut state, rows) = (self.state(), &samples.rows);
+        let mut state = self.state();
         state.leaves.extend(leaves);
-        match state.announced.iter_mut().find(|(known, _)| known == rows) {
-            Some((_, positions)) => drop(positions.insert(position.to_owned())),
-            None => state.announced.push((rows.clone(), BTreeSet::from([position.to_owned()]))),
-        }
+        state.announced.entry(samples.rows.clone()).or_default().insert(position.to_owned());
     }
 
     /// Frees the samples that only this position asks for.
     pub(crate) fn release(&self, position: &str) {
-        let mut state = self.state();
-        for (_, positions) in &mut state.announced {
+        let State { announced, gathered, .. } = &mut *self.state();
+        announced.retain(|_, positions| {
             positions.remove(position);
-        }
-        state.announced.retain(|(_, positions)| !positions.is_empty());
-        let State { announced, gathered, .. } = &mut *state;
-        gathered.retain(|(rows, ..), _| announced.iter().any(|(known, _)| known == rows));
+            !positions.is_empty()
+        });
+        gathered.retain(|(rows, ..), _| announced.contains_key(rows));
     }
 
     /// One leaf of the samples meant, in batches.
@@ -125,7 +121,7 @@ impl Partition {
                 && rows.iter().map(|row| &row.0).eq(asked.0.iter().map(|row| &row.0))
                 && !state.gathered.contains_key(&(rows.clone(), leaf.to_owned(), asked.2.clone()))
         };
-        keys.extend(state.announced.iter().map(|(rows, _)| rows).filter(|rows| is_new(rows)).cloned());
+        keys.extend(state.announced.keys().filter(|rows| is_new(rows)).cloned());
         let mut gathered = gather(files, &keys, &leaves, asked.2.as_deref())?;
         if is_wide {
             return Ok(Arc::new(gathered.remove(0).remove(0)));
@@ -347,18 +343,10 @@ mod tests {
             }
             partition.release("p3");
             assert_eq!(partition.state().gathered.len(), 2);
+            let bounds = |group| files[0].text_bounds("name", group).unwrap();
+            let holding = |name: &str| files[0].groups().filter(|g| bounds(*g).may_hold(name)).count();
+            assert_eq!(["p4", "q"].map(holding), [if is_sorted { 1 } else { 10 }, 0]);
         }
-    }
-
-    #[test]
-    fn row_groups_without_an_asked_parameter_are_not_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = file(folder.path(), true);
-        let holding = |name: &str| {
-            file.groups().filter(|g| file.text_bounds("name", *g).unwrap().may_hold(name)).collect::<Vec<_>>()
-        };
-        assert_eq!((holding("p4"), holding("p10"), holding("q")), (vec![4], vec![], vec![]));
-        assert_eq!(file.text_bounds("name", 4).unwrap().only(), Some("p4"));
     }
 
     /// Two columns mark the rows of a key; the texts of one are codes of a dictionary, of the other plain.

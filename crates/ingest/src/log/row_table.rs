@@ -303,11 +303,10 @@ impl RowTable {
         if is_every_row && self.files.iter().any(lists) {
             return self.burst_stamps(samples, column, ticks);
         }
-        if is_every_row && !ticks.is_whole && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
-            let mut reals = ColumnBuilder::with_capacity(self.rows().min(1 << 26), None);
-            self.files.iter().try_for_each(|file| file.append_numbers(column, None, &mut reals))?;
+        if !ticks.is_whole && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
+            let own = SampleSelector { leaf: column.to_owned(), rows: samples.rows.clone() };
             let mut reader = TimestampParser::new(column, ticks, 0);
-            reader.seconds = reals.finish().0;
+            reader.seconds = self.numbers(&own, None, None)?.0;
             return Ok(reader.stamps());
         }
         let room = if is_every_row { self.rows() } else { 0 };

@@ -41,7 +41,7 @@ impl SampleSelection {
             counted = segment.end;
         }
         channel.values[counted..].fill(f64::NAN);
-        channel.seen = None;
+        (channel.seen, channel.apart) = (None, self.apart);
         channel
     }
 }

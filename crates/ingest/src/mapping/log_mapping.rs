@@ -6,6 +6,7 @@ use jiff::civil::Date;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
+use smart_default::SmartDefault;
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::mapping::units::{TimeUnit, Unit};
@@ -57,49 +58,42 @@ pub struct Layout {
 }
 
 /// Another kind of file. Identity that it does not hold is shared with the main logs.
+#[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupMapping {
     /// Patterns of its files, from the folder of the configuration.
     pub files: Vec<String>,
     /// Its clock. Default: that of the main logs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockMapping>,
     /// Its layout. Default: wide.
     #[serde(default, skip_serializing_if = "is_default")]
     pub layout: Layout,
     /// Identity of its flight. Default: as for the main logs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identity: Option<IdentityMapping>,
 }
 
 /// Where tail, flight and departure stand: in the file's metadata, in constant columns, in its path, in
 /// the names of its folders, or in the configuration itself. For each fact the first source that has it
 /// wins, in that order; the flights table fills what is still open.
-#[skip_serializing_none]
+#[serde_with::apply(_ => #[serde(skip_serializing_if = "is_default")])]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct IdentityMapping {
     /// Key-value metadata of the Parquet footer: field → key, or `key.name` where the value is JSON. Fields: `tail_number`,
     /// `flight_id`, `departure_utc`, `position`, `flight_hours`, `tail_hours_end`, `landing_utc`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,
     /// Columns with one value throughout the log: field → column.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<IdentityField, String>,
     /// Whether each row names its flight, so that a file may hold many. A row that names none is ignored.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub by_row: bool,
     /// A regular expression on the absolute path, with fields as named groups.
     pub path: Option<String>,
     /// Folders called `name=value`: field → name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub folders: BTreeMap<IdentityField, String>,
     /// Values for logs that do not hold them: field → value.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
     /// Registrations of aircraft that loggers call otherwise; the first match counts.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tail_aliases: Vec<TailAlias>,
     /// `strftime` pattern of departures. Default: ISO 8601.
     pub departure_format: Option<String>,
@@ -165,16 +159,15 @@ impl IdentityField {
 }
 
 /// The clock of a log.
-#[skip_serializing_none]
+#[serde_with::apply(_ => #[serde(skip_serializing_if = "is_default")])]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct ClockMapping {
     /// The time column; not needed for evenly spaced rows with `rate_hz`.
     pub column: Option<String>,
     /// Unit of the column; `count` is a counter of samples. Not needed for Arrow timestamps and text.
     pub unit: Option<TimeUnit>,
     /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time. With `midnight`, texts may be times of the day.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero.
     pub wraps_at: Option<f64>,
@@ -187,7 +180,6 @@ pub struct ClockMapping {
     /// The longest pause of one flight, s; a log with a longer one is refused. Default 3600.
     pub max_gap_s: Option<f64>,
     /// Whether a log whose clock falls back further holds several recordings.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub split_at_jumps: bool,
 }
 
@@ -301,18 +293,21 @@ impl Channels {
 
 /// One channel: its column and how to read it.
 #[skip_serializing_none]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelMapping {
     /// The column; `{position}` stands for the actuator's position, `record.field` reaches into structs.
     pub column: String,
     /// Unit of the position, load or temperature.
+    #[default(Unit::Metre)]
     pub unit: Unit,
     /// 1, or −1 where the log counts the other way.
     #[serde(default = "one::<i8>", skip_serializing_if = "is_one")]
+    #[default(one())]
     pub sign: i8,
     /// `unit = raw · scale + offset`, for counts.
     #[serde(default = "one::<f64>", skip_serializing_if = "is_one")]
+    #[default(one())]
     pub scale: f64,
     /// See `scale`.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -324,11 +319,13 @@ pub struct ChannelMapping {
     pub missing: Vec<f64>,
     /// Turns of this sensor for one turn of the screw. Default 1.
     #[serde(default = "one::<f64>", skip_serializing_if = "is_one")]
+    #[default(one())]
     pub gear_ratio: f64,
     /// A column that marks valid samples; `{position}` as in `column`.
     pub valid_column: Option<String>,
     /// The values of `valid_column` that mean valid. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    #[default(yes())]
     pub valid_values: Vec<RawValue>,
     /// Bits of `valid_column` that are all set in a valid sample, e.g. `0x60`.
     pub valid_bits: Option<u64>,
@@ -387,33 +384,6 @@ impl From<&SampleFilter> for ChannelMapping {
             texts: RawValue::texts(&filter.equals),
             ignore_metadata: true,
             ..Self::default()
-        }
-    }
-}
-
-impl Default for ChannelMapping {
-    fn default() -> Self {
-        Self {
-            column: String::new(),
-            unit: Unit::Metre,
-            sign: 1,
-            scale: 1.0,
-            offset: 0.0,
-            wraps_at: None,
-            missing: Vec::new(),
-            gear_ratio: 1.0,
-            valid_column: None,
-            valid_values: yes(),
-            valid_bits: None,
-            invalid_bits: None,
-            ignore_metadata: false,
-            group: None,
-            time_column: None,
-            rate_hz: None,
-            instant_s: 0.0,
-            latency_s: 0.0,
-            alternatives: Vec::new(),
-            texts: Vec::new(),
         }
     }
 }

@@ -145,16 +145,6 @@ mod tests {
         assert!(when(&[1.0], None, Some(2.0)).within(&values, &[0..20], 0.1).is_empty());
     }
 
-    /// As a recorder writes flight phases and validity words: text, padded text, booleans.
-    #[test]
-    fn values_may_be_texts_and_truth_values() {
-        let text = |text: &str| RawValue::Text(text.into());
-        assert_eq!(RawValue::texts(&[text("CRUISE "), text("CLIMB")]), ["CRUISE", "CLIMB"]);
-        let (three, yes, no) = (RawValue::Number(3.0), RawValue::Truth(true), RawValue::Truth(false));
-        assert!(yes.is(1.0) && !yes.is(0.0) && no.is(0.0) && three.is(3.0));
-        assert_eq!(RawValue::texts(&[three, yes]), Vec::<String>::new());
-    }
-
     #[test]
     fn a_missing_value_never_holds() {
         assert!(when(&[], None, None).within(&[f64::NAN; 4], &[0..4], 0.1).is_empty());

@@ -24,11 +24,6 @@ const KNOWN: [&str; 12] = [
     "date_utc",
 ];
 
-/// Where a header has a name.
-pub(super) fn position(header: &[String], name: &str) -> Option<usize> {
-    header.iter().position(|h| h.trim() == name)
-}
-
 /// A column that is not there, with the nearest that is.
 pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
     // A column with a name of ours keeps its meaning.

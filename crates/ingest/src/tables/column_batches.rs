@@ -2,7 +2,7 @@
 //!
 //! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::ops::Range;
@@ -11,9 +11,11 @@ use std::sync::Arc;
 
 use arrow::array::{
     Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
-    StringBuilder, TimestampMicrosecondArray, new_null_array,
+    TimestampMicrosecondArray, new_null_array,
 };
 use arrow::compute::cast;
+use arrow::csv::ReaderBuilder;
+use arrow::csv::reader::Format;
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
 use jiff::Timestamp;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
@@ -26,10 +28,11 @@ use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
 use crate::parquet::raw_footer::{self, caught, not_parquet};
-use crate::tables::cell::{missing, number, position, utc};
+use crate::tables::cell::{missing, number, utc};
 
-/// Rows of a batch.
+/// Rows of a batch; of a CSV table of more than [`USUAL_COLUMNS`] columns, in proportion fewer.
 const ROWS: usize = 65_536;
+const USUAL_COLUMNS: usize = 16;
 
 /// Some rows of a table.
 #[derive(Debug, Clone)]
@@ -37,9 +40,13 @@ pub struct TableBatch {
     pub(super) file: PathBuf,
     pub(super) header: Vec<String>,
     pub(super) batch: RecordBatch,
+    pub(super) names: ColumnAliases,
     /// Rows of the table before these.
     before: usize,
 }
+
+/// What a user's table calls the columns that we know: our name → theirs.
+pub type ColumnAliases = BTreeMap<String, String>;
 
 /// The texts of a column: trimmed, an empty one none.
 #[derive(Debug, Clone)]
@@ -63,7 +70,7 @@ impl TableBatch {
     /// Rows from memory, so many others before them; `name` stands for their file in diagnostics.
     pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
         let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
-        Self { file: name.to_owned(), header, batch, before }
+        Self { file: name.to_owned(), header, batch, names: ColumnAliases::new(), before }
     }
 
     /// Numbers of its rows.
@@ -73,7 +80,13 @@ impl TableBatch {
 
     /// Where a column stands, if it is there under one of its names.
     pub fn find(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|name| position(&self.header, name))
+        let column = |name: &str| self.header.iter().position(|own| own.trim() == name);
+        names.iter().find_map(|name| column(self.alias(name)))
+    }
+
+    /// What this table calls a column.
+    fn alias<'n>(&'n self, name: &'n str) -> &'n str {
+        self.names.get(name).map_or(name, String::as_str)
     }
 
     /// Where a column stands.
@@ -81,7 +94,7 @@ impl TableBatch {
     /// # Errors
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
-        self.find(names).ok_or_else(|| missing(&self.file, names[0], &self.header))
+        self.find(names).ok_or_else(|| missing(&self.file, self.alias(names[0]), &self.header))
     }
 
     /// A column as text; without one, all none.
@@ -286,49 +299,28 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         opened.read_to_end(&mut text)
     })?;
     if let Some(format) = foreign(&text) {
-        let detail = format!("this is {format}: save it as CSV in UTF-8");
-        return Err(ErrorKind::Table { row: None, column: None, detail });
+        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8")));
     }
     // Spreadsheets open their UTF-8 with a byte order mark.
     let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
+    let format = Format::default().with_header(true).with_comment(b'#');
+    let (header, _) = format.infer_schema(&text[mark..], Some(0)).map_err(ErrorKind::table)?;
+    let names: Vec<&str> = header.fields().iter().map(|field| field.name().trim()).collect();
+    bounds::check("columns", names.len() as u64, TABLE_COLUMNS as u64)?;
+    let mut known = BTreeSet::new();
+    if let Some(twice) = names.iter().find(|name| !name.is_empty() && !known.insert(**name)) {
+        return Err(ErrorKind::table(format!("the header has column `{twice}` twice: rename or remove one")));
+    }
+    let fields: Vec<Field> = names.iter().map(|name| Field::new(*name, DataType::Utf8, true)).collect();
+    let schema = Arc::new(Schema::new(fields));
     let mut text = Cursor::new(text);
-    text.set_position(mark);
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
-    let header = reader.headers().map_err(|e| bad_row(&e))?;
-    bounds::check("columns", header.len() as u64, TABLE_COLUMNS as u64)?;
-    let mut names = BTreeSet::new();
-    if let Some(twice) = header.iter().find(|name| !name.is_empty() && !names.insert(*name)) {
-        let detail = format!("the header has column `{twice}` twice: rename or remove one");
-        return Err(ErrorKind::Table { row: None, column: None, detail });
-    }
-    let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
-    let (schema, mut records) = (Arc::new(Schema::new(fields)), reader.into_records());
-    let of_schema = Arc::clone(&schema);
-    let batches = Box::new(std::iter::from_fn(move || texts(&mut records, &of_schema).transpose()));
+    text.set_position(mark as u64);
+    // The reader takes the memory of a batch before it knows how many rows there are.
+    let rows = ROWS / names.len().div_ceil(USUAL_COLUMNS).max(1);
+    let reader = ReaderBuilder::new(Arc::clone(&schema)).with_format(format).with_batch_size(rows);
+    let reader = reader.build_buffered(text).map_err(ErrorKind::table)?;
+    let batches = Box::new(reader.map(|batch| batch.map_err(ErrorKind::table)));
     Ok(Rows { schema, batches, before: 0 })
-}
-
-/// The next rows of a CSV file; nothing at its end.
-fn texts(
-    records: &mut csv::StringRecordsIntoIter<Cursor<Vec<u8>>>,
-    schema: &Arc<Schema>,
-) -> Result<Option<RecordBatch>, ErrorKind> {
-    let mut columns: Vec<StringBuilder> = schema.fields().iter().map(|_| StringBuilder::new()).collect();
-    let mut count = 0;
-    for record in records.take(ROWS) {
-        let record = record.map_err(|e| bad_row(&e))?;
-        for (column, cell) in columns.iter_mut().zip(&record) {
-            column.append_option((!cell.is_empty()).then_some(cell));
-        }
-        count += 1;
-    }
-    if count == 0 {
-        return Ok(None);
-    }
-    let columns: Vec<ArrayRef> =
-        columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef).collect();
-    let batch = RecordBatch::try_new(Arc::clone(schema), columns);
-    batch.map(Some).map_err(|e| ErrorKind::Table { row: None, column: None, detail: e.to_string() })
 }
 
 /// Format of a table that is no CSV in UTF-8, by its first bytes.
@@ -338,11 +330,6 @@ fn foreign(bytes: &[u8]) -> Option<&'static str> {
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("text in UTF-16"),
         _ => None,
     }
-}
-
-fn bad_row(error: &csv::Error) -> ErrorKind {
-    let row = error.position().map(csv::Position::record);
-    ErrorKind::Table { row, column: None, detail: error.to_string() }
 }
 
 #[cfg(test)]
@@ -403,10 +390,6 @@ mod tests {
         let errors = batches(&file, None).unwrap().filter_map(|batch| batch.unwrap().numbers(Some(0)).err());
         let places: Vec<_> = errors.map(|e| e.diagnostic().location().unwrap()).collect();
         assert_eq!(places, [format!("column `gap_m`, row {}", ROWS + 5)]);
-        let not_finite = Arc::new(Float64Array::from(vec![1.0, f64::NAN])) as ArrayRef;
-        let batch = TableBatch::new("t".as_ref(), batch(vec![("gap_m", not_finite)]), 10);
-        let place = batch.numbers(Some(0)).unwrap_err().diagnostic().location().unwrap();
-        assert_eq!(place, "column `gap_m`, row 12");
     }
 
     /// Seven rows in groups of three, some texts as codes, whatever form of text the file's writer prefers.

@@ -1,6 +1,6 @@
 //! The flights table: an operator's own data about flights, with and without logs.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp, civil, tz::TimeZone};
@@ -10,7 +10,8 @@ use crate::error::Error;
 use crate::log::identity::{IdentityFields, date_alone, instant};
 use crate::mapping::{IdentityField, IdentityMapping};
 use crate::tables::cell::{self, name, not_negative};
-use crate::tables::table::{ColumnAliases, Table};
+use crate::tables::column_batches::ColumnAliases;
+use crate::tables::table::Table;
 
 /// A flight may seem to last longer than until the next departure by this factor and by these hours: clocks and rounding.
 const OVERLAP_SHARE: f64 = 1.25;
@@ -27,15 +28,8 @@ pub struct Flights {
     rows: Vec<Row>,
     digest: String,
     by_path: HashMap<String, usize>,
-    by_tail: HashMap<String, TailRows>,
-}
-
-/// The rows of one aircraft.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct TailRows {
-    /// By departure, which is noon where it is a date alone.
-    by_departure: HashMap<(Timestamp, bool), Vec<usize>>,
-    by_id: HashMap<String, Vec<usize>>,
+    /// The rows of each aircraft, in order of departure.
+    by_tail: HashMap<String, Vec<usize>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -71,20 +65,42 @@ impl Flights {
     /// is joined to the log of its flight id, or to the only one of its day, and the log's clock has the time.
     ///
     /// # Errors
-    /// Every cell that cannot be read, and a second flight of one id on one date without a time.
+    /// Every cell that cannot be read, or, when all can, every row that another one contradicts: a second flight of one id
+    /// on one date without a time, and flight hours beyond the next departure.
     pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
         let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
         let needed = table.columns(["tail_number", "flight_id", "departure_utc"])?;
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
-        let (mut flights, mut errors) = (Self::default(), Vec::new());
-        for row in table.rows() {
-            errors.extend(flights.enter(&table, row, needed, optional, identity).err());
+        let ([tail, flight, departure], [hours, tail_hours, path, position]) = (needed, optional);
+        let departs = |text: &str| match date_alone(text, identity) {
+            Some(date) => noon(date).map(|noon| (noon, true)),
+            None => cell::utc(text).or_else(|e| instant(text, identity).map_err(|_| e)).map(|at| (at, false)),
+        };
+        let text = |row, column: Option<usize>| column.and_then(|column| table.text(row, column));
+        let rows = table.read_rows(|row| {
+            let (departure_utc, is_date) = table.required(row, departure, departs)?;
+            let flight = Flight {
+                tail_number: table.required(row, tail, name::<TailNumber>)?,
+                flight_id: table.required(row, flight, name::<FlightId>)?,
+                departure_utc,
+                flight_hours: table.optional(row, hours, not_negative)?,
+                tail_hours_end: table.optional(row, tail_hours, not_negative)?,
+            };
+            Ok(Row { flight, is_date, position: text(row, position).map(str::to_owned) })
+        })?;
+        let mut by_tail = HashMap::<String, Vec<usize>>::new();
+        for (index, row) in rows.iter().enumerate() {
+            by_tail.entry(row.flight.tail_number.to_string()).or_default().push(index);
         }
-        if let (true, Some(hours)) = (errors.is_empty(), optional[0]) {
-            errors = flights.overlapping(&table, hours);
-        }
+        by_tail.values_mut().for_each(|of_tail| of_tail.sort_by_key(|row| rows[*row].flight.departure_utc));
+        let by_path =
+            table.rows().filter_map(|row| Some((text(row, path)?.replace('\\', "/"), row))).collect();
+        let mut flights = Self { rows, digest: String::new(), by_path, by_tail };
+        let mut errors = flights.contradictions(departure, hours);
         if !errors.is_empty() {
-            return Err(errors);
+            errors.sort_by_key(|(row, ..)| *row);
+            let error = |(row, column, what)| table.error(row, column, what);
+            return Err(errors.into_iter().map(error).collect());
         }
         let mut hash = blake3::Hasher::new();
         let columns: Vec<usize> = needed.into_iter().chain(optional.into_iter().flatten()).collect();
@@ -98,78 +114,42 @@ impl Flights {
         Ok(flights)
     }
 
-    /// Flights that last beyond the next departure of their aircraft: hours in another unit, or a wrong row.
-    fn overlapping(&self, table: &Table, column: usize) -> Vec<Error> {
-        let mut by_tail = BTreeMap::<&str, Vec<(usize, &Flight)>>::new();
-        for (row, Row { flight, .. }) in self.rows.iter().enumerate() {
-            by_tail.entry(flight.tail_number.as_str()).or_default().push((row, flight));
-        }
-        let mut errors = Vec::new();
-        for flights in by_tail.values_mut() {
-            flights.sort_by_key(|(_, flight)| flight.departure_utc);
-            for (k, (row, flight)) in flights.iter().enumerate() {
-                let is_next = |&(next, other): &(usize, &Flight)| {
-                    other.departure_utc > flight.departure_utc
-                        && self.rows[next].is_date == self.rows[*row].is_date
-                };
-                let next = flights[k..].iter().copied().find(is_next);
-                let (Some((_, next)), Some(hours)) = (next, flight.flight_hours) else { continue };
-                let until_next =
-                    next.departure_utc.duration_since(flight.departure_utc).as_secs_f64() / 3600.0;
-                if hours > OVERLAP_SHARE * until_next + OVERLAP_HOURS {
+    /// Rows that another row of their aircraft contradicts, with the column and the reason: a second flight of one id on
+    /// one date, and a flight that lasts beyond the next departure, whose hours are in another unit or of another flight.
+    fn contradictions(&self, departure: usize, hours: Option<usize>) -> Vec<(usize, usize, String)> {
+        let mut found = Vec::new();
+        for of_tail in self.by_tail.values() {
+            for (k, &row) in of_tail.iter().enumerate() {
+                let Row { flight, is_date, .. } = &self.rows[row];
+                let Flight { tail_number, flight_id, departure_utc, .. } = flight;
+                let is_same = |other: &Flight| other.departure_utc == *departure_utc;
+                let before = of_tail[..k].iter().rev().map(|&row| &self.rows[row]);
+                let mut same = before.take_while(|other| is_same(&other.flight));
+                if *is_date && same.any(|other| other.is_date && other.flight.flight_id == *flight_id) {
+                    let date = TimeZone::UTC.to_datetime(*departure_utc).date();
                     let what = format!(
-                        "{hours} flight hours, but {} departs again {until_next:.1} h later ({}): give hours, not minutes, \
-                         and check the two departures",
-                        flight.tail_number, next.flight_id
+                        "a second flight {flight_id} of {tail_number} on {date}: give both departures with their time"
                     );
-                    errors.push((*row, table.error(*row, column, what)));
+                    found.push((row, departure, what));
+                }
+                let mut after = of_tail[k..].iter().map(|&row| &self.rows[row]);
+                let next = after.find(|other| other.is_date == *is_date && !is_same(&other.flight));
+                let (Some(next), Some(column), Some(flown_h)) = (next, hours, flight.flight_hours) else {
+                    continue;
+                };
+                let next = &next.flight;
+                let until_next = next.departure_utc.duration_since(*departure_utc).as_secs_f64() / 3600.0;
+                if flown_h > OVERLAP_SHARE * until_next + OVERLAP_HOURS {
+                    let what = format!(
+                        "{flown_h} flight hours, but {tail_number} departs again {until_next:.1} h later ({}): give hours, \
+                         not minutes, and check the two departures",
+                        next.flight_id
+                    );
+                    found.push((row, column, what));
                 }
             }
         }
-        errors.sort_by_key(|(row, _)| *row);
-        errors.into_iter().map(|(_, error)| error).collect()
-    }
-
-    fn enter(
-        &mut self,
-        table: &Table,
-        row: usize,
-        [tail, flight, departure]: [usize; 3],
-        [hours, tail_hours, path, position]: [Option<usize>; 4],
-        identity: &IdentityMapping,
-    ) -> Result<(), Error> {
-        let departs = |text: &str| match date_alone(text, identity) {
-            Some(date) => noon(date).map(|noon| (noon, Some(date))),
-            None => cell::utc(text).or_else(|e| instant(text, identity).map_err(|_| e)).map(|at| (at, None)),
-        };
-        let (departure_utc, date) = table.required(row, departure, departs)?;
-        let flown = Flight {
-            tail_number: table.required(row, tail, name::<TailNumber>)?,
-            flight_id: table.required(row, flight, name::<FlightId>)?,
-            departure_utc,
-            flight_hours: table.optional(row, hours, not_negative)?,
-            tail_hours_end: table.optional(row, tail_hours, not_negative)?,
-        };
-        let index = self.rows.len();
-        if let Some(path) = path.and_then(|column| table.text(row, column)) {
-            self.by_path.insert(path.replace('\\', "/"), index);
-        }
-        let of_tail = self.by_tail.entry(flown.tail_number.to_string()).or_default();
-        let same_id = of_tail.by_id.entry(flown.flight_id.to_string()).or_default();
-        let is_same = |&other: &usize| {
-            self.rows[other].is_date && self.rows[other].flight.departure_utc == departure_utc
-        };
-        if let Some(date) = date.filter(|_| same_id.iter().any(is_same)) {
-            let (tail, id) = (&flown.tail_number, &flown.flight_id);
-            let what =
-                format!("a second flight {id} of {tail} on {date}: give both departures with their time");
-            return Err(table.error(row, departure, what));
-        }
-        of_tail.by_departure.entry((departure_utc, date.is_some())).or_default().push(index);
-        same_id.push(index);
-        let position = position.and_then(|column| table.text(row, column)).map(str::to_owned);
-        self.rows.push(Row { flight: flown, is_date: date.is_some(), position });
-        Ok(())
+        found
     }
 
     /// Every flight of the table.
@@ -195,41 +175,35 @@ impl Flights {
 
     fn row_of(&self, tail_number: &str, flight_id: Option<&str>, departure_utc: Timestamp) -> Option<usize> {
         let of_tail = self.by_tail.get(tail_number)?;
-        if let Some(row) = of_tail.by_departure.get(&(departure_utc, false)).and_then(|rows| rows.last()) {
-            return Some(*row);
-        }
-        let away = |row: &usize| self.rows[*row].flight.departure_utc.duration_since(departure_utc).abs();
-        let Some(id) = flight_id else {
-            let noon = noon(TimeZone::UTC.to_datetime(departure_utc).date()).ok()?;
-            return of_tail.by_departure.get(&(noon, true)).and_then(|rows| only(rows));
-        };
-        let same_id = of_tail.by_id.get(id)?.iter().copied();
-        same_id.filter(|row| away(row) <= SAME_FLIGHT).min_by_key(away)
+        let since = |row: &usize| self.rows[*row].flight.departure_utc.duration_since(departure_utc);
+        let first = of_tail.partition_point(|row| since(row) < -SAME_FLIGHT);
+        let near = of_tail[first..].iter().copied().take_while(|row| since(row) <= SAME_FLIGHT);
+        let exact = near.clone().filter(|row| !self.rows[*row].is_date && since(row).is_zero()).last();
+        exact.or_else(|| match flight_id {
+            Some(id) => near.filter(|row| self.is_called(*row, id)).min_by_key(|row| since(row).abs()),
+            None => {
+                let noon = noon(TimeZone::UTC.to_datetime(departure_utc).date()).ok()?;
+                let is_of_day = |Row { flight, is_date, .. }: &Row| *is_date && flight.departure_utc == noon;
+                only(near.filter(|row| is_of_day(&self.rows[*row])))
+            }
+        })
+    }
+
+    fn is_called(&self, row: usize, flight_id: &str) -> bool {
+        self.rows[row].flight.flight_id.as_str() == flight_id
     }
 
     /// What the table knows of a log: by its path, else by its tail and departure, else by its tail and flight id. An id that
     /// several rows have is found by the departure alone, which may be that of the log's clock.
-    pub fn facts(
-        &self,
-        path: &Path,
-        said: &IdentityFields,
-        start: Option<Timestamp>,
-        identity: &IdentityMapping,
-    ) -> IdentityFields {
-        if self.rows.is_empty() {
-            return IdentityFields::new();
-        }
+    pub fn facts(&self, path: &Path, said: &IdentityFields, departure: Option<Timestamp>) -> IdentityFields {
         let text = |fact: IdentityField| said.get(&fact).map(|t| t.trim());
         let by_identity = || {
             let (tail, id) = (text(IdentityField::TailNumber)?, text(IdentityField::FlightId));
-            let departure = match text(IdentityField::DepartureUtc) {
-                Some(text) => Some(instant(text, identity).ok()?),
-                None => start,
-            };
-            match departure {
-                Some(at) => self.row_of(tail, id, at),
-                None => only(self.by_tail.get(tail)?.by_id.get(id?)?),
+            if let Some(at) = departure {
+                return self.row_of(tail, id, at);
             }
+            let (of_tail, id) = (self.by_tail.get(tail)?, id?);
+            only(of_tail.iter().copied().filter(|row| self.is_called(*row, id)))
         };
         let found = self.of_path(path).or_else(by_identity);
         found.map(|row| self.rows[row].facts()).unwrap_or_default()
@@ -248,8 +222,9 @@ impl Flights {
     }
 }
 
-fn only(rows: &[usize]) -> Option<usize> {
-    if let [row] = rows { Some(*row) } else { None }
+/// The row, where there is but one.
+fn only(mut rows: impl Iterator<Item = usize>) -> Option<usize> {
+    rows.next().filter(|_| rows.next().is_none())
 }
 
 /// Noon of a date, UTC.
@@ -275,22 +250,17 @@ mod tests {
         let text = "reg,leg,off,flight_hours,path\nN1,0413,2026-11-19T04:13:00Z,2.5,N1/a.parquet\nN1,0500,2026-11-20 05:00,,\n";
         let names = [("tail_number", "reg"), ("flight_id", "leg"), ("departure_utc", "off")];
         let names = names.map(|(ours, theirs)| (ours.to_owned(), theirs.to_owned())).into();
-        let identity = IdentityMapping::default();
         let flights = read(text, &names).unwrap();
-        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), None, &identity);
+        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), None);
         assert_eq!(
             (by_path[&IdentityField::FlightId].as_str(), by_path[&IdentityField::FlightHours].as_str()),
             ("0413", "2.5")
         );
-        let said = IdentityFields::from([
-            (IdentityField::TailNumber, "N1".into()),
-            (IdentityField::DepartureUtc, "2026-11-20T05:00:00Z".into()),
-        ]);
-        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, None, &identity);
+        let said = IdentityFields::from([(IdentityField::TailNumber, "N1".into())]);
+        let departure = "2026-11-20T05:00:00Z".parse().ok();
+        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, departure);
         assert_eq!(by_departure[&IdentityField::FlightId], "0500");
-        assert!(
-            flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), None, &identity).is_empty()
-        );
+        assert!(flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), None).is_empty());
     }
 
     /// A flight number that flies every day: only the departure tells which row is meant.
@@ -298,7 +268,6 @@ mod tests {
     fn an_id_that_recurs_is_found_by_departure() {
         let row = |day: u32| format!("N1,FP100,2026-03-{day:02}T06:10:00Z,{day}.5\n");
         let rows: String = (1..=9).map(row).collect();
-        let identity = IdentityMapping::default();
         let flights = read(&format!("{HEADER}{rows}"), &ColumnAliases::new()).unwrap();
         let said = IdentityFields::from([
             (IdentityField::TailNumber, "N1".into()),
@@ -306,7 +275,7 @@ mod tests {
         ]);
         let at = |text: &str| text.parse::<Timestamp>().unwrap();
         let hours = |start: Option<Timestamp>| {
-            flights.facts(Path::new("/x"), &said, start, &identity).get(&IdentityField::FlightHours).cloned()
+            flights.facts(Path::new("/x"), &said, start).get(&IdentityField::FlightHours).cloned()
         };
         assert_eq!(hours(None), None, "nine flights have this id");
         assert_eq!(hours(Some(at("2026-03-04T06:25:00Z"))).as_deref(), Some("4.5"));
@@ -323,8 +292,7 @@ mod tests {
         let hours = |id: Option<&str>, at: &str| {
             let id = id.map(|id| (IdentityField::FlightId, id.to_owned()));
             let said = [(IdentityField::TailNumber, "N1".to_owned())].into_iter().chain(id).collect();
-            let facts = flights.facts(Path::new("/x"), &said, at.parse().ok(), &IdentityMapping::default());
-            facts.get(&IdentityField::FlightHours).cloned()
+            flights.facts(Path::new("/x"), &said, at.parse().ok()).get(&IdentityField::FlightHours).cloned()
         };
         assert_eq!(hours(Some("A"), "2026-03-04T23:10:00Z").as_deref(), Some("2"));
         assert_eq!(hours(Some("B"), "2026-03-04T00:10:00Z").as_deref(), Some("3"));

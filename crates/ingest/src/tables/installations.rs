@@ -7,7 +7,8 @@ use records::{Alias, Installation, Installations};
 
 use crate::error::{Error, ErrorKind};
 use crate::tables::cell::{name, number, utc};
-use crate::tables::table::{ColumnAliases, Table};
+use crate::tables::column_batches::ColumnAliases;
+use crate::tables::table::Table;
 
 /// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
 /// removed_utc` and optionally `unit_hours_at_install`, `tail_hours_at_install`.
@@ -16,22 +17,26 @@ use crate::tables::table::{ColumnAliases, Table};
 /// Every cell that cannot be read, or, when all can, every contradiction between rows.
 pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
     let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
-    let columns = InstallationColumns::find(&table)?;
-    let (mut rows, mut errors) = (Vec::with_capacity(table.rows().len()), Vec::new());
-    for row in table.rows() {
-        match columns.installation(&table, row) {
-            Ok(stay) => rows.push(stay),
-            Err(error) => errors.push(error),
-        }
-    }
-    if !errors.is_empty() {
-        return Err(errors);
-    }
+    let [tail, position, part, serial, installed] =
+        table.columns(["tail_number", "position", "part_number", "serial_number", "installed_utc"])?;
+    let [removed, unit_hours, tail_hours] =
+        ["removed_utc", "unit_hours_at_install", "tail_hours_at_install"].map(|name| table.find(&[name]));
+    let rows = table.read_rows(|row| {
+        Ok(Installation {
+            tail_number: table.required(row, tail, name)?,
+            position: table.required(row, position, name)?,
+            part_number: table.required(row, part, name)?,
+            serial_number: table.required(row, serial, name)?,
+            installed_utc: table.required(row, installed, utc)?,
+            removed_utc: table.optional(row, removed, removal)?.flatten(),
+            unit_hours_at_install: table.optional(row, unit_hours, number)?,
+            tail_hours_at_install: table.optional(row, tail_hours, number)?,
+            today: None,
+        })
+    })?;
     // The text of a million rows is not kept next to their values.
     drop(table);
-    let contradiction = |e: records::installation::Error| {
-        Error::new(file, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
-    };
+    let contradiction = |fault| Error::new(file, ErrorKind::table(fault));
     Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
 }
 
@@ -52,36 +57,6 @@ pub fn aliases(file: &Path) -> Result<Vec<Alias>, Error> {
         })
     };
     table.rows().map(row).collect()
-}
-
-struct InstallationColumns {
-    names: [usize; 5],
-    removed: Option<usize>,
-    hours: [Option<usize>; 2],
-}
-
-impl InstallationColumns {
-    fn find(table: &Table) -> Result<Self, Vec<Error>> {
-        let wanted = ["tail_number", "position", "part_number", "serial_number", "installed_utc"];
-        let names = table.columns(wanted)?;
-        let hours = ["unit_hours_at_install", "tail_hours_at_install"].map(|name| table.find(&[name]));
-        Ok(Self { names, removed: table.find(&["removed_utc"]), hours })
-    }
-
-    fn installation(&self, table: &Table, row: usize) -> Result<Installation, Error> {
-        let [tail, position, part, serial, installed] = self.names;
-        Ok(Installation {
-            tail_number: table.required(row, tail, name)?,
-            position: table.required(row, position, name)?,
-            part_number: table.required(row, part, name)?,
-            serial_number: table.required(row, serial, name)?,
-            installed_utc: table.required(row, installed, utc)?,
-            removed_utc: table.optional(row, self.removed, removal)?.flatten(),
-            unit_hours_at_install: table.optional(row, self.hours[0], number)?,
-            tail_hours_at_install: table.optional(row, self.hours[1], number)?,
-            today: None,
-        })
-    }
 }
 
 /// The removal of a unit; none for the values that databases write for a unit that is still installed: the year 9999

@@ -1,6 +1,5 @@
 //! Tables read whole, every cell as text.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -8,22 +7,16 @@ use std::sync::Arc;
 use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
 use arrow::datatypes::Schema;
-use arrow::error::ArrowError;
 
 use crate::error::{Error, ErrorKind};
-use crate::tables::cell::{missing, position};
-use crate::tables::column_batches::{StringColumn, TableBatch, batches};
+use crate::tables::column_batches::{ColumnAliases, StringColumn, TableBatch, batches};
 
 /// A table, every cell text; an empty cell is none.
 #[derive(Debug, Clone)]
 pub struct Table {
     whole: TableBatch,
     columns: Vec<StringColumn>,
-    names: ColumnAliases,
 }
-
-/// What a user's table calls the columns that we know: our name → theirs.
-pub type ColumnAliases = BTreeMap<String, String>;
 
 impl Table {
     /// Reads a `.parquet` file as Parquet and anything else as CSV.
@@ -41,17 +34,16 @@ impl Table {
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
         let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-        let fault = |e: ArrowError| ErrorKind::Table { row: None, column: None, detail: e.to_string() };
-        let whole = concat_batches(&schema, batches).map_err(|e| Error::new(name, fault(e)))?;
+        let whole = concat_batches(&schema, batches).map_err(|e| Error::new(name, ErrorKind::table(e)))?;
         let whole = TableBatch::new(name, whole, 0);
         let columns = (0..whole.header.len()).map(|column| whole.texts(Some(column)));
-        Ok(Self { columns: columns.collect::<Result<_, _>>()?, whole, names: ColumnAliases::new() })
+        Ok(Self { columns: columns.collect::<Result<_, _>>()?, whole })
     }
 
     /// The same table, whose columns go by a user's own names.
     #[must_use]
     pub fn with_aliases(mut self, names: &ColumnAliases) -> Self {
-        self.names.clone_from(names);
+        self.whole.names.clone_from(names);
         self
     }
 
@@ -62,8 +54,7 @@ impl Table {
 
     /// Where a column stands, if it is there under one of its names.
     pub fn find(&self, names: &[&str]) -> Option<usize> {
-        let theirs = |name: &str| self.names.get(name).map_or_else(|| name.to_owned(), Clone::clone);
-        names.iter().find_map(|name| position(&self.whole.header, &theirs(name)))
+        self.whole.find(names)
     }
 
     /// Where a column stands.
@@ -71,8 +62,7 @@ impl Table {
     /// # Errors
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
-        let wanted = || self.names.get(names[0]).map_or(names[0], String::as_str);
-        self.find(names).ok_or_else(|| missing(&self.whole.file, wanted(), &self.whole.header))
+        self.whole.column(names)
     }
 
     /// Where columns stand; an error for each that is not there.
@@ -82,6 +72,16 @@ impl Table {
             return Ok(found.map(Result::unwrap_or_default));
         }
         Err(found.into_iter().filter_map(Result::err).collect())
+    }
+
+    /// What `read` makes of each row; if it cannot read some, an error for each of them.
+    pub(super) fn read_rows<T>(
+        &self,
+        read: impl Fn(usize) -> Result<T, Error>,
+    ) -> Result<Vec<T>, Vec<Error>> {
+        let mut errors = Vec::new();
+        let rows = self.rows().filter_map(|row| read(row).map_err(|error| errors.push(error)).ok()).collect();
+        if errors.is_empty() { Ok(rows) } else { Err(errors) }
     }
 
     /// The text of a cell.

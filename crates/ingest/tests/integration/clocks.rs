@@ -137,51 +137,45 @@ fn the_redundant_channel_that_lives_is_taken() {
     }
 }
 
+/// Marks that are words, numbers, truth values, or bits of a word of 16 or 64 bits: bit 2 says powered, bit 5 says failed,
+/// and others are in use.
 #[test]
 fn a_sample_that_is_not_valid_is_missing() {
     let bad = |k: usize| (200..240).contains(&k);
-    let words = |k: usize| Some(if bad(k) { "FAILED" } else { "NORMAL " });
-    let truth: ArrayRef = Arc::new((0..ROWS).map(|k| Some(!bad(k))).collect::<BooleanArray>());
-    let marks: [(ArrayRef, Vec<RawValue>); 4] = [
-        (Arc::clone(&truth), vec![1.0.into()]),
-        (truth, vec![RawValue::Truth(true)]),
-        (
-            Arc::new((0..ROWS).map(|k| if bad(k) { 1 } else { 3 }).collect::<Int64Array>()),
-            vec![3.0.into(), 7.0.into()],
-        ),
-        (Arc::new((0..ROWS).map(words).collect::<StringArray>()), vec![RawValue::Text("NORMAL".into())]),
-    ];
-    for (mark, valid_values) in marks {
-        let mut m = plain();
-        m.channels.motor_position =
-            ChannelMapping { valid_column: Some("ok".into()), valid_values, ..channel("m", Unit::Metre) };
-        let a = only(&m, &with(columns(), "ok", mark)).unwrap();
-        assert!((0..ROWS).all(|k| a.dx_m[k].is_nan() == (200..240).contains(&k)));
-    }
-}
-
-/// A status word of 16 or 64 bits: bit 2 says powered, bit 5 says failed, and others are in use.
-#[test]
-fn bits_of_a_status_word_mark_valid_samples() {
     let word = |k: usize| match k {
         200..220 => 0b10_0100,
         220..240 => 0,
         _ => 0b0100,
     };
+    let texts = (0..ROWS).map(|k| Some(if bad(k) { "FAILED" } else { "NORMAL " })).collect::<StringArray>();
+    let truth: ArrayRef = Arc::new((0..ROWS).map(|k| Some(!bad(k))).collect::<BooleanArray>());
+    let counts = (0..ROWS).map(|k| if bad(k) { 1 } else { 3 }).collect::<Int64Array>();
     let short = (0..ROWS).map(|k| (word(k) | 0b1000) as i16 | i16::MIN).collect::<Int16Array>();
     let long = (0..ROWS).map(|k| (word(k) | (k as u64) << 40) | 1 << 63).collect::<UInt64Array>();
-    let mut m = plain();
-    m.channels.motor_position = ChannelMapping {
-        valid_column: Some("ok".into()),
+    let read = |mark: ArrayRef, valid: ChannelMapping| {
+        let mut m = plain();
+        m.channels.motor_position = ChannelMapping { valid_column: Some("ok".into()), ..valid };
+        only(&m, &with(columns(), "ok", mark)).map_err(|e| e.diagnostic())
+    };
+    let values = |valid_values: Vec<RawValue>| ChannelMapping { valid_values, ..channel("m", Unit::Metre) };
+    let bits = ChannelMapping {
         valid_bits: Some(0b0100),
         invalid_bits: Some(0b10_0000),
         ..channel("m", Unit::Metre)
     };
-    for words in [Arc::new(short) as ArrayRef, Arc::new(long)] {
-        let a = only(&m, &with(columns(), "ok", words)).unwrap();
-        assert!((0..ROWS).all(|k| a.dx_m[k].is_nan() == (200..240).contains(&k)));
+    let marks: [(ArrayRef, ChannelMapping); 6] = [
+        (Arc::clone(&truth), values(vec![1.0.into()])),
+        (truth, values(vec![RawValue::Truth(true)])),
+        (Arc::new(counts), values(vec![3.0.into(), 7.0.into()])),
+        (Arc::new(texts), values(vec![RawValue::Text("NORMAL".into())])),
+        (Arc::new(short), bits.clone()),
+        (Arc::new(long), bits.clone()),
+    ];
+    for (mark, valid) in marks {
+        let a = read(mark, valid).unwrap();
+        assert!((0..ROWS).all(|k| a.dx_m[k].is_nan() == bad(k)));
     }
-    let real = only(&m, &with(columns(), "ok", reals(|_| 4.0))).unwrap_err().diagnostic();
+    let real = read(reals(|_| 4.0), bits).unwrap_err();
     assert_eq!((real.code.as_str(), real.column.as_deref()), ("column_type", Some("ok")));
 }
 

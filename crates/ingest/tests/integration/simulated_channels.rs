@@ -2,7 +2,6 @@
 
 use ingest::ActuatorChannels;
 use ingest::channel::noise_floor::white_noise;
-use ingest::channel::position_ratio::position_ratio;
 use ingest::log::in_memory::ChannelArrays;
 use records::Position;
 use simulator::{Flight, Plant, Profile, Sensors, Vibration, simulate};
@@ -60,75 +59,33 @@ fn the_noise_of_each_sensor_is_found_within_fifteen_percent() {
     }
 }
 
+/// Two outliers of 2 mm in a flight of 100 s, and outliers of ten times the noise of a load cell, are spikes. The noise
+/// itself is none, and neither is a break in time of three rows that are not there.
 #[test]
-fn flights_without_outliers_have_no_spikes() {
-    let with_spikes = |(rate_hz, seed)| {
-        let flags = read(&flight(rate_hz, seed)).flags;
-        flags
-            .into_iter()
-            .filter(|f| f.ends_with("_spikes"))
-            .map(move |flag| format!("{flag} at {rate_hz} Hz, {seed}"))
-    };
-    let flagged: Vec<String> = flights().flat_map(with_spikes).collect();
-    // 2 % of 24 flights with three channels each.
-    assert!(flagged.len() <= 1, "{flagged:?}");
-}
-
-/// Two outliers of 2 mm in a flight of 100 s, and outliers of ten times the noise of a load cell.
-#[test]
-fn outliers_are_spikes() {
-    let mut missed = Vec::new();
-    for (rate_hz, seed) in flights().step_by(2) {
+fn outliers_are_spikes_and_neither_noise_nor_missing_rows_are() {
+    let (mut flagged, mut missed) = (0, 0);
+    for (rate_hz, seed) in flights() {
         let mut flight = flight(rate_hz, seed);
+        flagged += read(&flight).flags.iter().filter(|flag| flag.ends_with("_spikes")).count();
         let rows = flight.motor_m.len();
+        let mut shorter = flight.clone();
+        for at in [3000, 1700, 900] {
+            let Flight { time_s, motor_m, screw_m, load_n, .. } = &mut shorter;
+            for channel in [time_s, motor_m, screw_m, load_n] {
+                channel.remove(at);
+            }
+        }
+        let spikes = read(&shorter).quality.map(|q| q.spikes);
+        assert!(seed != 2 || spikes == [0; 3], "{rate_hz} Hz: {spikes:?}");
         for at in [rows / 3, 2 * rows / 3 + 7] {
             flight.motor_m[at] += 2e-3;
             flight.screw_m[at + 50] -= 2e-3;
             flight.load_n[at + 99] += 400.0;
         }
         let channels = read(&flight);
-        let spikes = channels.quality.map(|q| q.spikes);
-        assert_eq!(spikes[..2], [2, 2], "{rate_hz} Hz, {seed}");
-        if !channels.flags.contains(&"load_spikes".to_owned()) {
-            missed.push((rate_hz, seed));
-        }
+        assert_eq!(channels.quality.map(|q| q.spikes)[..2], [2, 2], "{rate_hz} Hz, {seed}");
+        missed += usize::from(!channels.flags.contains(&"load_spikes".to_owned()));
     }
-    assert!(missed.len() <= 3, "{missed:?}");
-}
-
-/// Three rows that are not there are a break in time, and no spike.
-#[test]
-fn missing_rows_are_no_spikes() {
-    for rate_hz in RATES_HZ {
-        let mut flight = flight(rate_hz, 2);
-        for at in [3000, 1700, 900] {
-            for channel in [&mut flight.time_s, &mut flight.motor_m, &mut flight.screw_m, &mut flight.load_n]
-            {
-                channel.remove(at);
-            }
-        }
-        assert_eq!(read(&flight).quality.map(|q| q.spikes), [0, 0, 0], "{rate_hz} Hz");
-    }
-}
-
-/// Soft rotary actuators wind up by a twentieth of their motion, and a sensor of theirs has outliers: the ratio of the
-/// positions is still that of the simulator, 1.
-#[test]
-fn the_ratio_of_the_positions_is_one_under_wind_up_and_outliers() {
-    for (stiffness_n_per_m, hinge_share) in [(1e7, 0.3), (1e7, 0.4), (5e6, 0.3), (1e8, 0.3)] {
-        for seed in 1..=3 {
-            let mut plant = Plant::default();
-            plant.contact.stiffness_n_per_m = stiffness_n_per_m;
-            let profile = Profile { duration_s: 100.0, hinge_share, ..Profile::default() };
-            let mut flight = simulate(&plant, &profile, &Sensors::default(), seed).unwrap();
-            let rows = flight.motor_m.len();
-            for at in [rows / 3, rows / 2, rows - 100] {
-                flight.motor_m[at] += 0.5;
-                flight.screw_m[at + 9] -= 2.0;
-            }
-            let a = read(&flight);
-            let ratio = position_ratio(&a.motor_m, &a.dx_m, &a.load_n).unwrap();
-            assert!((ratio - 1.0).abs() < 0.01, "{stiffness_n_per_m} N/m, {hinge_share}, {seed}: {ratio}");
-        }
-    }
+    // 2 % of 24 flights with three channels each, and a quarter of the flights.
+    assert!(flagged <= 1 && missed <= 6, "{flagged} flagged, {missed} missed");
 }
