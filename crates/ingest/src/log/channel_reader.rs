@@ -183,7 +183,7 @@ impl<'s> ChannelSampling<'s> {
     fn instants(&self) -> Result<(Timestamps, Vec<f64>), Error> {
         let (stamps, line) = self.read_line()?;
         let stamps = stamps.unwrap_or_else(|| Timestamps::uniform(line.rows, line.step_s.recip()));
-        let mut instants = stamps.of(&self.line);
+        let mut instants = self.line.keep(stamps.seconds);
         instants.iter_mut().for_each(|t| *t += self.map.shift_s());
         Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
     }
@@ -196,10 +196,6 @@ impl<'s> ChannelSampling<'s> {
             let (scale, offset) = self.sheet.scale_and_offset(&self.samples.leaf, map)?;
             si = si.with_line(scale, offset);
         }
-        let kept = |values: Vec<f64>| match &self.line.kept {
-            Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
-            None => values,
-        };
         let is_text = !map.texts.is_empty();
         let is_mended = is_text || !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
@@ -208,12 +204,12 @@ impl<'s> ChannelSampling<'s> {
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = seen.filter(|_| self.line.kept.is_none());
-            return Ok(Channel { seen, ..kept(values).into() });
+            return Ok(Channel { seen, ..self.line.keep(values).into() });
         }
         let read =
             if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
         self.same_count(read.len(), self.column())?;
-        let mut values = kept(read);
+        let mut values = self.line.keep(read);
         if !map.missing.is_empty() {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
@@ -221,7 +217,8 @@ impl<'s> ChannelSampling<'s> {
             let marks = self.valid_marks(valid)?;
             self.same_count(marks.len(), &valid.leaf)?;
             let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
-            values.iter_mut().zip(kept(marks)).filter(|(_, m)| is_bad(*m)).for_each(|(v, _)| *v = f64::NAN);
+            let marked = values.iter_mut().zip(self.line.keep(marks));
+            marked.filter(|(_, mark)| is_bad(*mark)).for_each(|(value, _)| *value = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);

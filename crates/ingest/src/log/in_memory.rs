@@ -47,7 +47,10 @@ impl ChannelArrays<'_> {
         let mut stamps =
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
         let line = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
-        let [motor, screw, load] = named.map(|(_, values)| on(values, line.kept.as_deref()).into());
+        // An infinite reading is no reading.
+        let reading = |&value: &f64| if value.is_finite() { value } else { f64::NAN };
+        let [motor, screw, load] =
+            named.map(|(_, values)| line.keep(values.iter().map(reading).collect()).into());
         let read = RawChannels {
             motor,
             screw,
@@ -57,15 +60,6 @@ impl ChannelArrays<'_> {
             selection: SampleSelection::whole(&line),
         };
         Ok(assemble(position, read, &line, None))
-    }
-}
-
-/// The rows that count; an infinite reading is no reading.
-fn on(values: &[f64], kept: Option<&[u32]>) -> Vec<f64> {
-    let reading = |value: f64| if value.is_finite() { value } else { f64::NAN };
-    match kept {
-        None => values.iter().copied().map(reading).collect(),
-        Some(rows) => rows.iter().map(|&row| reading(values[row as usize])).collect(),
     }
 }
 

@@ -64,19 +64,6 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn a_plain_name_fits_no_position_and_serves_every_one() {
-        let load = ColumnPattern::new("load_n");
-        assert_eq!(load.position_in("load_n"), None);
-        assert_eq!(load.column_for("aileron_left"), "load_n");
-    }
-
-    #[test]
-    fn a_misspelled_column_finds_its_neighbour() {
-        assert_eq!(nearest("screw_positon_m", ["time_s", "screw_position_m"]), Some("screw_position_m"));
-        assert_eq!(nearest("zzz", ["time_s"]), None);
-    }
-
     proptest! {
         #[test]
         fn a_position_written_into_a_pattern_is_read_back(before in "[a-z_.]{0,6}", after in "[a-z_.]{0,6}", position in "[a-z0-9_]{1,8}") {

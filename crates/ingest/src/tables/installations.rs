@@ -97,12 +97,4 @@ mod tests {
         }
         assert_eq!(removed("later"), None);
     }
-
-    #[test]
-    fn every_bad_cell_is_named_by_row_and_column() {
-        let rows = "N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n";
-        let errors = read(&format!("{HEADER}{rows}")).unwrap_err();
-        let places: Vec<_> = errors.iter().map(|e| e.diagnostic().location().unwrap()).collect();
-        assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
-    }
 }

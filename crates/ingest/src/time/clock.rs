@@ -72,6 +72,14 @@ pub struct TimestampRepairs {
 }
 
 impl TimeBase {
+    /// The values of the rows that count, in order of time.
+    pub(crate) fn keep(&self, values: Vec<f64>) -> Vec<f64> {
+        match &self.kept {
+            None => values,
+            Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
+        }
+    }
+
     /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
     pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), ErrorKind> {
         let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
@@ -139,14 +147,6 @@ impl Timestamps {
     pub(crate) fn uniform(rows: usize, rate_hz: f64) -> Self {
         let seconds = (0..rows).map(|k| k as f64 / rate_hz).collect();
         Self { column: "clock.rate_hz".into(), seconds, origin: TimeOrigin::Start }
-    }
-
-    /// The instants of a timeline's rows, s since the first stamp.
-    pub(crate) fn of(&self, line: &TimeBase) -> Vec<f64> {
-        match &line.kept {
-            None => self.seconds.clone(),
-            Some(kept) => kept.iter().map(|&row| self.seconds[row as usize]).collect(),
-        }
     }
 }
 

@@ -57,7 +57,7 @@ fn clock_of_any(bytes: &[u8]) {
         assert!(end <= segment.start && segment.start <= segment.end && segment.end <= kept, "{segment:?}");
         end = segment.end;
     }
-    assert_eq!(stamps.of(&line).len(), kept);
+    assert_eq!(line.keep(stamps.seconds).len(), kept);
 }
 
 #[test]
