@@ -98,7 +98,9 @@ impl<'s> ChannelSampling<'s> {
 
     /// Whether the pages of its column hold the rows that are declared, where a row is a sample.
     pub(crate) fn check_rows(&self) -> Result<(), Error> {
-        if self.samples.rows.is_empty() { self.sheet.check_pages(&self.samples.leaf) } else { Ok(()) }
+        let SampleSelector { leaf, rows } = &self.samples;
+        let mut files = self.sheet.files.iter().filter(|_| rows.is_empty());
+        files.try_for_each(|file| file.check_pages(leaf))
     }
 
     /// The column of the channel.

@@ -242,23 +242,20 @@ impl Log {
 
     /// Names the channel that is not there: none of its columns fits, or it is lacking where others are.
     fn no_position(&self, channels: &Channels, partly: &[ActuatorColumns]) -> Result<Error, Error> {
-        let mut fewest = (usize::MAX, &channels.motor_position);
-        for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)) {
-            let name = |at: &ActuatorColumns| column_at(&map.column, &at.position);
-            let count = partly.iter().filter(|at| !at.lacking.contains(&name(at))).count();
-            if count < fewest.0 {
-                fewest = (count, map);
-            }
-        }
-        let (pattern, columns) =
-            (fewest.1.column.clone(), self.names_for(fewest.1)?.iter().cloned().collect());
+        let fitting = |map: &&ChannelMapping| {
+            let is_here = |at: &&ActuatorColumns| !at.lacking.contains(&column_at(&map.column, &at.position));
+            partly.iter().filter(is_here).count()
+        };
+        let needed = Role::NEEDED.iter().filter_map(|role| channels.of(*role));
+        let fewest = needed.min_by_key(fitting).unwrap_or(&channels.motor_position);
+        let (pattern, columns) = (fewest.column.clone(), self.names_for(fewest)?.iter().cloned().collect());
         Ok(self.main().error(ErrorKind::NoPosition { pattern, columns }))
     }
 
     /// The positions that rows or names speak of; none when neither can.
     fn position_names(&self, channels: &Channels) -> Result<Option<BTreeSet<String>>, Error> {
-        if let Some(found) = self.main().row_positions()? {
-            return Ok(Some(found));
+        if let Some(column) = &self.main().layout.position_column {
+            return Ok(Some(self.main().texts(column)?.as_ref().clone()));
         }
         let (mut is_open, mut found) = (false, BTreeSet::new());
         for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)).flat_map(ChannelMapping::choices)
@@ -404,7 +401,7 @@ impl Log {
             return normalized::read_actuator(&self.main().files[0], at.position.clone(), geometry);
         }
         let read = ActuatorReader { log: self, at, channels, geometry }.read();
-        self.tables.values().for_each(|sheet| sheet.release(at.position.as_str()));
+        self.tables.values().for_each(|sheet| sheet.partition.release(at.position.as_str()));
         read
     }
 

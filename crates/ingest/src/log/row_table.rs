@@ -44,7 +44,7 @@ pub(crate) struct RowTable {
     /// The texts of columns that name channels or positions, once they were read.
     texts: Mutex<BTreeMap<String, Arc<BTreeSet<String>>>>,
     /// The rows of each channel or actuator, where rows belong to one.
-    partition: Partition,
+    pub(crate) partition: Partition,
 }
 
 impl RowTable {
@@ -81,12 +81,6 @@ impl RowTable {
         }
         let leaves = || self.files.iter().flat_map(LogFile::leaves).map(|leaf| leaf.name.clone());
         Ok(Arc::clone(self.leaf_names.get_or_init(|| Arc::new(leaves().collect()))))
-    }
-
-    /// The positions in the position column, if the layout has one.
-    pub(crate) fn row_positions(&self) -> Result<Option<BTreeSet<String>>, Error> {
-        let column = self.layout.position_column.as_deref();
-        column.map(|column| self.texts(column).map(|texts| texts.as_ref().clone())).transpose()
     }
 
     /// The samples of a channel, of one actuator where rows belong to one.
@@ -181,11 +175,6 @@ impl RowTable {
         noted.unwrap_or(FieldMetadata::NONE).line(leaf, map).map_err(|fault| self.error(fault))
     }
 
-    /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
-    pub(crate) fn check_pages(&self, leaf: &str) -> Result<(), Error> {
-        self.files.iter().try_for_each(|file| file.check_pages(leaf))
-    }
-
     /// Whether a channel's name is here, as a leaf or in the column of names.
     fn holds(&self, samples: &SampleSelector) -> bool {
         let named = samples.rows.first().filter(|_| self.layout.name_column.is_some());
@@ -202,11 +191,6 @@ impl RowTable {
             let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
             self.partition.announce(samples, leaves.cloned(), position);
         }
-    }
-
-    /// Frees what was gathered for a position alone.
-    pub(crate) fn release(&self, position: &str) {
-        self.partition.release(position);
     }
 
     /// Whether every row of the files holds those samples.
