@@ -124,15 +124,9 @@ impl Thrift<'_> {
             // A truth value takes a byte in a list, and none as a field.
             1 | 2 => self.pass(u64::from(self.path.last() == Some(&ELEMENT))),
             3 => self.pass(1),
-            4..=6 => {
-                let number = self.varint()?;
-                self.number(number)
-            }
+            4..=6 => self.varint().and_then(|number| self.number(number)),
             7 => self.pass(8),
-            8 => {
-                let bytes = self.varint()?;
-                self.pass(bytes)
-            }
+            8 => self.varint().and_then(|bytes| self.pass(bytes)),
             9 | 10 => self.list(),
             12 => self.fields(),
             // Maps, which the format does not use.

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use arrow::array::{
     ArrayRef, Float32Array, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
 };
-use arrow::datatypes::{DataType, Field, Schema};
+use arrow::datatypes::DataType;
 use arrow::error::ArrowError;
 use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
@@ -124,12 +124,8 @@ pub(crate) fn write_batch(
 /// # Errors
 /// When the columns differ in length.
 pub fn batch(columns: &[(String, Column)]) -> Result<RecordBatch, ArrowError> {
-    let arrays: Vec<ArrayRef> = columns.iter().map(|(_, column)| column.array()).collect();
-    let field = |((name, column), array): (&(String, Column), &ArrayRef)| {
-        Field::new(name, array.data_type().clone(), column.nullable())
-    };
-    let schema = Arc::new(Schema::new(columns.iter().zip(&arrays).map(field).collect::<Vec<_>>()));
-    RecordBatch::try_new(schema, arrays)
+    let columns = columns.iter().map(|(name, column)| (name, column.array(), column.nullable()));
+    RecordBatch::try_from_iter_with_nullable(columns)
 }
 
 fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Encoding) -> WriterProperties {
