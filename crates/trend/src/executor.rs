@@ -1,19 +1,17 @@
 //! Executor: applies one function to many items, on the caller's threads. This crate has none of its own.
 
-/// Does one piece of work on each of some things.
-///
-/// Results are in the order of the items, so the assignment of items to threads does not change them.
+/// Applies one function to many items.
 pub trait Executor {
-    /// The result for each thing, in their order.
-    fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R>;
+    /// The results, in the order of the items, so that the assignment of items to threads changes none of them.
+    fn map<T: Sync, R: Send>(&self, items: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R>;
 }
 
-/// One thing after the other.
+/// One item after the other, on the caller's thread.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SerialExecutor;
 
 impl Executor for SerialExecutor {
-    fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
-        things.iter().map(work).collect()
+    fn map<T: Sync, R: Send>(&self, items: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+        items.iter().map(work).collect()
     }
 }

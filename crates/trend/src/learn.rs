@@ -16,7 +16,7 @@ use crate::wear::bank::WearLaw;
 /// Largest number of units used: more change the prior little and cost as much as their own assessments.
 const MOST_UNITS: usize = 150;
 
-/// Units a prior of nothing is worth: few, so that thirty units outvote it.
+/// Weight of the assumed shares of laws, in units: few, so that thirty units outvote it.
 const PSEUDO_UNITS: f64 = 15.0;
 
 /// The same for the spread of lives, for a new unit's gap, and for changes of installation.
@@ -151,8 +151,10 @@ impl<'a> AxisPrior<'a> {
         }
         let assumed = FleetPrior { axis, hours_per_unit, ..assumed.clone() };
         let histories = executor.map(histories, |history| history.clone().on_axis(&assumed)).into();
-        let learned = assumed.clone();
-        Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))
+        Some(
+            Self { histories, learned: assumed.clone(), assumed, evidence: f64::NEG_INFINITY }
+                .em_iterate(executor),
+        )
     }
 
     /// The same with the noise of wear that has most evidence.

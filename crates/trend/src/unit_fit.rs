@@ -20,7 +20,7 @@ pub(crate) struct Fit {
     pub(crate) method: ForecastMethod,
 }
 
-/// What the flights of a unit show.
+/// Measured state, history and wear laws of a unit.
 pub(crate) struct UnitFit<'a> {
     /// The prior of the unit's fleet.
     pub(crate) prior: FleetPrior,

@@ -1,4 +1,4 @@
-//! Scatter of a unit's values from flight to flight, which neither a step nor wear enters, and which values are outliers.
+//! Scatter of a unit's values from flight to flight, without steps and wear, and the outliers among the values.
 //!
 //! One estimator for gaps and for all other quantities.
 
@@ -15,11 +15,11 @@ const MAX_INFLATION: f64 = 8.0;
 /// Standard errors of a variance by the median of as many normal deviates, times the root of their number: two of 1.17 √2.
 const CERTAIN: f64 = 3.3;
 
-/// Values up to which a jump among them may pass for noise where stated errors count, and the most that they are believed.
+/// Among so few values a jump may pass for noise: where stated errors count, the factor of their variance is then at most this.
 const FEW: usize = 9;
 const MOST_OF_FEW: f64 = 4.0;
 
-/// Second differences are taken for the noise where they show so much less of it: the rate changes.
+/// Second differences give the variance where it is less than this share of that by first ones: there the rate changes.
 const CHANGING_RATE: f64 = 0.7;
 
 /// Neighbours on each side by which an outlier is judged, and how many of them must agree with it.
@@ -151,8 +151,8 @@ fn successive(values: &[f64], errors: &[f64]) -> Option<f64> {
     Some(bent.filter(|bent| *bent < CHANGING_RATE * found).unwrap_or(found))
 }
 
-/// The same from first differences, less their median where they are centred: wear that shows from one flight to the next is no noise, it moves all
-/// differences equally.
+/// The same from first differences, less their median where they are centred: wear moves all differences equally, and is
+/// no noise.
 fn first_differences(values: &[f64], errors: &[f64], is_centred: bool) -> Option<f64> {
     let windows = values.array_windows().zip(errors.array_windows());
     let mut ratios: Vec<f64> = windows.map(|([a, b], [ea, eb])| (b - a) / ea.hypot(*eb)).collect();

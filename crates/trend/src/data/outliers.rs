@@ -3,8 +3,7 @@
 use crate::data::noise::{Assumed, Noise, certain_inflation};
 use crate::data::series::{Flight, Gap};
 
-/// Standard errors are taken to lie between these, shares of the limit: their squares must be numbers to
-/// reckon with.
+/// Least and largest standard error, shares of the limit: their squares must neither vanish nor overflow.
 const LEAST_ERROR: f64 = 1e-5;
 const LARGEST_ERROR: f64 = 1e4;
 

@@ -10,7 +10,7 @@ const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
 /// The longest of them.
 const FARTHEST: usize = 120;
 
-/// Places passed over in the first search.
+/// Distance between the places that are tested first.
 const STRIDE: usize = 3;
 
 /// Fewest estimates on either side.

@@ -15,7 +15,7 @@ use crate::data::bins::Bin;
 /// the level.
 const DIFFUSE: f64 = 10.0;
 
-/// What the gains are made of at one bin.
+/// Gains of the filter at one bin.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     gain: f64,
@@ -36,7 +36,7 @@ pub(crate) struct Filter {
     pub(crate) start_m2: f64,
 }
 
-/// What a pass over one sequence leaves: innovations times their precision, and the level at both ends.
+/// Result of a pass over one sequence: innovations times their precision, and the level at both ends.
 #[derive(Debug, Clone)]
 pub(crate) struct Pass {
     weighted: Vec<f64>,

@@ -48,7 +48,7 @@ impl Posterior {
     }
 }
 
-/// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
+/// Fits the curves of the bank to a segment: all of them on a few bins, the likely ones on many.
 ///
 /// The level walks by a variance proportional to the wear, so the first pass assumes wear along a
 /// line and the second takes it from the first.

@@ -91,12 +91,9 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
     let last = sound.last()?;
     let present = measured_level(sound, settings.limit_m)?;
     // The last record first: a line through few records may follow it.
-    let alone = jump_at(sound, sound.len() - 1, (last.gap_m, last.error_m), &present, settings);
-    if alone.is_some() {
-        return alone;
-    }
+    let mut found = jump_at(sound, sound.len() - 1, (last.gap_m, last.error_m), &present, settings);
     let mut to = sound.len();
-    loop {
+    while found.is_none() {
         let now = measured_level(&sound[..to], settings.limit_m)?;
         let from = to - now.window.min(to);
         let first = sound.get(from)?;
@@ -104,12 +101,10 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         if from == 0 || (sound.len() - from > JUMP_RECORDS && days > settings.change_watch_days) {
             return None;
         }
-        let found = jump_at(sound, from, (now.at(first.hours), now.se_m), &present, settings);
-        if found.is_some() {
-            return found;
-        }
+        found = jump_at(sound, from, (now.at(first.hours), now.se_m), &present, settings);
         to = from;
     }
+    found
 }
 
 /// The jump from the level before a record to a level, with its standard error, from that record on.

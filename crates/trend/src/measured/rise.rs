@@ -20,7 +20,7 @@ const EACH_ERRORS: f64 = 4.0;
 /// Records of a window for each one that may be left out as wild.
 const PER_WILD: usize = 5;
 
-/// Share of the records' variance about their mean that a line leaves where they rise evenly, if not by their errors.
+/// Share of the records' variance about their mean that a line through an even rise leaves at most, whatever their errors.
 const UNEVEN: f64 = 0.12;
 /// Fewest records that rise evenly.
 const LEAST_EVEN: usize = 6;

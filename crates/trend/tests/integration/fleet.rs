@@ -63,19 +63,14 @@ fn assessment(series: &Series, as_of_us: i64, prior: Option<&FleetPrior>) -> Ass
     assess(series, as_of_us, &Settings::for_limit(LIMIT_M), prior).unwrap()
 }
 
-/// Day on which a unit has flown some hours.
-fn day_of(hours: f64) -> i64 {
-    (hours / 3.4) as i64
-}
-
 /// Median relative error and coverage of the 90 % interval at shares of life, for a fleet of one law,
 /// each assessed with a prior learned at the same share.
 fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
     let fleet: Vec<Unit> = (0..30).map(|seed| unit(seed, law, 3000)).collect();
     let (mut errors, mut covered, mut without) = (Vec::new(), 0.0, 0);
     for share in shares {
-        // Every unit cut at its own share of life, so that the prior has seen no crossing.
-        let day = |u: &Unit| day_of(share * u.crossing_hours.min(2.0 * u.life_hours));
+        // Every unit cut at its own share of life, so that the prior has seen no crossing; 3.4 h are flown in a day.
+        let day = |u: &Unit| (share * u.crossing_hours.min(2.0 * u.life_hours) / 3.4) as i64;
         let is_known = |u: &Unit, row: &Observation| row.departure_us <= day(u) * DAY_US;
         let cut = |u: &Unit| series(u.rows.iter().copied().filter(|row| is_known(u, row)));
         let known: Vec<Series> = fleet.iter().map(cut).collect();
