@@ -46,10 +46,9 @@ pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
 
 /// Opens a regular file; opening a named pipe would wait for its writer for ever.
 fn open_local(path: &Path) -> Result<File, ErrorKind> {
-    let opened = transient::with_retry(|| match std::fs::metadata(path)?.file_type() {
+    Ok(transient::with_retry(|| match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
         kind if kind.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device")),
-    });
-    Ok(opened?)
+    })?)
 }

@@ -90,13 +90,12 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn errors_of_a_share_that_comes_back_are_transient_and_missing_files_are_not() {
-        let [eintr, eio, eagain, enomem, ebusy, enfile, emfile] = [4, 5, 11, 12, 16, 23, 24];
-        let [etimedout, estale] = [110, 116];
-        for number in [eintr, eio, eagain, enomem, ebusy, enfile, emfile, etimedout, estale] {
+        // EINTR, EIO, EAGAIN, ENOMEM, EBUSY, ENFILE, EMFILE, ETIMEDOUT, ESTALE.
+        for number in [4, 5, 11, 12, 16, 23, 24, 110, 116] {
             assert!(is_transient(&io::Error::from_raw_os_error(number)), "{number}");
         }
-        let [enoent, eacces, eisdir, enospc] = [2, 13, 21, 28];
-        for number in [enoent, eacces, eisdir, enospc] {
+        // ENOENT, EACCES, EISDIR, ENOSPC.
+        for number in [2, 13, 21, 28] {
             assert!(!is_transient(&io::Error::from_raw_os_error(number)), "{number}");
         }
     }

@@ -102,8 +102,7 @@ impl LogFile {
             read.map_err(|error| footer_error(&source, error))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let footer =
-            ArrowReaderMetadata::try_new(metadata, options).map_err(|e| not_parquet(e.to_string()))?;
+        let footer = caught(|| ArrowReaderMetadata::try_new(metadata, options)).map_err(not_parquet)?;
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let mut by_name: HashMap<String, Vec<usize>> = HashMap::with_capacity(leaves.len());
         for (place, leaf) in leaves.iter().enumerate() {
