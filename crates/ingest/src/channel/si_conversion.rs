@@ -38,6 +38,15 @@ impl Geometry {
     }
 }
 
+/// No position in m, load in N or temperature reaches this: larger ones are fill values, such as the 9.97e36 of netCDF.
+const LARGEST_READING: f64 = 1e12;
+
+/// The value of a reading; missing (NaN) where it is infinite or a fill value.
+#[inline]
+pub(crate) fn reading(value: f64) -> f64 {
+    if value.abs() < LARGEST_READING { value } else { f64::NAN }
+}
+
 /// One straight line from raw to SI.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SiConversion {
@@ -48,11 +57,10 @@ pub(crate) struct SiConversion {
 }
 
 impl SiConversion {
-    /// SI value of a raw reading; an infinite reading is missing (NaN).
+    /// SI value of a raw reading; NaN where it is none.
     #[inline]
     pub(crate) fn apply(self, raw: f64) -> f64 {
-        let value = (raw * self.scale + self.offset) * self.factor + self.shift;
-        if value.is_finite() { value } else { f64::NAN }
+        reading((raw * self.scale + self.offset) * self.factor + self.shift)
     }
 
     /// The same, of raw readings on another line: `unit = raw · scale + offset`.
@@ -124,7 +132,9 @@ mod tests {
         let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
         let angle = ChannelMapping { unit: Unit::Degree, ..ChannelMapping::default() };
         let torque = ChannelMapping { unit: Unit::NewtonMetre, sign: -1, ..ChannelMapping::default() };
-        assert!((to_si("a", &angle, geometry).unwrap().apply(90.0) - 0.00125).abs() < 1e-15);
+        let in_metres = to_si("a", &angle, geometry).unwrap();
+        assert!((in_metres.apply(90.0) - 0.00125).abs() < 1e-15);
+        assert!([f64::INFINITY, 9.969_21e36, -1e30].iter().all(|fill| in_metres.apply(*fill).is_nan()));
         assert!((to_si("t", &torque, geometry).unwrap().apply(0.1) + 125.663_706_143_591_7).abs() < 1e-9);
     }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use records::Position;
 
+use crate::channel::si_conversion::reading;
 use crate::error::{Error, ErrorKind};
 use crate::log::assemble::{RawChannels, assemble};
 use crate::log::selection::SampleSelection;
@@ -47,10 +48,8 @@ impl ChannelArrays<'_> {
         let mut stamps =
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
         let line = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
-        // An infinite reading is no reading.
-        let reading = |&value: &f64| if value.is_finite() { value } else { f64::NAN };
         let [motor, screw, load] =
-            named.map(|(_, values)| line.keep(values.iter().map(reading).collect()).into());
+            named.map(|(_, values)| line.keep(values.iter().copied().map(reading).collect()).into());
         let read = RawChannels {
             motor,
             screw,
