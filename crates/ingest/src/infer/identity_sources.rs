@@ -19,7 +19,7 @@ const SOUNDS: [(IdentityField, &str); 6] = [
     (IdentityField::FlightId, "flight_id flight_leg_id flight flight_number flight_no flt_no flt leg sortie"),
     (
         IdentityField::DepartureUtc,
-        "departure_utc departure departure_time dep_time takeoff_utc takeoff off_block_utc off_block off start_utc start_time t0 \
+        "departure_utc departure departure_time dep_time takeoff_utc takeoff take_off_utc take_off_time off_time off_block_utc off_block off start_utc start_time t0 \
          date_utc flight_date date",
     ),
     (IdentityField::Position, "position actuator actuator_position surface"),
@@ -344,6 +344,7 @@ mod tests {
             ("flight-leg", IdentityField::FlightId),
             ("DEP_TIME", IdentityField::DepartureUtc),
             ("AircraftReg", IdentityField::TailNumber),
+            ("TakeOffTime", IdentityField::DepartureUtc),
             ("FLIGHT LEG NBR", IdentityField::FlightId),
             ("SurfaceName", IdentityField::Position),
         ] {

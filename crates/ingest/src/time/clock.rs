@@ -35,8 +35,8 @@ const UNORDERED_SHARE: f64 = 1.0 / 3.0;
 /// The longest pause within one flight by default, s: recorders pause for minutes, and a turnaround lasts longer.
 const MAX_GAP_S: f64 = 3600.0;
 
-/// The shortest recording on both sides of a pause that two flights have, s: a few wrong stamps are none.
-const SHORTEST_FLIGHT_S: f64 = 60.0;
+/// The shortest recording on both sides of a pause that two flights have, s: wrong stamps before a clock is set are none.
+const SHORTEST_FLIGHT_S: f64 = 30.0;
 
 /// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
 const TICK_FOLLOW_S: f64 = 10.0;
