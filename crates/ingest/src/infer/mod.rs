@@ -98,22 +98,17 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         }
     };
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
-    let clock = clock(&leaves, is_fact, epoch_of_texts);
-    let mut epoch = Epoch::None;
-    let clock = clock.map(|(name, unit)| {
-        let kind = leaves.iter().find(|leaf| leaf.name == name).map(|leaf| &leaf.kind);
-        let is_number = kind.is_some_and(DataType::is_numeric);
-        let times = if is_number { numbers(file, &name) } else { Vec::new() };
-        let unit = unit.or_else(|| unit_of_steps(&times));
-        epoch = match unit {
-            Some(unit) => epoch_of(&times, unit, is_of_day(&name)),
-            None if kind == Some(&DataType::Utf8) => epoch_of_texts(&name).unwrap_or_default(),
-            None => Epoch::None,
-        };
-        (name, unit)
-    });
+    let stamps = clock_column(&leaves, is_fact, epoch_of_texts);
+    let counted = stamps.filter(|leaf| leaf.kind.is_numeric());
+    let times = counted.map_or_else(Vec::new, |leaf| numbers(file, &leaf.name));
+    let unit = counted.and_then(|leaf| time_unit(&leaf.name).or_else(|| unit_of_steps(&times)));
+    let epoch = match (stamps, unit) {
+        (Some(leaf), Some(unit)) => epoch_of(&times, unit, is_of_day(&leaf.name)),
+        (Some(leaf), None) if leaf.kind == DataType::Utf8 => epoch_of_texts(&leaf.name).unwrap_or_default(),
+        _ => Epoch::None,
+    };
     let is_position = |name: &str| layout.position_column.as_deref() == Some(name);
-    let is_clock = |name: &str| clock.as_ref().is_some_and(|(column, _)| column == name);
+    let is_clock = |name: &str| stamps.is_some_and(|leaf| leaf.name == name);
     let texts = layout.name_column.as_deref().map(|column| table.texts(column)).transpose()?;
     let names: Vec<&str> = match &texts {
         Some(texts) => texts.iter().map(String::as_str).collect(),
@@ -149,6 +144,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         (tail, _) => tail.into_iter().collect(),
     };
     let folders = folders(path);
+    let clock = stamps.map(|leaf| (leaf.name.clone(), unit));
     Ok(InferredMapping { clock, epoch, layout, metadata, columns, by_row, folders, tails, ..found })
 }
 
@@ -220,11 +216,11 @@ fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, O
 
 /// The time column: timestamps before numbers, numbers before texts of instants, and these before texts of times of the
 /// day; names of a time before others; never a column of one value.
-fn clock(
+fn clock_column(
     leaves: &[LeafColumn],
     is_constant: impl Fn(&str) -> bool,
     epoch_of_texts: impl Fn(&str) -> Option<Epoch>,
-) -> Option<(String, Option<&'static str>)> {
+) -> Option<&LeafColumn> {
     let is_instant = |leaf: &LeafColumn| {
         matches!(leaf.kind, DataType::Timestamp(..) | DataType::Time32(_) | DataType::Time64(_))
     };
@@ -240,8 +236,7 @@ fn clock(
         _ => None,
     };
     let ranked = leaves.iter().filter_map(|leaf| Some((rank(leaf)?, leaf)));
-    let (_, best) = ranked.filter(|(_, leaf)| !is_constant(&leaf.name)).min_by_key(|(rank, _)| *rank)?;
-    Some((best.name.clone(), time_unit(&best.name).filter(|_| best.kind.is_numeric())))
+    ranked.filter(|(_, leaf)| !is_constant(&leaf.name)).min_by_key(|(rank, _)| *rank).map(|(_, leaf)| leaf)
 }
 
 /// The unit that gives the usual step of a column of times a rate between 2 and 5000 Hz; none where two units do.
