@@ -243,14 +243,10 @@ fn clock_column(
 fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
     let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
     let middle = steps.len().checked_sub(1)? / 2;
-    match *steps.select_nth_unstable_by(middle, f64::total_cmp).1 {
-        step if (2e-4..=0.5).contains(&step) => Some("s"),
-        step if (2.0..=500.0).contains(&step) => Some("ms"),
-        step if (2e3..=5e5).contains(&step) => Some("us"),
-        step if (2e6..=5e8).contains(&step) => Some("ns"),
-        step if (2e-4..=0.5).contains(&(step * DAY_S)) => Some("d"),
-        _ => None,
-    }
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let days = 2e-4 / DAY_S..=0.5 / DAY_S;
+    let known = [("s", 2e-4..=0.5), ("ms", 2.0..=500.0), ("us", 2e3..=5e5), ("ns", 2e6..=5e8), ("d", days)];
+    known.into_iter().find(|(_, steps)| steps.contains(&step)).map(|(unit, _)| unit)
 }
 
 /// Units of times, and how many seconds each is.
@@ -259,10 +255,8 @@ const UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 
 /// A column of numbers; none where it cannot be read.
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
-    match file.append_numbers(name, None, &mut values) {
-        Ok(()) => values.finish().0,
-        Err(_) => Vec::new(),
-    }
+    let read = file.append_numbers(name, None, &mut values);
+    read.map_or_else(|_| Vec::new(), |()| values.finish().0)
 }
 
 /// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie

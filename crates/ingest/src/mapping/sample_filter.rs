@@ -18,12 +18,6 @@ pub enum RawValue {
     Text(String),
 }
 
-impl From<f64> for RawValue {
-    fn from(number: f64) -> Self {
-        Self::Number(number)
-    }
-}
-
 impl RawValue {
     /// Whether a number is this value.
     #[expect(clippy::float_cmp, reason = "a raw value is compared as it was written")]

@@ -164,9 +164,9 @@ fn a_sample_that_is_not_valid_is_missing() {
         ..channel("m", Unit::Metre)
     };
     let marks: [(ArrayRef, ChannelMapping); 6] = [
-        (Arc::clone(&truth), values(vec![1.0.into()])),
+        (Arc::clone(&truth), values(vec![RawValue::Number(1.0)])),
         (truth, values(vec![RawValue::Truth(true)])),
-        (Arc::new(counts), values(vec![3.0.into(), 7.0.into()])),
+        (Arc::new(counts), values([3.0, 7.0].map(RawValue::Number).into())),
         (Arc::new(texts), values(vec![RawValue::Text("NORMAL".into())])),
         (Arc::new(short), bits.clone()),
         (Arc::new(long), bits.clone()),

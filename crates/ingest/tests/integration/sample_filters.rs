@@ -3,9 +3,10 @@
 use std::fs::{self, File};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use arrow::array::RecordBatch;
-use ingest::{ActuatorChannels, Mapping, SampleFilter};
+use arrow::array::{Int64Array, RecordBatch, StringArray, UInt8Array};
+use ingest::{ActuatorChannels, Mapping, RawValue, SampleFilter};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
@@ -60,7 +61,7 @@ fn written(folder: &Path, laid: Laid) -> PathBuf {
 
 /// The condition that a column is 1.
 fn when(column: &str) -> SampleFilter {
-    SampleFilter { column: column.into(), equals: vec![1.0.into()], ..SampleFilter::default() }
+    SampleFilter { column: column.into(), equals: vec![RawValue::Number(1.0)], ..SampleFilter::default() }
 }
 
 fn conditional(is_conditional: bool) -> Mapping {
@@ -156,7 +157,7 @@ fn a_condition_that_is_never_met_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
     let mut never = conditional(true);
-    never.channels.when[0].equals = vec![7.0.into()];
+    never.channels.when[0].equals = vec![RawValue::Number(7.0)];
     let read = read(&file, &never).unwrap();
     assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.apart == ROWS);
     assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
@@ -171,8 +172,9 @@ fn conditions_apply_to_each_actuator() {
         ("t", column(|k| k as f64 * 0.01)),
         ("a_t", column(|k| k as f64 * 0.01)),
         ("b_t", column(|k| 0.4 + k as f64 * 0.01)),
-        ("a_mode", column(|k| (k / 50) as f64)),
-        ("b_mode", column(|k| (k / 90) as f64)),
+        ("a_mode", Arc::new(UInt8Array::from_iter_values((0..100).map(|k| k / 50)))),
+        ("b_mode", Arc::new(Int64Array::from_iter_values((0..100).map(|k| k / 90)))),
+        ("phase", Arc::new(StringArray::from_iter_values((0..100).map(|k| ["climb", "cruise"][k / 50])))),
     ];
     columns.extend(["a_m", "a_s", "a_f", "b_m", "b_s", "b_f"].map(|name| (name, column(|k| k as f64))));
     let (_dir, file) = layouts::written(&columns);
@@ -185,8 +187,11 @@ fn conditions_apply_to_each_actuator() {
     };
     mapping.channels.when = vec![when("{position}_mode")];
     assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);
-    mapping.channels.when = vec![when("a_mode")];
-    assert_eq!(segments(&mapping), [vec![50..100], vec![50..100]]);
+    let cruise = SampleFilter { equals: vec![RawValue::Text("cruise".into())], ..when("phase") };
+    for of_both in [when("a_mode"), cruise] {
+        mapping.channels.when = vec![of_both];
+        assert_eq!(segments(&mapping), [vec![50..100], vec![50..100]]);
+    }
     // One column for all, on stamps of each one's own: b's come 0.4 s later.
     let timed = SampleFilter { time_column: Some("{position}_t".into()), ..when("a_mode") };
     mapping.channels.when = vec![timed];
