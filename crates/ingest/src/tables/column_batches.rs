@@ -319,7 +319,9 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
     let rows = ROWS / names.len().div_ceil(USUAL_COLUMNS).max(1);
     let reader = ReaderBuilder::new(Arc::clone(&schema)).with_format(format).with_batch_size(rows);
     let reader = reader.build_buffered(text).map_err(ErrorKind::table)?;
-    let batches = Box::new(reader.map(|batch| batch.map_err(ErrorKind::table)));
+    let unread =
+        |error| ErrorKind::table(format!("{error} (lines that are blank or comments are not counted)"));
+    let batches = Box::new(reader.map(move |batch| batch.map_err(unread)));
     Ok(Rows { schema, batches, before: 0 })
 }
 
