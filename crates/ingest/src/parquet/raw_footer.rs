@@ -175,7 +175,8 @@ impl Thrift<'_> {
             }
             let step = i64::from(head >> 4);
             number = if step == 0 { self.varint()? } else { number.saturating_add(step) };
-            *self.path.last_mut()? = number;
+            // A field numbered as an element would mislead the walk; the format has none below one.
+            *self.path.last_mut()? = Some(number).filter(|number| *number > ELEMENT)?;
             self.value(head & 0x0f)?;
         }
         self.path.pop();
