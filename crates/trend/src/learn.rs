@@ -83,12 +83,12 @@ fn read_fleet<'a>(
     as_of_us: i64,
     limit_m: f64,
     executor: &impl Executor,
-) -> Vec<History<'a>> {
+) -> Arc<[History<'a>]> {
     let uninformative = FleetPrior::uninformative(limit_m);
     let units = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
     // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
     // their first hour on lead to a fleet prior without wear.
-    executor.map(&units, |unit| History::read(*unit, None, &uninformative))
+    executor.map(&units, |unit| History::read(*unit, None, &uninformative)).into()
 }
 
 /// Assumptions before the shares of the laws are learned: the effect of an installation, and the season, which
@@ -137,7 +137,7 @@ struct AxisPrior<'a> {
 impl<'a> AxisPrior<'a> {
     /// Nothing along an axis without usage.
     fn on_axis(
-        histories: &[History<'a>],
+        histories: &Arc<[History<'a>]>,
         axis: UsageAxis,
         assumed: &FleetPrior,
         executor: &impl Executor,
@@ -150,7 +150,11 @@ impl<'a> AxisPrior<'a> {
             return None;
         }
         let assumed = FleetPrior { axis, hours_per_unit, ..assumed.clone() };
-        let histories = executor.map(histories, |history| history.clone().on_axis(&assumed)).into();
+        let histories = match axis {
+            // They are read along hours.
+            UsageAxis::Hours => Arc::clone(histories),
+            _ => executor.map(histories, |history| history.clone().on_axis(&assumed)).into(),
+        };
         Some(
             Self { histories, learned: assumed.clone(), assumed, evidence: f64::NEG_INFINITY }
                 .em_iterate(executor),
@@ -174,8 +178,10 @@ impl<'a> AxisPrior<'a> {
     /// takes effect in the next one.
     fn em_iterate(self, executor: &impl Executor) -> Self {
         let fitted = |segment: &Segment<'_>| {
-            let fitted = posterior(segment, &self.learned)?;
-            Some(Posterior { components: fitted.significant_components().copied().collect(), ..fitted })
+            let mut fitted = posterior(segment, &self.learned)?;
+            let negligible = fitted.negligible();
+            fitted.components.retain(|component| component.weight > negligible);
+            Some(fitted)
         };
         let units: Vec<Posterior> =
             executor.map(&segments(&self.histories), fitted).into_iter().flatten().collect();

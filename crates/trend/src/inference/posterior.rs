@@ -43,8 +43,13 @@ pub(crate) struct Posterior {
 impl Posterior {
     /// The components whose weight can move a quantile.
     pub(crate) fn significant_components(&self) -> impl Iterator<Item = &Component> {
-        let negligible = 2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max);
+        let negligible = self.negligible();
         self.components.iter().filter(move |n| n.weight > negligible)
+    }
+
+    /// Weight, a share of the largest, up to which a component cannot move a quantile.
+    pub(crate) fn negligible(&self) -> f64 {
+        2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max)
     }
 }
 
