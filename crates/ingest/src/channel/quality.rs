@@ -92,8 +92,8 @@ fn resolution(values: &[f64], seen: &ChannelStats) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// Stretches of at least so many samples, but not all, that repeat one value while another position travels further than
-/// `travel_m`.
+/// Stretches of `least` samples or more that repeat one value while another position travels further than `travel_m`; a
+/// channel that never changes has none.
 #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
 fn still_runs(
     values: &[f64],

@@ -479,7 +479,7 @@ impl<'c> ActuatorReader<'c> {
         Ok(ChannelSampling::new(self.log.sheet_of(map)?, map, name, self.at.position.as_str()))
     }
 
-    /// The first of redundant channels that is alive, else the first one, with what `read` gave beside it.
+    /// Reads redundant channels until one is alive, and returns it as `read` gave it; the first channel where none is alive.
     fn first_alive<T>(
         self,
         role: Role,

@@ -93,7 +93,7 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
 /// Compares the size that a page claims with its values, and returns how many it claims.
 fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Result<u32, String> {
     let is_required = chunk.column_descr().max_def_level() == 0;
-    // Values, nulls among them as far as the header tells, and encoding.
+    // The number of values, that of nulls among them where the header tells it, and the encoding.
     let claimed = match header.type_ {
         PageType::DATA_PAGE => {
             let page = header.data_page_header.as_ref();
@@ -117,8 +117,8 @@ fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Result<u32, S
     if !(0..=most).contains(&size) {
         return Err(format!("a page of {values} values claims {size} bytes"));
     }
-    // Each value lies in the page at its full width, where neither nulls nor an encoding hide it. A text takes the four
-    // bytes of its length at least.
+    // Plain and split encodings store each value that is not null at its full width; a text takes at least the four bytes
+    // of its length.
     let is_split = encoding == Encoding::BYTE_STREAM_SPLIT && width.is_some();
     let (nulls, width) = (nulls.filter(|_| is_split || encoding == Encoding::PLAIN), width.unwrap_or(4));
     let present = nulls.map_or(0, |nulls| i64::from(count) - i64::from(nulls));

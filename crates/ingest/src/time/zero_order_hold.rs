@@ -1,5 +1,6 @@
 //! A load that is recorded more slowly than the positions stands until the next one comes.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A load is held over so many of its own steps, or so many seconds if that is more.
@@ -58,19 +59,19 @@ pub(crate) fn median_sample_interval(load_n: &[f64]) -> usize {
     if !load_n.iter().any(|f| f.is_nan()) {
         return 1;
     }
-    let (mut counts, mut last) = (Vec::<usize>::new(), None);
+    // A hole of the load may be as long as the log: intervals are counted by length, and few lengths occur.
+    let (mut counts, mut last) = (BTreeMap::<usize, usize>::new(), None);
     for i in (0..load_n.len()).filter(|&i| !load_n[i].is_nan()) {
         if let Some(last) = last.replace(i) {
-            counts.resize(counts.len().max(i - last + 1), 0);
-            counts[i - last] += 1;
+            *counts.entry(i - last).or_default() += 1;
         }
     }
-    let (half, mut shorter) = (counts.iter().sum::<usize>() / 2, 0);
-    let is_middle = |count: &usize| {
-        shorter += count;
+    let (half, mut shorter) = (counts.values().sum::<usize>() / 2, 0);
+    let is_middle = |(_, count): &(&usize, &usize)| {
+        shorter += **count;
         shorter > half
     };
-    counts.iter().position(is_middle).unwrap_or(1)
+    counts.iter().find(is_middle).map_or(1, |(interval, _)| *interval)
 }
 
 #[cfg(test)]

@@ -33,8 +33,8 @@ impl<'a> UnloggedFlights<'a> {
         self.by_tail.contains_key(tail)
     }
 
-    /// Flights of a unit's installations for which it has no row, each with the index of its installation. None where no
-    /// row of the unit lies in an installation: then the table of installations says nothing about this history.
+    /// Flights of a unit's installations for which it has no row, each with the index of its installation. None if none of
+    /// the unit's rows lies in an installation: the table does not describe such a history.
     pub(crate) fn of_unit(
         &self,
         history: &History,
