@@ -166,6 +166,7 @@ pub(crate) fn all() -> Vec<Hostile> {
     let root = [text(4, "schema"), int(0x15, 1), vec![0]].concat();
     let one = [root, leaf("x", DOUBLE)].concat();
     let many = i64::from(i32::MAX);
+    let seven = [list(1, 12, 0, &[]), int(0x16, 100), int(0x16, 7), vec![0]].concat();
     let long = [&250_000_u32.to_le_bytes()[..], &vec![b'1'; 250_000]].concat();
     let codes = [levels(100_000, true), vec![1], varint(100_000 << 1), vec![0]].concat();
     let texts = [
@@ -184,6 +185,9 @@ pub(crate) fn all() -> Vec<Hostile> {
             "claims",
         ),
         hostile("nested", nested(2000), "beyond_limit", "groups inside each other"),
+        hostile("group_rows", footer(&one, 2, 10, &list(1, 12, 1, &seven)), "not_parquet", "claim 7 rows"),
+        // A truth value whose field has the number 0: as an element of a list it would take the byte after it.
+        hostile("field_zero", footer(&one, 2, 10, &[1, 0, 0]), "not_parquet", "an offset below zero"),
         hostile(
             "null_runs",
             log(DOUBLE, 0, rows, false, &page(0, rows, 11, 0, &levels(rows as u64, false))),
