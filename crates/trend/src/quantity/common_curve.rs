@@ -3,7 +3,7 @@
 //! Median polish (Tukey 1977) of weekly means: a level of each unit, and a deviation of each week. A tail counts once,
 //! so that a sensor that serves a whole aircraft moves the curve no more than one unit does.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::QuantityValue;
 use crate::math::{SD_OVER_MAD, median};
@@ -28,25 +28,32 @@ struct Cell {
     unit: usize,
     tail: usize,
     mean: f64,
+    /// Deviation of the week, as the latest sweep found it; zero in a week that too few tails flew in.
+    deviation: f64,
+}
+
+/// Deviation of a week, and the variance of its error.
+struct Deviation {
+    week: i64,
+    value: f64,
+    variance: f64,
 }
 
 impl CommonCurve {
     /// The curve of some units, each with the tail it flies on; zero with fewer than three tails.
     pub fn fit<'a>(units: impl Iterator<Item = (usize, &'a [QuantityValue])>) -> Self {
-        let cells: Vec<Cell> =
+        let mut cells: Vec<Cell> =
             units.enumerate().flat_map(|(unit, (tail, values))| cells(unit, tail, values)).collect();
-        if cells.iter().map(|cell| cell.tail).collect::<BTreeSet<_>>().len() < MIN_TAILS {
-            return Self::default();
-        }
-        let mut weeks: BTreeMap<i64, f64> = BTreeMap::new();
-        let mut left = BTreeMap::new();
+        let count = cells.last().map_or(0, |cell| cell.unit + 1);
+        // A stable sort: within a week and tail, units stay in order.
+        cells.sort_by_key(|cell| (cell.week, cell.tail));
+        let mut curve = Vec::new();
         for _ in 0..SWEEPS {
-            let levels = levels(&cells, &weeks);
-            left = by_week(&cells, &levels);
-            weeks =
-                left.iter().map(|(week, tails)| (*week, median(tails.clone()).unwrap_or_default())).collect();
+            let levels = levels(&cells, count);
+            let weeks = cells.chunk_by_mut(|a, b| a.week == b.week);
+            curve = weeks.filter_map(|of_week| deviation(of_week, &levels)).collect();
         }
-        Self { weeks: shrunk(weeks, &left) }
+        Self { weeks: shrunk(curve) }
     }
 
     /// Deviation in the week of a departure, µs since 1970 UTC; of a week that no three tails flew in, of the nearest.
@@ -66,43 +73,41 @@ fn cells(unit: usize, tail: usize, values: &[QuantityValue]) -> impl Iterator<It
         unit,
         tail,
         mean: of_week.iter().map(|v| v.value).sum::<f64>() / of_week.len() as f64,
+        deviation: 0.0,
     })
 }
 
-/// Level of each unit, the deviations of the weeks taken off.
-fn levels(cells: &[Cell], weeks: &BTreeMap<i64, f64>) -> BTreeMap<usize, f64> {
-    let mut of_unit: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+/// Level of each unit: the median of its cells less the deviations of their weeks.
+fn levels(cells: &[Cell], units: usize) -> Vec<f64> {
+    let mut of_unit = vec![Vec::new(); units];
     for cell in cells {
-        let deviation = weeks.get(&cell.week).copied().unwrap_or_default();
-        of_unit.entry(cell.unit).or_default().push(cell.mean - deviation);
+        of_unit[cell.unit].push(cell.mean - cell.deviation);
     }
-    of_unit.into_iter().filter_map(|(unit, values)| Some((unit, median(values)?))).collect()
+    of_unit.into_iter().map(|values| median(values).unwrap_or_default()).collect()
 }
 
-/// Deviation of each tail in each week that enough tails flew in.
-fn by_week(cells: &[Cell], levels: &BTreeMap<usize, f64>) -> BTreeMap<i64, Vec<f64>> {
-    let mut sums: BTreeMap<(i64, usize), (f64, f64)> = BTreeMap::new();
-    for cell in cells {
-        let sum = sums.entry((cell.week, cell.tail)).or_default();
-        *sum = (sum.0 + cell.mean - levels.get(&cell.unit).copied().unwrap_or_default(), sum.1 + 1.0);
+/// The median over the tails of a week of what they differ from the levels of their units, which its cells then keep;
+/// none of a week that too few tails flew in.
+fn deviation(of_week: &mut [Cell], levels: &[f64]) -> Option<Deviation> {
+    let of_tail = |cells: &[Cell]| {
+        let sum = cells.iter().fold(0.0, |sum, cell| sum + cell.mean - levels[cell.unit]);
+        sum / cells.len() as f64
+    };
+    let tails: Vec<f64> = of_week.chunk_by(|a, b| a.tail == b.tail).map(of_tail).collect();
+    if tails.len() < MIN_TAILS {
+        return None;
     }
-    let mut weeks: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
-    for ((week, _), (sum, count)) in sums {
-        weeks.entry(week).or_default().push(sum / count);
-    }
-    weeks.retain(|_, tails| tails.len() >= MIN_TAILS);
-    weeks
+    let value = median(tails.clone())?;
+    let spread = SD_OVER_MAD * median(tails.iter().map(|v| (v - value).abs()).collect())?;
+    of_week.iter_mut().for_each(|cell| cell.deviation = value);
+    let variance = (MEDIAN_SE * spread).powi(2) / tails.len() as f64;
+    Some(Deviation { week: of_week[0].week, value, variance })
 }
 
 /// The curve drawn to zero by as much of its variance as its errors explain.
-fn shrunk(weeks: BTreeMap<i64, f64>, left: &BTreeMap<i64, Vec<f64>>) -> BTreeMap<i64, f64> {
-    let error = |week: &i64, value: f64| {
-        let tails = left.get(week)?;
-        let spread = SD_OVER_MAD * median(tails.iter().map(|v| (v - value).abs()).collect())?;
-        Some((MEDIAN_SE * spread).powi(2) / tails.len() as f64)
-    };
-    let noise: f64 = weeks.iter().filter_map(|(week, value)| error(week, *value)).sum();
-    let seen: f64 = weeks.values().map(|value| value * value).sum();
+fn shrunk(curve: Vec<Deviation>) -> BTreeMap<i64, f64> {
+    let noise: f64 = curve.iter().map(|week| week.variance).sum();
+    let seen: f64 = curve.iter().map(|week| week.value * week.value).sum();
     let kept = if seen > 0.0 { (1.0 - noise / seen).max(0.0) } else { 0.0 };
-    weeks.into_iter().map(|(week, value)| (week, kept * value)).collect()
+    curve.into_iter().map(|week| (week.week, kept * week.value)).collect()
 }
