@@ -87,22 +87,20 @@ impl Store {
         self.tables().into_iter().chain(later).collect()
     }
 
-    /// Verifies the digests of data files, each once per store handle.
+    /// Verifies the digest of a data file, once per store handle.
     ///
     /// Neither Delta Lake nor Polars detects a changed byte of a data file.
     ///
     /// # Errors
-    /// [`Error::Damaged`] for the first file that differs.
-    pub(crate) fn check(&self, files: &[PathBuf]) -> Result<(), Error> {
+    /// [`Error::Damaged`] when it differs.
+    pub(crate) fn check(&self, file: &Path) -> Result<(), Error> {
         let verified = || self.verified.lock().unwrap_or_else(PoisonError::into_inner);
-        for file in files {
-            // The mutex is not held during the check, so that threads verify different files in parallel.
-            let is_known = verified().contains(file);
-            if !is_known {
-                self.location.fetch(file)?;
-                data_file::check(file)?;
-                verified().insert(file.clone());
-            }
+        // The mutex is not held during the check, so that threads verify different files in parallel.
+        let is_known = verified().contains(file);
+        if !is_known {
+            self.location.fetch(file)?;
+            data_file::check(file)?;
+            verified().insert(file.to_owned());
         }
         Ok(())
     }

@@ -1,7 +1,5 @@
 //! Contents of the store, and its last run.
 
-use std::path::PathBuf;
-
 use jiff::Timestamp;
 use polars::prelude::ChunkAgg;
 use records::GapRecord;
@@ -50,11 +48,9 @@ impl Store {
     /// As [`Store::scan`].
     pub fn info(&self) -> Result<Info, Error> {
         let snapshot = self.gaps.snapshot()?;
-        let files: Vec<PathBuf> = snapshot.paths().collect();
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let rows =
-            self.read_rows(&snapshot, &Query::default(), &scan::only(&GapRecord::schema(), &names)?)?;
-        let rows = frame::frame(&rows, &names)?;
+        let columns = scan::only(&GapRecord::schema(), &names)?;
+        let rows = frame::frame(&self.select(&snapshot, &Query::default(), &columns).read_all()?, &names)?;
         let departures = rows.column(names[0])?.i64()?;
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
         let runs = self.runs()?;
@@ -68,7 +64,7 @@ impl Store {
             last_departure_utc: at(departures.max()),
             logs: accounts.len(),
             failed_logs: accounts.iter().filter(|log| log.outcome == LogOutcome::Error).count(),
-            files: files.len(),
+            files: snapshot.files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,
             last_completed: last_completed(&runs, Timestamp::now()).cloned(),

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use arrow::compute::concat_batches;
 use jiff::Timestamp;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
@@ -47,7 +48,7 @@ impl Store {
         let files: Vec<PathBuf> = self.gaps.snapshot()?.paths().collect();
         let schema = GapRecord::schema();
         let schema = Arc::new(schema.project(&key_columns(&schema)?)?);
-        let rows = scan::read_files(&files, &schema, &[])?;
+        let rows = self.read_files(&files, &schema, &[])?;
         let keys = keys_of(&frame::sorted(&rows, &RecordKey::COLUMNS, None)?)?;
         let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
         let mut findings: Vec<Diagnostic> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
@@ -192,8 +193,7 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
 
 /// The column by which a reader would skip a file that holds matching rows.
 fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>, Error> {
-    let files = std::slice::from_ref(&file.path);
-    let content = scan::read_table(files, &table.schema, &[])?;
+    let content = concat_batches(&table.schema, &scan::read_file(&file.path, &table.schema, &[])?)?;
     Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
 }
 

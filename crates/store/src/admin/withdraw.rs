@@ -7,15 +7,14 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch, StringArray};
-use arrow::compute::and;
+use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray};
 use arrow::datatypes::TimestampMicrosecondType;
 use arrow::error::ArrowError;
 use records::Status;
 
 use crate::error::Error;
 use crate::read::query::Query;
-use crate::read::scan::Condition;
+use crate::read::scan::{self, Condition};
 use crate::write::writer::Writer;
 
 const COLUMNS: [&str; 7] =
@@ -59,11 +58,7 @@ fn with_status(
     undo: bool,
     flights: &mut BTreeSet<(String, i64)>,
 ) -> Result<RecordBatch, ArrowError> {
-    let mut matches = BooleanArray::from(vec![true; batch.num_rows()]);
-    for condition in conditions {
-        let column = batch.column(batch.schema_ref().index_of(condition.column)?);
-        matches = and(&matches, &condition.matches(column)?)?;
-    }
+    let matches = scan::matches(batch, conditions)?;
     let (statuses, gaps) = (batch.column(0).as_string::<i32>(), batch.column(1));
     let status = |row: usize| match (matches.value(row), undo) {
         (true, false) => Status::Withdrawn.as_str(),

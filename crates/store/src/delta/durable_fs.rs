@@ -1,6 +1,7 @@
-//! Durable local writes: content is synced before its name appears, and the folder before the call returns.
+//! Durable local writes: content is synced before its name appears, and the folder before the call returns. And listings
+//! that fail when they are not complete.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Write};
 use std::path::{Path as FsPath, PathBuf};
 
@@ -50,6 +51,21 @@ pub(crate) fn create_folder(dir: &FsPath) -> io::Result<()> {
         },
         done => done,
     }
+}
+
+/// What is in a folder, in the order of names. An entry whose `stat` fails is an error, unless it was deleted meanwhile.
+pub(crate) fn entries(dir: &FsPath) -> io::Result<Vec<(PathBuf, Metadata)>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(dir)? {
+        let path = entry?.path();
+        match std::fs::metadata(&path) {
+            Ok(data) => found.push((path, data)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", path.display()))),
+        }
+    }
+    found.sort_unstable_by(|a, b| a.0.cmp(&b.0));
+    Ok(found)
 }
 
 /// Writes and syncs the content under a temporary name; returns the folder and that name.

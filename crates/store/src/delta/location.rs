@@ -4,6 +4,7 @@
 //! [brought](Location::fetch). Data files never change under their names, so a copy is as good as the object; it is
 //! compared with its digest like any file.
 
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -35,6 +36,14 @@ struct BucketLocation {
     client: Client,
     /// Deleted with the last who reads from it.
     _copies: Arc<tempfile::TempDir>,
+}
+
+/// A file of a folder or prefix. One that is truncated or replaced differs in its size or the time it was written.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Entry {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: u64,
+    pub(crate) written: SystemTime,
 }
 
 /// What runs Delta's asynchronous library: threads of our own, which a process has that was forked from one with
@@ -226,10 +235,15 @@ impl Location {
         }
     }
 
-    /// The files right here, and when they were written.
-    pub(crate) fn entries(&self) -> Result<Vec<(PathBuf, SystemTime)>, Error> {
+    /// The files right here, in the order of names.
+    pub(crate) fn entries(&self) -> Result<Vec<Entry>, Error> {
         let Some(bucket) = &self.bucket else {
-            return local(&self.dir).map_err(Error::io(&self.dir, "read"));
+            let found = durable_fs::entries(&self.dir).map_err(Error::io(&self.dir, "read"))?;
+            let entry = |(path, data): (PathBuf, Metadata)| {
+                let written = data.modified().map_err(Error::io(&path, "read"))?;
+                Ok(Entry { path, bytes: data.len(), written })
+            };
+            return found.into_iter().map(entry).collect();
         };
         let (prefix, mut found) = (joined(bucket.address.key(), ""), Vec::new());
         object_io::list(&bucket.address, |entry| {
@@ -237,7 +251,8 @@ impl Location {
             let name = name.as_ref().and_then(|address| address.key().strip_prefix(&prefix));
             let written =
                 UNIX_EPOCH + Duration::from_nanos(u64::try_from(entry.modified_utc_ns).unwrap_or_default());
-            found.extend(name.filter(|n| !n.contains('/')).map(|name| (self.dir.join(name), written)));
+            let entry = |name| Entry { path: self.dir.join(name), bytes: entry.size_bytes, written };
+            found.extend(name.filter(|name| !name.contains('/')).map(entry));
         })?;
         Ok(found)
     }
@@ -265,15 +280,4 @@ impl BucketLocation {
 
 fn joined(folder: &str, name: &str) -> String {
     if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
-}
-
-fn local(dir: &Path) -> std::io::Result<Vec<(PathBuf, SystemTime)>> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(dir)? {
-        let path = entry?.path();
-        // One that is gone by now needs no more care.
-        let written = std::fs::metadata(&path).and_then(|data| data.modified());
-        found.extend(written.ok().map(|written| (path, written)));
-    }
-    Ok(found)
 }

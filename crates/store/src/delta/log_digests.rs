@@ -2,11 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use serde_json::{Map, Value};
 
-use crate::delta::location::Location;
+use crate::delta::location::{Entry, Location};
 use crate::delta::log_storage::{DIGESTS, LOG, log_file, version};
 use crate::error::Error;
 
@@ -35,11 +34,11 @@ impl LogDigests {
     /// Lists both folders.
     pub(crate) fn list(table: &Location) -> Result<Self, Error> {
         let mut files = BTreeMap::new();
-        for (path, _) in table.join(LOG).entries()? {
+        for Entry { path, .. } in table.join(LOG).entries()? {
             files.extend(log_file(&path).map(|name| (name.to_owned(), path.clone())));
         }
         let mut digests: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        for (path, _) in digest_entries(table)? {
+        for Entry { path, .. } in digest_entries(table)? {
             if let Some((name, digest)) = split(&path) {
                 digests.entry(name.to_owned()).or_default().insert(digest.to_owned());
             }
@@ -115,7 +114,7 @@ pub(crate) fn add(table: &Location, file: &Path) -> Result<(), Error> {
 pub(crate) fn prune(table: &Location) -> Result<(), Error> {
     let listed = LogDigests::list(table)?;
     let oldest = listed.files.keys().filter_map(|name| version(name)).min();
-    for (path, _) in digest_entries(table)? {
+    for Entry { path, .. } in digest_entries(table)? {
         if split(&path).is_some_and(|(name, _)| version(name) < oldest) {
             table.delete(&path)?;
         }
@@ -123,7 +122,7 @@ pub(crate) fn prune(table: &Location) -> Result<(), Error> {
     Ok(())
 }
 
-fn digest_entries(table: &Location) -> Result<Vec<(PathBuf, SystemTime)>, Error> {
+fn digest_entries(table: &Location) -> Result<Vec<Entry>, Error> {
     let folder = table.join(DIGESTS);
     // A table of an earlier release has no such folder.
     if !folder.is_bucket() && !table.has(DIGESTS)? {

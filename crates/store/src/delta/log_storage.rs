@@ -11,20 +11,22 @@
 //!
 //! `object_store` 0.13 does not sync, so a power cut can leave the name of a commit on an empty file.
 
+use std::ffi::OsStr;
 use std::fmt;
+use std::fs::Metadata;
 use std::io;
-use std::path::Path as FsPath;
+use std::path::{Path as FsPath, PathBuf};
 use std::sync::Arc;
 
 use async_trait::async_trait;
 use deltalake::logstore::object_store::local::LocalFileSystem;
 use deltalake::logstore::object_store::path::Path;
 use deltalake::logstore::object_store::{
-    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
-    ObjectStoreExt, PutMode, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
+    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore, PutMode,
+    PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
+use futures::StreamExt;
 use futures::stream::{self, BoxStream};
-use futures::{StreamExt, TryStreamExt};
 
 use crate::delta::durable_fs;
 
@@ -80,40 +82,34 @@ impl LogStorage {
         }
         Ok(PutResult { e_tag: None, version: None })
     }
+}
 
-    /// Adds the files of the folder that `object_store` leaves out because their `stat` fails, or fails: without the last
-    /// commit, a table would be read as it was before.
-    fn complete(
-        &self,
-        prefix: Option<&Path>,
-        offset: Option<&Path>,
-        listed: BoxStream<'static, Result<ObjectMeta>>,
-    ) -> BoxStream<'static, Result<ObjectMeta>> {
-        let Some(files) = self.local.clone() else { return listed };
-        let prefix = prefix.cloned().unwrap_or_default();
-        let offset = offset.cloned();
-        stream::once(async move {
-            let mut listed: Vec<ObjectMeta> = listed.try_collect().await?;
-            listed.sort_unstable_by(|a, b| a.location.cmp(&b.location));
-            let is_listed =
-                |location: &Path| listed.binary_search_by(|found| found.location.cmp(location)).is_ok();
-            let mut left_out = names(&files.path_to_filesystem(&prefix)?).map_err(failed)?;
-            left_out.retain(|name| {
-                let location = prefix.clone().join(name.as_str());
-                offset.as_ref().is_none_or(|offset| location > *offset) && !is_listed(&location)
-            });
-            for name in left_out {
-                match files.head(&prefix.clone().join(name)).await {
-                    Ok(found) => listed.push(found),
-                    // A folder, or removed by now.
-                    Err(Error::NotFound { .. }) => {}
-                    Err(error) => return Err(error),
-                }
-            }
-            Ok(stream::iter(listed.into_iter().map(Ok)))
-        })
-        .try_flatten()
-        .boxed()
+/// The files of a folder, after `offset` where there is one. `LocalFileSystem` would leave out those whose `stat` fails:
+/// without the last commit, a table would be read as it was before.
+fn list_folder(
+    files: &LocalFileSystem,
+    prefix: Option<&Path>,
+    offset: Option<&Path>,
+) -> BoxStream<'static, Result<ObjectMeta>> {
+    let prefix = prefix.cloned().unwrap_or_default();
+    let meta = |(path, data): (PathBuf, Metadata)| -> Result<Option<ObjectMeta>> {
+        let name = path.file_name().and_then(OsStr::to_str);
+        // A number after a hash sign ends the name of a staged file.
+        let Some(name) = name.filter(|name| data.is_file() && !name.contains('#')) else { return Ok(None) };
+        let last_modified = data.modified().map_err(failed)?.into();
+        let location = prefix.clone().join(name);
+        Ok(Some(ObjectMeta { location, last_modified, size: data.len(), e_tag: None, version: None }))
+    };
+    let listed = || -> Result<Vec<ObjectMeta>> {
+        match durable_fs::entries(&files.path_to_filesystem(&prefix)?) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+            found => found.map_err(failed)?.into_iter().filter_map(|entry| meta(entry).transpose()).collect(),
+        }
+    };
+    let is_after = |found: &ObjectMeta| offset.is_none_or(|offset| found.location > *offset);
+    match listed() {
+        Ok(listed) => stream::iter(listed.into_iter().filter(is_after).map(Ok).collect::<Vec<_>>()).boxed(),
+        Err(error) => stream::iter([Err(error)]).boxed(),
     }
 }
 
@@ -131,17 +127,6 @@ fn digest_location(location: &Path, payload: &PutPayload) -> Option<Path> {
 
 fn failed(source: io::Error) -> Error {
     Error::Generic { store: "durable", source: Box::new(source) }
-}
-
-/// Names in a folder, without those of staged files; none when the folder does not exist.
-fn names(folder: &FsPath) -> io::Result<Vec<String>> {
-    let entries = match std::fs::read_dir(folder) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries?,
-    };
-    let names: io::Result<Vec<_>> = entries.map(|entry| Ok(entry?.file_name())).collect();
-    let names = names?.into_iter().filter_map(|name| name.into_string().ok());
-    Ok(names.filter(|name| !name.contains('#')).collect())
 }
 
 impl fmt::Display for LogStorage {
@@ -176,7 +161,10 @@ impl ObjectStore for LogStorage {
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.complete(prefix, None, self.inner.list(prefix))
+        match &self.local {
+            Some(files) => list_folder(files, prefix, None),
+            None => self.inner.list(prefix),
+        }
     }
 
     fn list_with_offset(
@@ -184,7 +172,10 @@ impl ObjectStore for LogStorage {
         prefix: Option<&Path>,
         offset: &Path,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.complete(prefix, Some(offset), self.inner.list_with_offset(prefix, offset))
+        match &self.local {
+            Some(files) => list_folder(files, prefix, Some(offset)),
+            None => self.inner.list_with_offset(prefix, offset),
+        }
     }
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
@@ -198,47 +189,29 @@ impl ObjectStore for LogStorage {
 
 #[cfg(test)]
 mod tests {
+    use futures::TryStreamExt;
+
     use super::*;
 
-    /// A listing without a file, as `object_store` gives it when the `stat` of the file fails.
     #[tokio::test]
-    async fn a_file_that_a_listing_leaves_out_is_looked_for() {
+    async fn a_folder_is_listed_after_an_offset_without_staged_files_and_folders() {
         let dir = tempfile::tempdir().unwrap();
-        let commits = ["00000.json", "00001.json", "00002.json"];
-        for name in commits.iter().chain(&["00003.json#7"]) {
+        for name in ["00002.json", "00000.json", "00001.json", "00003.json#7"] {
             std::fs::write(dir.path().join(name), name).unwrap();
         }
         std::fs::create_dir(dir.path().join("sidecars")).unwrap();
         let prefix = Path::from_filesystem_path(dir.path()).unwrap();
-        let files = LogStorage::folder();
-        let listed = async |offset: Option<&Path>, left_out: &str| {
-            let inner = files.inner.list(Some(&prefix)).try_collect::<Vec<_>>().await.unwrap();
-            let kept: Vec<_> = inner
-                .into_iter()
-                .filter(|found| found.location.filename() != Some(left_out))
-                .map(Ok)
-                .collect();
-            let found = files.complete(Some(&prefix), offset, stream::iter(kept).boxed());
-            let found: Vec<ObjectMeta> = found.try_collect().await.unwrap();
-            let mut names: Vec<_> =
-                found.iter().map(|file| (file.location.filename().unwrap().to_owned(), file.size)).collect();
-            names.sort();
-            names
-        };
-        let wanted = commits.map(|name| (name.to_owned(), 10));
-        assert_eq!(listed(None, "").await, wanted);
-        assert_eq!(listed(None, "00002.json").await, wanted);
-        let offset = prefix.clone().join("00000.json");
-        assert_eq!(listed(Some(&offset), "00000.json").await, wanted[1..]);
-    }
-
-    #[test]
-    fn a_folder_that_is_gone_has_no_names_and_one_that_cannot_be_listed_is_an_error() {
-        let dir = tempfile::tempdir().unwrap();
-        assert_eq!(names(&dir.path().join("gone")).unwrap(), Vec::<String>::new());
-        let file = dir.path().join("file");
-        std::fs::write(&file, "").unwrap();
-        assert_eq!(names(&file).unwrap_err().kind(), io::ErrorKind::NotADirectory);
+        let (files, offset) = (LogStorage::folder(), prefix.clone().join("00000.json"));
+        let listed: Vec<ObjectMeta> = files.list(Some(&prefix)).try_collect().await.unwrap();
+        let after: Vec<ObjectMeta> =
+            files.list_with_offset(Some(&prefix), &offset).try_collect().await.unwrap();
+        let names: Vec<_> = listed.iter().map(|file| file.location.filename().unwrap()).collect();
+        assert_eq!(names, ["00000.json", "00001.json", "00002.json"]);
+        assert_eq!(after, listed[1..]);
+        let gone = files.list(Some(&prefix.join("gone"))).try_collect::<Vec<_>>().await;
+        assert_eq!(gone.unwrap(), []);
+        let file = LogStorage::folder().list(Some(&offset)).try_collect::<Vec<_>>().await;
+        assert!(file.is_err(), "a folder that cannot be listed");
     }
 
     /// A loop of links has a `stat` that fails for another reason than that the file is gone.
@@ -249,9 +222,8 @@ mod tests {
         let looped = dir.path().join("00001.json");
         std::os::unix::fs::symlink(&looped, &looped).unwrap();
         let prefix = Path::from_filesystem_path(dir.path()).unwrap();
-        let files = LogStorage::folder();
-        let listed = files.complete(Some(&prefix), None, stream::empty().boxed());
-        let error = listed.try_collect::<Vec<_>>().await.unwrap_err().to_string();
+        let listed = LogStorage::folder().list(Some(&prefix)).try_collect::<Vec<_>>().await;
+        let error = listed.unwrap_err().to_string();
         assert!(error.contains("os error") && error.contains("00001.json"), "{error}");
     }
 }

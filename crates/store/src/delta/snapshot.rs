@@ -22,6 +22,12 @@ impl Snapshot {
     pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
         self.files.iter().map(|file| file.path.clone())
     }
+
+    /// Paths of the data files that hold rows, and may hold some that a function looks for in their statistics.
+    pub(crate) fn paths_where(&self, may_be_in: impl Fn(&Stats) -> bool) -> Vec<PathBuf> {
+        let files = self.files.iter().filter(|file| file.has_rows() && may_be_in(&file.stats));
+        files.map(|file| file.path.clone()).collect()
+    }
 }
 
 /// Data file as recorded in the log.

@@ -18,9 +18,9 @@ use jiff::Timestamp;
 
 use crate::delta::data_file;
 use crate::delta::file_stats::Stats;
-use crate::delta::location::Location;
+use crate::delta::location::{Entry, Location};
 use crate::delta::log_digests::{self, LogDigests};
-use crate::delta::log_storage::LOG;
+use crate::delta::log_storage::{LOG, log_file};
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
 use crate::error::Error;
@@ -267,7 +267,7 @@ impl Table {
         let commits = self.commit_times()?;
         let is_due = |since| kept.is_zero() || is_older(since, &commits, kept);
         let mut deleted = 0;
-        for (path, written) in self.location.entries()?.into_iter().filter(|(path, _)| is_data(path)) {
+        for Entry { path, written, .. } in self.location.entries()?.into_iter().filter(|e| is_data(&e.path)) {
             let since = superseded.get(&path).copied().unwrap_or(written);
             if !active.contains(path.as_path()) && is_due(since) {
                 self.location.delete(&path)?;
@@ -281,13 +281,11 @@ impl Table {
     /// When the commits that the log remembers were written, in their order, and the time now.
     fn commit_times(&self) -> Result<Vec<SystemTime>, Error> {
         let log = self.location.join("_delta_log").entries()?;
-        let commit = |(path, written): (PathBuf, SystemTime)| {
-            let name = path.file_name()?.to_str()?.strip_suffix(".json")?.parse::<u64>().ok()?;
-            Some((name, written))
+        let is_commit = |entry: &Entry| {
+            log_file(&entry.path).is_some() && entry.path.extension().is_some_and(|kind| kind == "json")
         };
-        let mut commits: Vec<(u64, SystemTime)> = log.into_iter().filter_map(commit).collect();
-        commits.sort_unstable();
-        Ok(commits.into_iter().map(|(_, written)| written).chain([SystemTime::now()]).collect())
+        let commits = log.into_iter().filter(is_commit).map(|entry| entry.written);
+        Ok(commits.chain([SystemTime::now()]).collect())
     }
 
     /// When each file that the log still remembers was superseded.

@@ -1,32 +1,51 @@
-//! Scan of selected columns of the records, file by file, for callers that read all records.
+//! Scan of the matching records, file by file: the columns that a query needs, with the bookkeeping joined to the rows.
 //!
 //! A whole fleet's records are tens of millions of rows with repeated names, so text columns remain dictionaries as
 //! stored, numbers are not copied, and a caller with threads may read several files at once.
+//!
+//! Part and serial number, and hours, are bookkeeping: a caller that knows the operator's tables joins them when it
+//! reads ([`Store::joined`]), so that a corrected table counts at once. What was written with the records is what other
+//! programs read.
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{AsArray, Float64Array, RecordBatch};
 use arrow::compute::kernels::numeric::{add, mul, sub};
 use arrow::compute::kernels::zip::zip;
-use arrow::compute::{and_kleene, cast, is_not_null};
-use arrow::datatypes::DataType;
+use arrow::compute::{and_kleene, cast, filter_record_batch, is_not_null};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
-use records::GapRecord;
 use records::uncertainty::NORMAL_95;
+use records::{GapRecord, Status};
 
+use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
 use crate::handle::Store;
+use crate::read::join::Join;
 use crate::read::query::Query;
-use crate::read::scan;
-use crate::read::selection::Selection;
+use crate::read::scan::{self, Condition};
+
+/// Columns that bookkeeping supplies.
+const JOINED: [&str; 2] = ["part_number", "serial_number"];
+/// Columns that a join needs besides those that it supplies.
+const NEEDED: [&str; 4] = ["tail_number", "position", "departure_utc", "flight_id"];
 
 /// Files that may hold records that fit, of one version of the table.
 #[derive(Debug)]
 pub struct ColumnScan {
     store: Store,
-    selection: Selection,
+    files: Vec<PathBuf>,
     version: u64,
+    /// Columns of the result.
+    wanted: SchemaRef,
+    /// Columns that are read: those of the result, and those that the join and the conditions after it need.
+    read: SchemaRef,
+    /// Conditions on stored columns.
+    stored: Vec<Condition>,
+    /// Conditions on joined columns.
+    joined: Vec<Condition>,
 }
 
 impl Store {
@@ -40,16 +59,44 @@ impl Store {
         let is_replaced = !self.parts_by_largest_gap.is_empty() && names.contains(&"gap_m");
         let needed = LARGEST.into_iter().filter(|name| is_replaced && !names.contains(name));
         let names: Vec<&str> = names.iter().copied().chain(needed).collect();
-        let (snapshot, schema) = (self.gaps.snapshot()?, scan::only(&GapRecord::schema(), &names)?);
-        let selection = Selection::of(self, &snapshot, query, &schema);
-        Ok(ColumnScan { store: self.clone(), selection, version: snapshot.version })
+        Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), &names)?))
+    }
+
+    /// The same of one version of the table.
+    pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query, wanted: &SchemaRef) -> ColumnScan {
+        let is_joined = |column: &str| self.join.is_some() && JOINED.contains(&column);
+        let (joined, mut stored): (Vec<_>, Vec<_>) =
+            query.conditions().into_iter().partition(|condition| is_joined(condition.column));
+        let files = snapshot.paths_where(|stats| stored.iter().all(|condition| condition.may_be_in(stats)));
+        let withdrawn = Status::Withdrawn.as_str();
+        if snapshot.files.iter().any(|file| file.stats.may_hold("status", withdrawn, withdrawn)) {
+            stored.push(not_withdrawn());
+        }
+        let read = if self.join.is_some() { widened(wanted) } else { Arc::clone(wanted) };
+        let (store, version) = (self.clone(), snapshot.version);
+        ColumnScan { store, files, version, wanted: Arc::clone(wanted), read, stored, joined }
+    }
+
+    /// The same store, which joins bookkeeping to every record that it reads.
+    #[must_use]
+    pub fn joined(mut self, join: Join) -> Self {
+        self.join = Some(join);
+        self
+    }
+
+    /// The same store, whose [scans](Store::scan_columns) read the largest gap along the stroke as the gap of these parts, where
+    /// the gap varies.
+    #[must_use]
+    pub fn by_largest_gap(mut self, parts: BTreeSet<String>) -> Self {
+        self.parts_by_largest_gap = parts;
+        self
     }
 }
 
 impl ColumnScan {
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.selection.files.len()
+        self.files.len()
     }
 
     /// Version of the store that they are of.
@@ -59,7 +106,7 @@ impl ColumnScan {
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.selection.files.is_empty()
+        self.files.is_empty()
     }
 
     /// The rows of one that fit, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.
@@ -68,15 +115,48 @@ impl ColumnScan {
     /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
     /// [`Error::Arrow`] when it cannot be read.
     pub fn read(&self, part: usize) -> Result<Vec<RecordBatch>, Error> {
-        let path = &self.selection.files[part];
-        self.store.check(std::slice::from_ref(path))?;
-        let rows = self.selection.read_file(path)?;
+        let rows = self.read_file(&self.files[part])?;
         let parts = &self.store.parts_by_largest_gap;
         if parts.is_empty() {
             return Ok(rows);
         }
         rows.into_iter().map(|batch| Ok(with_largest_gaps(batch, parts)?)).collect()
     }
+
+    /// The rows of all that fit, each with its own gap, in one batch or more.
+    pub(crate) fn read_all(&self) -> Result<Vec<RecordBatch>, Error> {
+        // A joined condition applies to each file as soon as it is read, or all rows of the store would be held.
+        scan::read_each(&self.files, &self.wanted, |file| self.read_file(file))
+    }
+
+    fn read_file(&self, file: &Path) -> Result<Vec<RecordBatch>, Error> {
+        let rows = self.store.read_file(file, &self.read, &self.stored)?;
+        let Some(join) = &self.store.join else { return Ok(rows) };
+        rows.iter().map(|batch| Ok(self.finish(&join.apply(batch)?)?)).collect()
+    }
+
+    /// The matching rows and the wanted columns of a batch after the join.
+    fn finish(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+        let batch = filter_record_batch(batch, &scan::matches(batch, &self.joined)?)?;
+        let columns = self.wanted.fields().iter().map(|field| batch.schema_ref().index_of(field.name()));
+        let columns = batch.project(&columns.collect::<Result<Vec<_>, _>>()?)?.columns().to_vec();
+        RecordBatch::try_new(Arc::clone(&self.wanted), columns)
+    }
+}
+
+/// Records that are not withdrawn.
+pub(crate) fn not_withdrawn() -> Condition {
+    Condition::texts("status", Status::Estimated.as_str(), Status::Refused.as_str())
+}
+
+/// The columns and those that a join needs; the latter as dictionaries where they are text.
+fn widened(wanted: &SchemaRef) -> SchemaRef {
+    let all = GapRecord::schema();
+    let missing = NEEDED.iter().chain(&JOINED).filter(|name| wanted.field_with_name(name).is_err());
+    let missing = missing.filter_map(|name| all.field_with_name(name).ok()).map(scan::coded);
+    let fields: Vec<Field> =
+        wanted.fields().iter().map(|field| field.as_ref().clone()).chain(missing).collect();
+    Arc::new(Schema::new(fields))
 }
 
 /// The columns that [`with_largest_gaps`] needs.
@@ -106,14 +186,4 @@ fn with_largest_gaps(batch: RecordBatch, parts: &BTreeSet<String>) -> Result<Rec
         }
     }
     RecordBatch::try_new(batch.schema(), columns)
-}
-
-impl Store {
-    /// The same store, whose [scans](Store::scan_columns) read the largest gap along the stroke as the gap of these parts, where
-    /// the gap varies.
-    #[must_use]
-    pub fn by_largest_gap(mut self, parts: BTreeSet<String>) -> Self {
-        self.parts_by_largest_gap = parts;
-        self
-    }
 }

@@ -3,10 +3,9 @@
 //! Only the columns that rows are ordered or grouped by become Polars columns. Polars returns the rows' numbers, and the
 //! rows themselves remain in Arrow.
 
-use arrow::array::{ArrayRef, AsArray, DictionaryArray, RecordBatch, StringArray};
-use arrow::compute::interleave_record_batch;
-use arrow::datatypes::{DataType, Int32Type, Int64Type, TimestampMicrosecondType};
-use arrow::error::ArrowError;
+use arrow::array::{ArrayRef, AsArray, RecordBatch};
+use arrow::compute::{cast, interleave_record_batch};
+use arrow::datatypes::{DataType, Int64Type};
 use polars::prelude::{
     Column, DataFrame, Int64Chunked, IntoColumn, NewChunkedArray, SortMultipleOptions, StringChunked,
 };
@@ -19,7 +18,7 @@ const ROW: &str = "row";
 /// Some columns of batches of one schema; times are microseconds.
 ///
 /// # Errors
-/// [`Error::Arrow`] for a column that is not there, or has another type than text, time or whole number.
+/// [`Error::Arrow`] for a column that is not there, or cannot be a text.
 pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame, Error> {
     let height = batches.iter().map(RecordBatch::num_rows).sum();
     let columns = names.iter().map(|name| column(batches, name));
@@ -27,35 +26,18 @@ pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame
 }
 
 fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
-    let arrays = batches.iter().map(|batch| Ok(batch.column(batch.schema_ref().index_of(name)?)));
-    let arrays: Vec<&ArrayRef> = arrays.collect::<Result<_, ArrowError>>()?;
-    Ok(match arrays.first().map(|array| array.data_type()) {
-        Some(DataType::Utf8 | DataType::Dictionary(..)) => {
-            StringChunked::from_iter_options(name.into(), arrays.iter().flat_map(|array| texts(array)))
-                .into_column()
-        }
-        Some(DataType::Int64) => {
-            let numbers = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>());
-            Int64Chunked::from_iter_options(name.into(), numbers).into_column()
-        }
-        Some(DataType::Timestamp(..)) => {
-            let times = arrays.iter().flat_map(|array| array.as_primitive::<TimestampMicrosecondType>());
-            Int64Chunked::from_iter_options(name.into(), times).into_column()
-        }
-        _ => {
-            let problem = format!("column `{name}` cannot be ordered or grouped by");
-            return Err(ArrowError::NotYetImplemented(problem).into());
-        }
-    })
-}
-
-/// Texts, plain or as a dictionary.
-fn texts(array: &ArrayRef) -> Box<dyn Iterator<Item = Option<&str>> + '_> {
-    let coded = array.as_dictionary_opt::<Int32Type>();
-    match coded.and_then(DictionaryArray::downcast_dict::<StringArray>) {
-        Some(coded) => Box::new(coded.into_iter()),
-        None => Box::new(array.as_string::<i32>().iter()),
+    let array = |batch: &RecordBatch| {
+        let array = batch.column(batch.schema_ref().index_of(name)?);
+        let is_number = matches!(array.data_type(), DataType::Int64 | DataType::Timestamp(..));
+        cast(array, if is_number { &DataType::Int64 } else { &DataType::Utf8 })
+    };
+    let arrays: Vec<ArrayRef> = batches.iter().map(array).collect::<Result<_, _>>()?;
+    if arrays.first().is_some_and(|array| array.data_type() == &DataType::Int64) {
+        let numbers = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>());
+        return Ok(Int64Chunked::from_iter_options(name.into(), numbers).into_column());
     }
+    let texts = arrays.iter().flat_map(|array| array.as_string::<i32>());
+    Ok(StringChunked::from_iter_options(name.into(), texts).into_column())
 }
 
 /// The rows of batches in one, ordered by some columns; rows that are equal in all of them keep their order. Only the

@@ -4,17 +4,15 @@
 //! for them that was a third of what a run with nothing to do takes.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-use arrow::array::AsArray;
+use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::Int64Type;
 
-use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::scan::{self, Condition};
+use crate::read::scan::Condition;
 use records::row_schema::{self, FromCells, Row};
 
 impl Store {
@@ -28,36 +26,32 @@ impl Store {
         wanted: &[Condition],
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
-        let snapshot = table.snapshot()?;
-        let may_hold = |file: &&DataFile| file.has_rows() && wanted.iter().all(|w| w.may_be_in(&file.stats));
-        let files: Vec<PathBuf> =
-            snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
-        self.check(&files)?;
-        newest_of(&files, wanted, name)
+        let schema = versioned::schema::<R>();
+        let files = table.snapshot()?.paths_where(|stats| wanted.iter().all(|w| w.may_be_in(stats)));
+        let mut newest = BTreeMap::new();
+        for file in files {
+            for batch in self.read_file(&file, &schema, wanted)? {
+                update(&mut newest, &batch, &name)?;
+            }
+        }
+        Ok(newest.into_values().map(|(_, row)| row).collect())
     }
 }
 
-fn newest_of<R: Row + FromCells>(
-    files: &[PathBuf],
-    wanted: &[Condition],
+/// Puts the rows of a batch in the place of older ones of their names. Each row has the commit that it came with.
+fn update<R: Row + FromCells>(
+    newest: &mut BTreeMap<String, (i64, R)>,
+    batch: &RecordBatch,
     name: impl Fn(&R) -> String,
-) -> Result<Vec<R>, Error> {
-    let schema = versioned::schema::<R>();
-    let commit_column = schema.index_of(versioned::COMMIT)?;
-    // By name: the row, and the commit that it came with.
-    let mut newest: BTreeMap<String, (i64, R)> = BTreeMap::new();
-    for file in files {
-        for batch in scan::read_file(file, &schema, wanted)? {
-            let commits = batch.column(commit_column).as_primitive::<Int64Type>();
-            for (&commit, row) in commits.values().iter().zip(row_schema::from_batch::<R>(&batch)?) {
-                let name = name(&row);
-                if newest.get(&name).is_none_or(|(known, _)| *known <= commit) {
-                    newest.insert(name, (commit, row));
-                }
-            }
+) -> Result<(), Error> {
+    let commits = batch.column(batch.schema_ref().index_of(versioned::COMMIT)?).as_primitive::<Int64Type>();
+    for (&commit, row) in commits.values().iter().zip(row_schema::from_batch::<R>(batch)?) {
+        let name = name(&row);
+        if newest.get(&name).is_none_or(|(known, _)| *known <= commit) {
+            newest.insert(name, (commit, row));
         }
     }
-    Ok(newest.into_values().map(|(_, row)| row).collect())
+    Ok(())
 }
 
 #[cfg(test)]
@@ -65,10 +59,11 @@ mod tests {
     use std::fs::File;
     use std::sync::Arc;
 
-    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, RecordBatch, TimestampNanosecondArray};
+    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, TimestampNanosecondArray};
     use parquet::arrow::ArrowWriter;
 
     use super::*;
+    use crate::read::scan;
     use records::RunRecord;
 
     /// Runs as another program may write them: long texts, nanoseconds, columns in another order and one of its own,
@@ -92,15 +87,18 @@ mod tests {
     }
 
     fn taken(batches: &[RecordBatch]) -> Result<Vec<(String, i64)>, Error> {
-        let dir = tempfile::tempdir().unwrap();
-        let files: Vec<PathBuf> = (0..batches.len()).map(|k| dir.path().join(k.to_string())).collect();
-        for (path, batch) in files.iter().zip(batches) {
-            let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), None).unwrap();
+        let (dir, mut newest) = (tempfile::tempdir().unwrap(), BTreeMap::new());
+        let path = dir.path().join("file");
+        for batch in batches {
+            let mut writer =
+                ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), None).unwrap();
             writer.write(batch).unwrap();
             writer.close().unwrap();
+            for batch in scan::read_file(&path, &versioned::schema::<RunRecord>(), &[])? {
+                update(&mut newest, &batch, |run: &RunRecord| run.run_id.clone())?;
+            }
         }
-        let newest = newest_of(&files, &[], |run: &RunRecord| run.run_id.clone())?;
-        Ok(newest.into_iter().map(|run| (run.run_id, run.found)).collect())
+        Ok(newest.into_values().map(|(_, run)| (run.run_id, run.found)).collect())
     }
 
     #[test]

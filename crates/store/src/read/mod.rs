@@ -6,5 +6,4 @@ pub(crate) mod join;
 pub(crate) mod latest_rows;
 pub(crate) mod query;
 pub(crate) mod scan;
-pub(crate) mod selection;
 pub(crate) mod store_read;

@@ -1,7 +1,6 @@
 //! Scan of data files: the wanted columns of the matching rows, as Arrow.
 //!
-//! Row groups whose statistics rule out a condition are not decoded. A column of a later release is empty, and a column
-//! that this release does not know is not read.
+//! A column of a later release is empty, and a column that this release does not know is not read.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -12,12 +11,11 @@ use arrow::array::{
     Array, ArrayRef, AsArray, BooleanArray, RecordBatch, Scalar, StringArray, TimestampMicrosecondArray,
     new_null_array,
 };
-use arrow::compute::kernels::cmp::{gt, gt_eq, lt, lt_eq};
-use arrow::compute::{and, cast, concat_batches, nullif};
+use arrow::compute::kernels::cmp::{gt_eq, lt_eq};
+use arrow::compute::{and, cast, nullif};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::statistics::StatisticsConverter;
 use parquet::arrow::arrow_reader::{
     ArrowPredicate, ArrowPredicateFn, ArrowReaderMetadata, ArrowReaderOptions,
     ParquetRecordBatchReaderBuilder, RowFilter,
@@ -28,6 +26,7 @@ use records::row_schema::time_type;
 use crate::delta::data_file::GROUP_ROWS;
 use crate::delta::file_stats::Stats;
 use crate::error::Error;
+use crate::handle::Store;
 
 type Builder = ParquetRecordBatchReaderBuilder<File>;
 
@@ -99,28 +98,6 @@ impl Condition {
         Ok(mask)
     }
 
-    /// For each row group, whether its statistics rule out every row; `None` where they cannot be compared.
-    fn excludes(&self, builder: &Builder) -> Option<Vec<bool>> {
-        let groups = builder.metadata().row_groups();
-        let stats =
-            StatisticsConverter::try_new(self.column, builder.schema(), builder.parquet_schema()).ok()?;
-        let mut excluded = vec![false; groups.len()];
-        let mut exclude = |mask: Result<BooleanArray, ArrowError>| {
-            // Statistics that are missing exclude nothing.
-            let mask = mask.ok()?;
-            excluded.iter_mut().zip(&mask).for_each(|(excluded, outside)| *excluded |= outside == Some(true));
-            Some(())
-        };
-        let [first, last] = self.scalars();
-        if let Some(first) = first {
-            exclude(lt(&stats.row_group_maxes(groups).ok()?, &first))?;
-        }
-        if let Some(last) = last {
-            exclude(gt(&stats.row_group_mins(groups).ok()?, &last))?;
-        }
-        Some(excluded)
-    }
-
     /// The condition as a filter of rows while a file is decoded.
     fn predicate(&self, builder: &Builder) -> Box<dyn ArrowPredicate> {
         let condition = self.clone();
@@ -132,28 +109,42 @@ impl Condition {
     }
 }
 
-/// The matching rows of files of one table, in the order of the files, in one batch.
-///
-/// # Errors
-/// As [`read_file`].
-pub(crate) fn read_table(
-    files: &[PathBuf],
-    schema: &SchemaRef,
-    conditions: &[Condition],
-) -> Result<RecordBatch, Error> {
-    Ok(concat_batches(schema, &read_files(files, schema, conditions)?)?)
+/// Mask of the rows of a batch that meet every condition.
+pub(crate) fn matches(batch: &RecordBatch, conditions: &[Condition]) -> Result<BooleanArray, ArrowError> {
+    let all = BooleanArray::from(vec![true; batch.num_rows()]);
+    conditions.iter().try_fold(all, |mask, condition| {
+        let column = batch.column(batch.schema_ref().index_of(condition.column)?);
+        and(&mask, &condition.matches(column)?)
+    })
 }
 
-/// As [`read_table`], in one batch or more. Files are read by as many threads as the machine has.
-///
-/// # Errors
-/// As [`read_file`].
-pub(crate) fn read_files(
-    files: &[PathBuf],
-    schema: &SchemaRef,
-    conditions: &[Condition],
-) -> Result<Vec<RecordBatch>, Error> {
-    read_each(files, schema, |file| read_file(file, schema, conditions))
+impl Store {
+    /// The wanted columns of a file's matching rows, once the file's digest is verified.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] when the file is not the one that was committed, and as [`read_file`].
+    pub(crate) fn read_file(
+        &self,
+        path: &Path,
+        schema: &SchemaRef,
+        conditions: &[Condition],
+    ) -> Result<Vec<RecordBatch>, Error> {
+        self.check(path)?;
+        read_file(path, schema, conditions)
+    }
+
+    /// The same of files of one table, in their order. They are read by as many threads as the machine has.
+    ///
+    /// # Errors
+    /// As [`Store::read_file`].
+    pub(crate) fn read_files(
+        &self,
+        files: &[PathBuf],
+        schema: &SchemaRef,
+        conditions: &[Condition],
+    ) -> Result<Vec<RecordBatch>, Error> {
+        read_each(files, schema, |file| self.read_file(file, schema, conditions))
+    }
 }
 
 /// What a function reads of each file, in the order of the files, one empty batch where that is nothing.
@@ -201,18 +192,13 @@ pub(crate) fn read_file(
     schema: &SchemaRef,
     conditions: &[Condition],
 ) -> Result<Vec<RecordBatch>, Error> {
-    let mut builder = opened(path, schema)?;
-    if !conditions.is_empty() {
-        let excluded: Vec<Vec<bool>> = conditions.iter().filter_map(|one| one.excludes(&builder)).collect();
-        let groups = 0..builder.metadata().num_row_groups();
-        let groups = groups.filter(|&group| excluded.iter().all(|excluded| !excluded[group])).collect();
-        let predicates = conditions.iter().map(|one| one.predicate(&builder)).collect();
-        builder = builder.with_row_groups(groups).with_row_filter(RowFilter::new(predicates));
-    }
+    let builder = opened(path, schema)?;
+    let predicates = conditions.iter().map(|one| one.predicate(&builder)).collect();
     let mask = mask(&builder, schema.fields().iter().map(|field| field.name().as_str()));
     // A group's dictionary serves its rows alone.
-    let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
-    rows.map(|batch| Ok(without_infinities(&cast_to_schema(&batch?, schema)?)?)).collect()
+    let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS);
+    let rows = rows.with_row_filter(RowFilter::new(predicates)).build()?;
+    rows.map(|batch| Ok(cast_to_schema(&batch?, schema)?)).collect()
 }
 
 /// A file whose text columns remain dictionaries, except those that are wanted as plain text.
@@ -238,6 +224,7 @@ fn mask<'a>(builder: &Builder, names: impl Iterator<Item = &'a str>) -> Projecti
 /// A batch's columns in the form wanted; a column that came with a later release is empty.
 fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
     let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
+        Some(column) if field.is_nullable() => without_infinities(cast(column, field.data_type())?),
         Some(column) => cast(column, field.data_type()),
         None => Ok(new_null_array(field.data_type(), batch.num_rows())),
     };
@@ -247,19 +234,15 @@ fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch
     RecordBatch::try_new(Arc::clone(schema), columns)
 }
 
-/// A batch whose numbers are finite or missing: an infinite diagnostic of one refused flight, written by a release
+/// A column whose numbers are finite or missing: an infinite diagnostic of one refused flight, written by a release
 /// before 2026-11-23, must not refuse the whole table.
-fn without_infinities(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
-    let column = |(field, column): (&Arc<Field>, &ArrayRef)| {
-        let numbers = column.as_primitive_opt::<Float64Type>().filter(|_| field.is_nullable());
-        match numbers.filter(|numbers| numbers.values().iter().any(|value| !value.is_finite())) {
-            Some(numbers) => nullif(column, &BooleanArray::from_unary(numbers, |value| !value.is_finite())),
-            None => Ok(Arc::clone(column)),
+fn without_infinities(column: ArrayRef) -> Result<ArrayRef, ArrowError> {
+    match column.as_primitive_opt::<Float64Type>() {
+        Some(numbers) if numbers.values().iter().any(|value| !value.is_finite()) => {
+            nullif(numbers, &BooleanArray::from_unary(numbers, |value| !value.is_finite()))
         }
-    };
-    let schema = batch.schema();
-    let columns = schema.fields().iter().zip(batch.columns()).map(column).collect::<Result<_, _>>()?;
-    RecordBatch::try_new(schema, columns)
+        _ => Ok(column),
+    }
 }
 
 /// Some of a schema's columns, with texts as dictionaries.
@@ -310,17 +293,17 @@ mod tests {
         let file = written(dir.path(), "a", &batch);
         let schema = |names: &[&str]| only(&GapRecord::schema(), names).unwrap();
         let wanted = schema(&["departure_utc", "tail_number", "skew_se_s"]);
-        let found = read_table(std::slice::from_ref(&file), &wanted, &[]).unwrap();
+        let found = read_file(&file, &wanted, &[]).unwrap().remove(0);
         assert_eq!(found.column(1).data_type(), &dictionary());
         assert_eq!((found.num_rows(), found.column(2).null_count()), (3, 3));
         let tail = Condition::texts("tail_number", "N1", "N1");
         let since = Condition::times("departure_utc", Some(2_000_000), None);
-        let found = read_table(std::slice::from_ref(&file), &wanted, &[tail, since]).unwrap();
-        assert_eq!(found.num_rows(), 1);
+        let found = read_file(&file, &wanted, &[tail, since]).unwrap();
+        assert_eq!(found.iter().map(RecordBatch::num_rows).sum::<usize>(), 1);
         assert!(read_file(&file, &schema(&["serial_number"]), &[]).is_err());
     }
 
-    /// Files of an earlier release lack a column: whatever the order of the files, the missing values are empty.
+    /// Files of an earlier release lack a column.
     #[test]
     fn files_without_a_later_column_are_read_by_time_with_empty_values() {
         let dir = tempfile::tempdir().unwrap();
@@ -331,42 +314,18 @@ mod tests {
         let (new, old) =
             (written(dir.path(), "new", &batch), written(dir.path(), "old", &batch.project(&[0]).unwrap()));
         let since = Condition::times("departure_utc", Some(15), None);
-        for (files, wanted) in
-            [([old.clone(), new.clone()], [None, Some(2.0)]), ([new, old], [Some(2.0), None])]
-        {
-            let found = read_table(&files, &batch.schema(), std::slice::from_ref(&since)).unwrap();
-            assert_eq!(found.column(1).as_primitive::<Float64Type>().iter().collect::<Vec<_>>(), wanted);
+        for (file, wanted) in [(old, None), (new, Some(2.0))] {
+            let found = read_file(&file, &batch.schema(), std::slice::from_ref(&since)).unwrap().remove(0);
+            assert_eq!(found.column(1).as_primitive::<Float64Type>().iter().collect::<Vec<_>>(), [wanted]);
         }
-    }
-
-    #[test]
-    fn a_row_group_is_passed_over_only_when_its_statistics_exclude_every_row() {
-        let dir = tempfile::tempdir().unwrap();
-        let texts: ArrayRef = Arc::new(StringArray::from(vec!["a", "b", "c", "d", "e"]));
-        let times: ArrayRef =
-            Arc::new(TimestampMicrosecondArray::from(vec![1, 2, 3, 4, 5]).with_timezone("UTC"));
-        let batch = RecordBatch::try_from_iter([("text", texts), ("time", times)]).unwrap();
-        let file = opened(&written(dir.path(), "a", &batch), &batch.schema()).unwrap();
-        for (condition, excluded) in [
-            (Condition::texts("text", "b", "b"), [false, true, true]),
-            (Condition::texts("text", "b", "c"), [false, false, true]),
-            (Condition::texts("text", "f", "g"), [true, true, true]),
-            (Condition::times("time", Some(3), None), [true, false, false]),
-            (Condition::times("time", None, Some(2)), [false, true, true]),
-        ] {
-            assert_eq!(condition.excludes(&file), Some(excluded.to_vec()), "{condition:?}");
-        }
-        assert_eq!(Condition::texts("other", "a", "b").excludes(&file), None);
-        assert_eq!(Condition::texts("time", "a", "b").excludes(&file), None, "of another type");
     }
 
     /// A NIS that overflowed, of a log with samples of 1e300, was stored as infinity: every trend ended with exit code 2.
     #[test]
     fn an_infinite_number_is_read_as_missing() {
         let nis = Float64Array::from(vec![Some(1.0), Some(f64::INFINITY), None, Some(f64::NAN), Some(2.0)]);
-        let batch = RecordBatch::try_from_iter([("nis", Arc::new(nis) as ArrayRef)]).unwrap();
-        let found = without_infinities(&batch).unwrap();
+        let found = without_infinities(Arc::new(nis)).unwrap();
         let wanted = Float64Array::from(vec![Some(1.0), None, None, None, Some(2.0)]);
-        assert_eq!(found.column(0).as_primitive::<Float64Type>(), &wanted);
+        assert_eq!(found.as_primitive::<Float64Type>(), &wanted);
     }
 }

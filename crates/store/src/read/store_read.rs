@@ -4,16 +4,13 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use arrow::array::RecordBatch;
-use arrow::datatypes::SchemaRef;
 use records::GapRecord;
 
-use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::frame;
 use crate::read::query::Query;
 use crate::read::scan::{self, Condition};
-use crate::read::selection::Selection;
 use records::RecordKey;
 use records::row_schema::from_batch;
 use records::{LogOutcome, LogRecord};
@@ -28,7 +25,8 @@ impl Store {
     /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
     /// was committed, [`Error::Parquet`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
-        self.select(&self.gaps.snapshot()?, query)
+        let rows = self.select(&self.gaps.snapshot()?, query, &GapRecord::schema()).read_all()?;
+        frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 
     /// The same as rows.
@@ -45,7 +43,7 @@ impl Store {
     /// As [`Store::records`]; [`Error::Frame`] when there is no such column.
     pub fn distinct(&self, column: &str) -> Result<BTreeSet<String>, Error> {
         let schema = scan::only(&GapRecord::schema(), &[column])?;
-        let rows = self.read_rows(&self.gaps.snapshot()?, &Query::default(), &schema)?;
+        let rows = self.select(&self.gaps.snapshot()?, &Query::default(), &schema).read_all()?;
         let counts = frame::counts(&frame::frame(&rows, &[column])?, column)?;
         Ok(counts.into_iter().map(|(value, _)| value).collect())
     }
@@ -79,22 +77,5 @@ impl Store {
             return Ok(Vec::new());
         };
         Ok(table.snapshot()?.paths().map(|file| self.location.display_path(&file)).collect())
-    }
-
-    /// Some columns of the matching rows, after a check of the digests of their files.
-    pub(crate) fn read_rows(
-        &self,
-        snapshot: &Snapshot,
-        query: &Query,
-        schema: &SchemaRef,
-    ) -> Result<Vec<RecordBatch>, Error> {
-        let selection = Selection::of(self, snapshot, query, schema);
-        self.check(&selection.files)?;
-        selection.read()
-    }
-
-    pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query) -> Result<RecordBatch, Error> {
-        let rows = self.read_rows(snapshot, query, &GapRecord::schema())?;
-        frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 }

@@ -1,11 +1,7 @@
 //! Compaction: many small files become few, sorted by tail, unit and departure, so that a question opens one.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Duration;
-
-use arrow::array::RecordBatch;
-use arrow::datatypes::SchemaRef;
 
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
@@ -70,9 +66,7 @@ impl Writer {
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
         for table in store.existing_tables() {
             let before = table.snapshot()?.files.len();
-            table.change(|snapshot| {
-                RewritePlan::of(table).change(table, snapshot, |files| store.check(files))
-            })?;
+            table.change(|snapshot| RewritePlan::of(table).change(store, table, snapshot))?;
             total.before += before;
             total.after += table.snapshot()?.files.len();
         }
@@ -110,17 +104,11 @@ impl RewritePlan {
         Self { slice_by, order }
     }
 
-    fn change<'a>(
-        &self,
-        table: &Table,
-        snapshot: &'a Snapshot,
-        check: impl Fn(&[PathBuf]) -> Result<(), Error>,
-    ) -> Result<Change<'a>, Error> {
-        let files: Vec<PathBuf> = snapshot.paths().collect();
-        // A flipped byte must not be given a new digest.
-        check(&files)?;
-        let schema = &table.schema;
-        let slices = slices(&self.counts(&files, schema)?, FILE_ROWS);
+    fn change<'a>(&self, store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Change<'a>, Error> {
+        let (files, schema) = (snapshot.paths().collect::<Vec<_>>(), &table.schema);
+        let values = store.read_files(&files, &scan::only(schema, &[self.slice_by])?, &[])?;
+        let counts = frame::counts(&frame::frame(&values, &[self.slice_by])?, self.slice_by)?;
+        let slices = slices(&counts.into_iter().collect(), FILE_ROWS);
         let planned: usize = slices.iter().map(|slice| slice.rows.div_ceil(FILE_ROWS)).sum();
         let all_ours = snapshot.files.iter().all(DataFile::has_digest);
         if planned.max(1) >= files.len() && all_ours {
@@ -129,7 +117,9 @@ impl RewritePlan {
         let mut change =
             Change { remove: snapshot.files.iter().collect(), rearranges: true, ..Change::default() };
         for slices in slices.chunks(FILES_AT_ONCE) {
-            let rows = self.rows(&files, schema, slices)?;
+            let (first, last) = (&slices[0].first, &slices[slices.len() - 1].last);
+            let condition = Condition::texts(self.slice_by, first, last);
+            let rows = frame::sorted(&store.read_files(&files, schema, &[condition])?, self.order, None)?;
             let mut begin = 0;
             for slice in slices {
                 for first in (0..slice.rows).step_by(FILE_ROWS) {
@@ -140,23 +130,6 @@ impl RewritePlan {
             }
         }
         Ok(change)
-    }
-
-    fn counts(&self, files: &[PathBuf], schema: &SchemaRef) -> Result<BTreeMap<String, usize>, Error> {
-        let values = scan::read_files(files, &scan::only(schema, &[self.slice_by])?, &[])?;
-        let counts = frame::counts(&frame::frame(&values, &[self.slice_by])?, self.slice_by)?;
-        Ok(counts.into_iter().collect())
-    }
-
-    fn rows(
-        &self,
-        files: &[PathBuf],
-        schema: &SchemaRef,
-        slices: &[OutputRange],
-    ) -> Result<RecordBatch, Error> {
-        let (first, last) = (&slices[0].first, &slices[slices.len() - 1].last);
-        let condition = Condition::texts(self.slice_by, first, last);
-        frame::sorted(&scan::read_files(files, schema, &[condition])?, self.order, None)
     }
 }
 

@@ -1,25 +1,24 @@
 //! The writer: finished logs become records and accounts, whole flights at a time, each flight once.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::slice;
 use std::sync::Arc;
 use std::time::Duration;
 
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::kernels::cmp::distinct;
-use arrow::compute::{filter_record_batch, or};
-use arrow::datatypes::{Schema, TimestampMicrosecondType};
+use arrow::compute::{concat_batches, filter_record_batch, or};
+use arrow::datatypes::{Schema, SchemaRef, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use records::{GapRecord, Status, stored_row};
 
 use crate::delta::data_file;
+use crate::delta::file_stats::Stats;
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::table::{Change, Table};
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::scan;
-use crate::read::selection::not_withdrawn;
+use crate::read::column_scan::not_withdrawn;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
 use records::LogRecord;
@@ -153,15 +152,13 @@ impl Writer {
         let wanted: MergeDecisions<'_> =
             keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
         let snapshot = self.store.gaps.snapshot()?;
-        let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
-        let files: Vec<_> = snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
-        self.store.check(&files)?;
+        let files = snapshot.paths_where(|stats| may_hold_any(stats, &wanted));
         let all = GapRecord::schema();
         let names = row_schema::columns::<HeldRecord>().into_iter().map(|column| column.name);
         let columns = RecordKey::COLUMNS.into_iter().chain(names).map(|name| all.index_of(name));
         let schema = Arc::new(all.project(&columns.collect::<Result<Vec<_>, _>>()?)?);
         let mut held = BTreeMap::new();
-        for batch in scan::read_files(&files, &schema, &[not_withdrawn()])? {
+        for batch in self.store.read_files(&files, &schema, &[not_withdrawn()])? {
             let is_wanted = keys_of(&batch)?.iter().map(|key| Some(keys.contains(key))).collect();
             let batch = filter_record_batch(&batch, &is_wanted)?;
             held.extend(keys_of(&batch)?.into_iter().zip(from_batch::<HeldRecord>(&batch)?));
@@ -188,16 +185,14 @@ impl Writer {
             let (location, version) = (&self.store.gaps.location, snapshot.version + 1);
             let mut commit = Change::default();
             for file in snapshot.files.iter().filter(|file| file.has_rows()) {
-                let files = slice::from_ref(&file.path);
-                self.store.check(files)?;
-                let before = scan::read_table(files, &some, &[])?;
+                let before = self.read_all(file, &some)?;
                 let after = change(&before)?;
                 let rows = differing_rows(&before, &after)?;
                 if rows == 0 {
                     continue;
                 }
                 changed += rows;
-                let all = scan::read_table(files, &schema, &[])?;
+                let all = self.read_all(file, &schema)?;
                 let mut arrays = all.columns().to_vec();
                 for (place, array) in places.iter().zip(after.columns()) {
                     arrays[*place] = Arc::clone(array);
@@ -218,7 +213,9 @@ impl Writer {
     ) -> Result<Change<'a>, Error> {
         let mut change = Change::default();
         let (location, version) = (&self.store.gaps.location, snapshot.version + 1);
-        for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(file, decisions)) {
+        for file in
+            snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(&file.stats, decisions))
+        {
             if let Some(rest) = self.without(file, decisions)? {
                 change.remove.push(file);
                 if rest.num_rows() > 0 {
@@ -239,16 +236,19 @@ impl Writer {
 
     /// What is left of a file without the records named; nothing when it holds none of them.
     fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
-        let files = slice::from_ref(&file.path);
-        self.store.check(files)?;
         let schema = GapRecord::schema();
         let columns = key_columns(&schema)?.into_iter().chain([schema.index_of("log_digest")?]);
         let keys = Arc::new(schema.project(&columns.collect::<Vec<_>>())?);
-        if is_kept(&scan::read_table(files, &keys, &[])?, decisions)?.false_count() == 0 {
+        if is_kept(&self.read_all(file, &keys)?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
-        let all = scan::read_table(files, &GapRecord::schema(), &[])?;
+        let all = self.read_all(file, &schema)?;
         Ok(Some(filter_record_batch(&all, &is_kept(&all, decisions)?)?))
+    }
+
+    /// Some columns of all rows of a file, in one batch.
+    fn read_all(&self, file: &DataFile, schema: &SchemaRef) -> Result<RecordBatch, Error> {
+        Ok(concat_batches(schema, &self.store.read_file(&file.path, schema, &[])?)?)
     }
 }
 
@@ -285,13 +285,11 @@ fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
 }
 
 /// Whether the file may hold one of the records, by its bounds.
-fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
-    let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
+fn may_hold_any(stats: &Stats, decisions: &MergeDecisions<'_>) -> bool {
+    let (earliest_us, latest_us) = stats.times_us("departure_utc");
     let from = |departure_us| RecordKey { departure_us, tail_number: String::new(), position: String::new() };
     let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));
-    in_time
-        .map(|(key, _)| key)
-        .any(|key| file.stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
+    in_time.map(|(key, _)| key).any(|key| stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
 }
 
 /// Mask of the rows that no merge decision takes away.
