@@ -2,13 +2,11 @@
 //! records.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::compute::concat_batches;
 use jiff::Timestamp;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
 use records::GapRecord;
 
@@ -51,18 +49,11 @@ impl Store {
         let rows = self.read_files(&files, &schema, &[])?;
         let keys = keys_of(&frame::sorted(&rows, &RecordKey::COLUMNS, None)?)?;
         let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
-        let mut findings: Vec<Diagnostic> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
-        if twice.len() > NAMED {
-            let more = format!("{} more records are stored twice", twice.len() - NAMED);
-            findings.push(Diagnostic::new("store_duplicate", more));
-        }
         let logs = self.accounts()?;
         let incomplete = incomplete_logs(&logs, &keys);
-        findings.extend(incomplete.iter().take(NAMED).map(|(log, stored)| incomplete_log(log, *stored)));
-        if incomplete.len() > NAMED {
-            let more = format!("{} more logs lack records", incomplete.len() - NAMED);
-            findings.push(Diagnostic::new("store_records_missing", more));
-        }
+        let mut findings = first_of(twice.iter().map(|key| duplicate(key)), "records are stored twice");
+        let incomplete = incomplete.iter().map(|(log, stored)| incomplete_log(log, *stored));
+        findings.extend(first_of(incomplete, "logs lack records"));
         Ok(findings)
     }
 }
@@ -82,6 +73,15 @@ impl Writer {
         }
         Ok(accepted)
     }
+}
+
+/// The first of similar findings, and the number of the others.
+fn first_of(mut findings: impl ExactSizeIterator<Item = Diagnostic>, problem: &str) -> Vec<Diagnostic> {
+    let mut named: Vec<Diagnostic> = findings.by_ref().take(NAMED).collect();
+    if let (more @ 1.., Some(last)) = (findings.len(), named.last()) {
+        named.push(Diagnostic::new(last.code.clone(), format!("{more} more {problem}")));
+    }
+    named
 }
 
 /// A flight: tail and departure.
@@ -155,11 +155,6 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
     let wrong = |code: &str, what: &str, hint: &str| {
         Diagnostic::new(code, what).in_file(table.location.display_path(&file.path).display()).hint(hint)
     };
-    let differs = |what: &str, found: String, expected: String| {
-        let what = format!("a data file has another {what} than was committed");
-        let found = Some(found);
-        Err(Diagnostic { found, expected: Some(expected), ..wrong("store_damaged", &what, RESTORE) })
-    };
     let Some(length) = table.location.length(&file.path).map_err(|e| e.diagnostic())? else {
         return Err(wrong("store_file_missing", "a committed data file is missing", RESTORE));
     };
@@ -169,11 +164,10 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
         .and_then(|()| data_file::check(&file.path))
         .map_err(|e| e.diagnostic())?;
     if length != file.size_bytes {
-        return differs("length", format!("{length} bytes"), format!("{} bytes", file.size_bytes));
-    }
-    let rows = rows(file).map_err(|e| e.diagnostic().in_file(file.path.display()))?;
-    if let Some(committed) = file.stats.num_records.filter(|committed| *committed != rows) {
-        return differs("number of rows", rows.to_string(), committed.to_string());
+        let found = Some(format!("{length} bytes"));
+        let expected = Some(format!("{} bytes", file.size_bytes));
+        let what = "a data file has another length than was committed";
+        return Err(Diagnostic { found, expected, ..wrong("store_damaged", what, RESTORE) });
     }
     if !file.has_digest() {
         return Err(wrong(
@@ -182,7 +176,7 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
             "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
         ));
     }
-    match missed_by_statistics(table, file).map_err(|e| e.diagnostic())? {
+    match missed_by_statistics(table, file).map_err(|e| e.diagnostic().in_file(file.path.display()))? {
         None => Ok(()),
         Some(column) => {
             let what = format!("the statistics of a data file do not cover its content: {column}");
@@ -195,9 +189,4 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
 fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>, Error> {
     let content = concat_batches(&table.schema, &scan::read_file(&file.path, &table.schema, &[])?)?;
     Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
-}
-
-fn rows(file: &DataFile) -> Result<i64, Error> {
-    let opened = File::open(&file.path).map_err(Error::io(&file.path, "opened"))?;
-    Ok(SerializedFileReader::new(opened)?.metadata().file_metadata().num_rows())
 }

@@ -63,16 +63,11 @@ impl LogDigests {
         self.files.iter().filter(move |(name, _)| is_read(name)).map(|(_, path)| path.as_path())
     }
 
-    /// Whether a log file has a digest to be compared with.
-    pub(crate) fn has_digest(&self, file: &Path) -> bool {
-        log_file(file).is_some_and(|name| self.digests.contains_key(name))
-    }
-
     /// Whether a commit was written by another program: it has no digest, and an earlier one has.
     pub(crate) fn is_foreign(&self, file: &Path) -> bool {
         let first = self.digests.keys().next();
-        log_file(file).is_some_and(|name| first.is_some_and(|first| first.as_str() < name))
-            && !self.has_digest(file)
+        let has_earlier = |name: &str| first.is_some_and(|first| first.as_str() < name);
+        log_file(file).is_some_and(|name| has_earlier(name) && !self.digests.contains_key(name))
     }
 
     /// Compares a log file with its digests, and checks that its actions are those of the protocol.

@@ -56,62 +56,18 @@ fn update<R: Row + FromCells>(
 
 #[cfg(test)]
 mod tests {
-    use std::fs::File;
-    use std::sync::Arc;
-
-    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, TimestampNanosecondArray};
-    use parquet::arrow::ArrowWriter;
-
     use super::*;
-    use crate::read::scan;
     use records::RunRecord;
-
-    /// Runs as another program may write them: long texts, nanoseconds, columns in another order and one of its own,
-    /// and none of those that may be empty.
-    fn foreign(ids: &[&str], found: i64, commit: i64) -> RecordBatch {
-        let texts = |text: &str| Arc::new(LargeStringArray::from(vec![text; ids.len()])) as ArrayRef;
-        let counts = |count: i64| Arc::new(Int64Array::from(vec![count; ids.len()])) as ArrayRef;
-        let times = TimestampNanosecondArray::from(vec![3_000_000_000; ids.len()]).with_timezone("UTC");
-        let mut columns = vec![
-            ("commit", counts(commit)),
-            ("own", counts(7)),
-            ("run_id", Arc::new(LargeStringArray::from(ids.to_vec())) as ArrayRef),
-            ("started_utc", Arc::new(times) as ArrayRef),
-            ("program_version", texts("0")),
-            ("config_path", texts("a")),
-            ("found", counts(found)),
-        ];
-        let others = ["known", "done", "estimated", "refused", "errors", "not_reached"];
-        columns.extend(others.map(|name| (name, counts(0))));
-        RecordBatch::try_from_iter(columns).unwrap()
-    }
-
-    fn taken(batches: &[RecordBatch]) -> Result<Vec<(String, i64)>, Error> {
-        let (dir, mut newest) = (tempfile::tempdir().unwrap(), BTreeMap::new());
-        let path = dir.path().join("file");
-        for batch in batches {
-            let mut writer =
-                ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), None).unwrap();
-            writer.write(batch).unwrap();
-            writer.close().unwrap();
-            for batch in scan::read_file(&path, &versioned::schema::<RunRecord>(), &[])? {
-                update(&mut newest, &batch, |run: &RunRecord| run.run_id.clone())?;
-            }
-        }
-        Ok(newest.into_values().map(|(_, run)| (run.run_id, run.found)).collect())
-    }
 
     #[test]
     fn the_commit_tells_which_is_newest_whatever_the_order_of_files() {
-        let batches = [foreign(&["b", "a"], 20, 2), foreign(&["b", "c"], 30, 3), foreign(&["a", "c"], 10, 1)];
-        let expected = [("a", 20), ("b", 30), ("c", 30)].map(|(name, found)| (name.to_owned(), found));
-        assert_eq!(taken(&batches).unwrap(), expected);
-    }
-
-    #[test]
-    fn a_column_that_must_be_there_and_is_not_is_an_error() {
-        let batch = foreign(&["a"], 1, 1);
-        let without: Vec<usize> = (1..batch.num_columns()).collect();
-        assert!(taken(&[batch.project(&without).unwrap()]).is_err());
+        let mut newest = BTreeMap::new();
+        for (ids, found, commit) in [(["b", "a"], 20, 2), (["b", "c"], 30, 3), (["a", "c"], 10, 1)] {
+            let run = |id: &str| RunRecord { run_id: id.to_owned(), found, ..RunRecord::default() };
+            let batch = versioned::to_batch(&ids.map(run), commit).unwrap();
+            update(&mut newest, &batch, |run: &RunRecord| run.run_id.clone()).unwrap();
+        }
+        let found: Vec<_> = newest.values().map(|(_, run)| (run.run_id.as_str(), run.found)).collect();
+        assert_eq!(found, [("a", 20), ("b", 30), ("c", 30)]);
     }
 }

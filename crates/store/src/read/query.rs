@@ -44,6 +44,7 @@ impl Query {
         // A departure is cut to whole microseconds in the table, so a bound between two of them rounds up.
         let (first, last) = (self.since_utc.map(until_us), self.until_utc.map(|until| until_us(until) - 1));
         let is_timed = first.or(last).is_some();
+        let (first, last) = (first.unwrap_or(i64::MIN), last.unwrap_or(i64::MAX));
         texts
             .into_iter()
             .filter_map(text)

@@ -41,7 +41,7 @@ pub(crate) struct Condition {
 enum Bounds {
     Texts(String, String),
     /// µs since 1970 UTC.
-    Times(Option<i64>, Option<i64>),
+    Times(i64, i64),
 }
 
 impl Condition {
@@ -51,7 +51,7 @@ impl Condition {
     }
 
     /// Times in µs UTC.
-    pub(crate) fn times(column: &'static str, first_us: Option<i64>, last_us: Option<i64>) -> Self {
+    pub(crate) fn times(column: &'static str, first_us: i64, last_us: i64) -> Self {
         Self { column, bounds: Bounds::Times(first_us, last_us) }
     }
 
@@ -61,41 +61,28 @@ impl Condition {
             Bounds::Texts(first, last) => file.may_hold(self.column, first, last),
             Bounds::Times(first, last) => {
                 let (earliest, latest) = file.times_us(self.column);
-                first.is_none_or(|first| first <= latest) && last.is_none_or(|last| earliest <= last)
+                *first <= latest && earliest <= *last
             }
-        }
-    }
-
-    /// The least and the largest matching value.
-    fn scalars(&self) -> [Option<Scalar<ArrayRef>>; 2] {
-        let text = |text: &String| Scalar::new(Arc::new(StringArray::from(vec![text.as_str()])) as ArrayRef);
-        let time = |micros: i64| {
-            let time = TimestampMicrosecondArray::from(vec![micros]).with_timezone("UTC");
-            Scalar::new(Arc::new(time) as ArrayRef)
-        };
-        match &self.bounds {
-            Bounds::Texts(first, last) => [first, last].map(|bound| Some(text(bound))),
-            Bounds::Times(first, last) => [first, last].map(|bound| bound.map(time)),
         }
     }
 
     /// Mask of the matching values.
     pub(crate) fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
         // Another program may have given the values another form.
-        let values = match self.bounds {
-            Bounds::Texts(..) if values.data_type() == &dictionary() => Arc::clone(values),
-            Bounds::Texts(..) => cast(values, &DataType::Utf8)?,
-            Bounds::Times(..) => cast(values, &time_type())?,
+        let (values, first, last): (_, ArrayRef, ArrayRef) = match &self.bounds {
+            Bounds::Texts(first, last) => {
+                let is_text = values.data_type() == &dictionary();
+                let values = if is_text { Arc::clone(values) } else { cast(values, &DataType::Utf8)? };
+                let [first, last] =
+                    [first, last].map(|text| Arc::new(StringArray::from(vec![text.as_str()])));
+                (values, first, last)
+            }
+            Bounds::Times(first, last) => {
+                let time = |us| TimestampMicrosecondArray::from(vec![us]).with_timezone("UTC");
+                (cast(values, &time_type())?, Arc::new(time(*first)), Arc::new(time(*last)))
+            }
         };
-        let [first, last] = self.scalars();
-        let mut mask = BooleanArray::from(vec![true; values.len()]);
-        if let Some(first) = first {
-            mask = and(&mask, &gt_eq(&values, &first)?)?;
-        }
-        if let Some(last) = last {
-            mask = and(&mask, &lt_eq(&values, &last)?)?;
-        }
-        Ok(mask)
+        and(&gt_eq(&values, &Scalar::new(first))?, &lt_eq(&values, &Scalar::new(last))?)
     }
 
     /// The condition as a filter of rows while a file is decoded.
@@ -297,7 +284,7 @@ mod tests {
         assert_eq!(found.column(1).data_type(), &dictionary());
         assert_eq!((found.num_rows(), found.column(2).null_count()), (3, 3));
         let tail = Condition::texts("tail_number", "N1", "N1");
-        let since = Condition::times("departure_utc", Some(2_000_000), None);
+        let since = Condition::times("departure_utc", 2_000_000, i64::MAX);
         let found = read_file(&file, &wanted, &[tail, since]).unwrap();
         assert_eq!(found.iter().map(RecordBatch::num_rows).sum::<usize>(), 1);
         assert!(read_file(&file, &schema(&["serial_number"]), &[]).is_err());
@@ -313,7 +300,7 @@ mod tests {
         let batch = RecordBatch::try_from_iter_with_nullable(fields).unwrap();
         let (new, old) =
             (written(dir.path(), "new", &batch), written(dir.path(), "old", &batch.project(&[0]).unwrap()));
-        let since = Condition::times("departure_utc", Some(15), None);
+        let since = Condition::times("departure_utc", 15, i64::MAX);
         for (file, wanted) in [(old, None), (new, Some(2.0))] {
             let found = read_file(&file, &batch.schema(), std::slice::from_ref(&since)).unwrap().remove(0);
             assert_eq!(found.column(1).as_primitive::<Float64Type>().iter().collect::<Vec<_>>(), [wanted]);

@@ -66,7 +66,7 @@ impl Writer {
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
         for table in store.existing_tables() {
             let before = table.snapshot()?.files.len();
-            table.change(|snapshot| RewritePlan::of(table).change(store, table, snapshot))?;
+            table.change(|snapshot| merged(store, table, snapshot))?;
             total.before += before;
             total.after += table.snapshot()?.files.len();
         }
@@ -84,53 +84,45 @@ impl Writer {
     }
 }
 
-/// Plan to rewrite a table.
-struct RewritePlan {
-    /// Rows of one value lie together.
-    slice_by: &'static str,
-    /// The order within a slice.
-    order: &'static [&'static str],
+/// Columns by which the rows of a compacted table are ordered; those of one value of the first lie together.
+fn order(table: &Table) -> &'static [&'static str] {
+    match table.name {
+        "gaps" => &["tail_number", "serial_number", "departure_utc"],
+        "logs" => &["log_path", versioned::COMMIT],
+        "alerts" => &["alert_id", versioned::COMMIT],
+        "work" => &["request_id", "number", versioned::COMMIT],
+        _ => &["run_id", versioned::COMMIT],
+    }
 }
 
-impl RewritePlan {
-    fn of(table: &Table) -> Self {
-        let (slice_by, order): (_, &[_]) = match table.name {
-            "gaps" => ("tail_number", &["tail_number", "serial_number", "departure_utc"]),
-            "logs" => ("log_path", &["log_path", versioned::COMMIT]),
-            "alerts" => ("alert_id", &["alert_id", versioned::COMMIT]),
-            "work" => ("request_id", &["number", versioned::COMMIT]),
-            _ => ("run_id", &[versioned::COMMIT]),
-        };
-        Self { slice_by, order }
+/// The rows of a table in few files; nothing where it has few.
+fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Change<'a>, Error> {
+    let order = order(table);
+    let (slice_by, files, schema) = (order[0], snapshot.paths().collect::<Vec<_>>(), &table.schema);
+    let values = store.read_files(&files, &scan::only(schema, &[slice_by])?, &[])?;
+    let counts = frame::counts(&frame::frame(&values, &[slice_by])?, slice_by)?;
+    let slices = slices(&counts.into_iter().collect(), FILE_ROWS);
+    let planned: usize = slices.iter().map(|slice| slice.rows.div_ceil(FILE_ROWS)).sum();
+    let all_ours = snapshot.files.iter().all(DataFile::has_digest);
+    if planned.max(1) >= files.len() && all_ours {
+        return Ok(Change::default());
     }
-
-    fn change<'a>(&self, store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Change<'a>, Error> {
-        let (files, schema) = (snapshot.paths().collect::<Vec<_>>(), &table.schema);
-        let values = store.read_files(&files, &scan::only(schema, &[self.slice_by])?, &[])?;
-        let counts = frame::counts(&frame::frame(&values, &[self.slice_by])?, self.slice_by)?;
-        let slices = slices(&counts.into_iter().collect(), FILE_ROWS);
-        let planned: usize = slices.iter().map(|slice| slice.rows.div_ceil(FILE_ROWS)).sum();
-        let all_ours = snapshot.files.iter().all(DataFile::has_digest);
-        if planned.max(1) >= files.len() && all_ours {
-            return Ok(Change::default());
-        }
-        let mut change =
-            Change { remove: snapshot.files.iter().collect(), rearranges: true, ..Change::default() };
-        for slices in slices.chunks(FILES_AT_ONCE) {
-            let (first, last) = (&slices[0].first, &slices[slices.len() - 1].last);
-            let condition = Condition::texts(self.slice_by, first, last);
-            let rows = frame::sorted(&store.read_files(&files, schema, &[condition])?, self.order, None)?;
-            let mut begin = 0;
-            for slice in slices {
-                for first in (0..slice.rows).step_by(FILE_ROWS) {
-                    let part = rows.slice(begin + first, FILE_ROWS.min(slice.rows - first));
-                    change.add.push(data_file::write(&table.location, snapshot.version + 1, &part, false)?);
-                }
-                begin += slice.rows;
+    let mut change =
+        Change { remove: snapshot.files.iter().collect(), rearranges: true, ..Change::default() };
+    for slices in slices.chunks(FILES_AT_ONCE) {
+        let (first, last) = (&slices[0].first, &slices[slices.len() - 1].last);
+        let condition = Condition::texts(slice_by, first, last);
+        let rows = frame::sorted(&store.read_files(&files, schema, &[condition])?, order, None)?;
+        let mut begin = 0;
+        for slice in slices {
+            for first in (0..slice.rows).step_by(FILE_ROWS) {
+                let part = rows.slice(begin + first, FILE_ROWS.min(slice.rows - first));
+                change.add.push(data_file::write(&table.location, snapshot.version + 1, &part, false)?);
             }
+            begin += slice.rows;
         }
-        Ok(change)
     }
+    Ok(change)
 }
 
 /// Neighbouring values whose rows fill a file together.

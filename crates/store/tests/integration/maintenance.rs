@@ -116,15 +116,6 @@ fn verify_names_a_file_that_is_gone_and_one_cut_short() {
 }
 
 #[test]
-fn a_torn_log_is_an_error_that_names_the_table() {
-    let (dir, writer) = filled();
-    fs::write(dir.path().join("gaps/_delta_log/00000000000000000003.json"), "{\"add\":{\"pa").unwrap();
-    let error = writer.store().records(&Query::default()).unwrap_err().to_string();
-    assert!(error.starts_with("the log of a table is damaged: "), "{error}");
-    assert_eq!(codes(writer.store()), ["store_damaged"]);
-}
-
-#[test]
 fn stray_files_beside_the_data_are_no_rows() {
     let (dir, writer) = filled();
     fs::copy(data_file(&writer), dir.path().join("gaps/copy of yesterday.parquet")).unwrap();
@@ -237,7 +228,7 @@ fn a_changed_action_is_refused_by_readers_with_and_without_a_digest() {
         }
         let store = Store::open(dir.path()).unwrap();
         let error = store.records(&Query::default()).unwrap_err();
-        assert!(matches!(error, store::Error::LogDamaged { .. }), "{error}");
+        assert!(error.to_string().starts_with("the log of a table is damaged: "), "{error}");
         assert_eq!(codes(&store), ["store_damaged"]);
     }
 }

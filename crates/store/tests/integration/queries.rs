@@ -61,19 +61,6 @@ fn questions() -> impl Strategy<Value = Query> {
         })
 }
 
-#[test]
-fn a_query_answers_what_asking_every_row_would() {
-    let (_dir, writer) = filled();
-    let all = writer.store().records(&Query::default()).unwrap();
-    assert_eq!(all.len(), 36);
-    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
-    proptest!(config, |(query in questions())| {
-        let fitting: Vec<GapRecord> = all.iter().filter(|record| fits(&query, record)).cloned().collect();
-        let first = fitting.len() - query.last.unwrap_or(usize::MAX).min(fitting.len());
-        prop_assert_eq!(writer.store().records(&query).unwrap(), &fitting[first..]);
-    });
-}
-
 /// Departure, serial number and gap of the rows of all parts, in order.
 fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
     let parts = store.scan_columns(query, &["gap_m", "serial_number", "departure_utc"]).unwrap();
@@ -92,30 +79,32 @@ fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
     rows
 }
 
+/// Whether files hold the rows of a run, or of a unit.
 #[test]
-fn parts_hold_the_rows_that_a_scan_holds() {
+fn a_query_and_the_parts_of_a_scan_answer_what_asking_every_row_would() {
     let (dir, mut writer) = filled();
     let all = writer.store().records(&Query::default()).unwrap();
-    let wanted = |query: &Query| {
-        let row = |r: &GapRecord| {
-            let at = r.flight.departure_utc.as_microsecond();
-            (at, r.serial_number.to_string(), r.estimate.gap_m.map(f64::to_bits))
-        };
-        let mut rows: Vec<_> = all.iter().filter(|record| fits(query, record)).map(row).collect();
-        rows.sort();
-        rows
+    assert_eq!(all.len(), 36);
+    let check = |store: &Store| {
+        let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
+        proptest!(config, |(query in questions())| {
+            let fitting: Vec<GapRecord> = all.iter().filter(|record| fits(&query, record)).cloned().collect();
+            let row = |r: &GapRecord| {
+                let at = r.flight.departure_utc.as_microsecond();
+                (at, r.serial_number.to_string(), r.estimate.gap_m.map(f64::to_bits))
+            };
+            let mut rows: Vec<_> = fitting.iter().map(row).collect();
+            rows.sort();
+            prop_assert_eq!(parted(store, &query), rows);
+            let first = fitting.len() - query.last.unwrap_or(usize::MAX).min(fitting.len());
+            prop_assert_eq!(store.records(&query).unwrap(), &fitting[first..]);
+        });
     };
-    let config = || ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
-    proptest!(config(), |(query in questions())| {
-        prop_assert_eq!(parted(writer.store(), &query), wanted(&query));
-    });
-    // Nor does it matter whether files hold the rows of a run, or of a unit.
+    check(writer.store());
     writer.compact().unwrap();
     let store = Store::open(dir.path()).unwrap();
     assert_eq!(store.scan_columns(&Query::default(), &["gap_m"]).unwrap().len(), 1);
-    proptest!(config(), |(query in questions())| {
-        prop_assert_eq!(parted(&store, &query), wanted(&query));
-    });
+    check(&store);
 }
 
 #[test]

@@ -41,21 +41,6 @@ fn outcomes(store: &Store, run_id: &str) -> Vec<LogOutcome> {
     store.run_logs(run_id).unwrap().iter().map(|log| log.outcome).collect()
 }
 
-#[test]
-fn a_run_that_was_killed_is_accounted_for_log_by_log() {
-    let (dir, mut writer) = fresh();
-    cut_short(&mut writer);
-    let store = Store::open(dir.path()).unwrap();
-    let runs = store.runs().unwrap();
-    assert_eq!(figures(&runs[0]), [3, 4, 2, 1, 1]);
-    assert_eq!((runs[0].exit_code, runs[0].has_ended()), (None, false));
-    assert_eq!(
-        outcomes(&store, "run"),
-        [LogOutcome::Done, LogOutcome::Done, LogOutcome::Error, LogOutcome::NotReached]
-    );
-    assert_eq!(store.info().unwrap().last, Some(runs[0].clone()));
-}
-
 /// The commit of records comes before that of their accounts: a kill between them leaves such a store.
 #[test]
 fn records_without_an_account_are_counted_and_their_log_is_done_again() {
@@ -74,9 +59,17 @@ fn records_without_an_account_are_counted_and_their_log_is_done_again() {
 }
 
 #[test]
-fn the_next_run_closes_the_account_of_a_killed_one_for_good() {
+fn a_killed_run_is_accounted_for_log_by_log_and_the_next_run_closes_its_account_for_good() {
     let (_dir, mut writer) = fresh();
     cut_short(&mut writer);
+    let runs = writer.store().runs().unwrap();
+    assert_eq!(figures(&runs[0]), [3, 4, 2, 1, 1]);
+    assert_eq!((runs[0].exit_code, runs[0].has_ended()), (None, false));
+    assert_eq!(
+        outcomes(writer.store(), "run"),
+        [LogOutcome::Done, LogOutcome::Done, LogOutcome::Error, LogOutcome::NotReached]
+    );
+    assert_eq!(writer.store().info().unwrap().last, Some(runs[0].clone()));
     let closed = writer.close_killed_runs().unwrap();
     assert_eq!(closed.iter().map(figures).collect::<Vec<_>>(), [[3, 4, 2, 1, 1]]);
     assert_eq!((closed[0].has_ended(), closed[0].exit_code), (true, None));
