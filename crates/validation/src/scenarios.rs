@@ -8,8 +8,8 @@ use rand::seq::IndexedRandom as _;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simulator::{
-    ContactLaw, Flight, FrictionLaw, GustForm, Line, Lines, NoiseColour, PeriodicError, Plant, Profile,
-    Sensors, Vibration, simulate,
+    ContactLaw, Flight, FrictionLaw, GustForm, Line, NoiseColour, PeriodicError, Plant, Profile, Sensors,
+    Vibration, simulate,
 };
 
 /// A flight to be simulated, and the assumptions of its estimator.
@@ -303,7 +303,7 @@ fn wide(case: &mut Case, rng: &mut ChaCha8Rng) {
         stick_share: rng.random_range(0.05..0.2),
         hinge_share: rng.random_range(0.1..0.4),
         no_reversal: false,
-        ..case.profile
+        ..case.profile.clone()
     };
 }
 
@@ -359,7 +359,7 @@ fn lines(case: &mut Case, rng: &mut ChaCha8Rng) {
         amplitude: if k < count { log_uniform(rng, 0.01..0.2) } else { 0.0 },
         phase_walk_rad: rng.random_range(0.0..1.0),
     });
-    case.profile.buffet.lines = Lines::from(lines);
+    case.profile.buffet.lines = lines.to_vec();
 }
 
 fn turbulence(case: &mut Case, rng: &mut ChaCha8Rng) {
@@ -381,10 +381,9 @@ fn periodic(case: &mut Case, rng: &mut ChaCha8Rng) {
         period,
         phase_rad: rng.random_range(0.0..std::f64::consts::TAU),
     };
-    let none = PeriodicError::default();
     // Once and four times a turn of the resolver; a rack or a second gear of the screw transducer.
-    case.sensors.motor.periodic = [error(0.5e-6..5e-6, 5e-3), error(0.2e-6..2e-6, 1.25e-3), none].into();
-    case.sensors.screw.periodic = [error(0.5e-6..8e-6, 3.1e-3), none, none].into();
+    case.sensors.motor.periodic = vec![error(0.5e-6..5e-6, 5e-3), error(0.2e-6..2e-6, 1.25e-3)];
+    case.sensors.screw.periodic = vec![error(0.5e-6..8e-6, 3.1e-3)];
 }
 
 fn coloured(case: &mut Case, rng: &mut ChaCha8Rng) {
@@ -514,7 +513,7 @@ impl Class {
     /// Whether its channels hold spikes or wrong channels.
     pub(crate) fn has_spikes(&self) -> bool {
         let case = self.case(0);
-        let channels = [case.sensors.motor, case.sensors.screw, case.sensors.load];
+        let channels = [&case.sensors.motor, &case.sensors.screw, &case.sensors.load];
         case.mapping != Mapping::Right || channels.iter().any(|channel| channel.spikes_per_minute > 0.0)
     }
 

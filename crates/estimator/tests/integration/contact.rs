@@ -7,9 +7,7 @@ use estimator::{Error, Samples};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simulator::{
-    ContactLaw, Flight, PeriodicError, PeriodicErrors, Plant, Profile, Sensors, Vibration, simulate,
-};
+use simulator::{ContactLaw, Flight, PeriodicError, Plant, Profile, Sensors, Vibration, simulate};
 
 type Fault = fn(&mut Case);
 
@@ -278,7 +276,7 @@ fn a_filtered_load_channel_moves_no_gap() {
 fn errors_periodic_in_position_become_terms() {
     let case = Case::with(100e-6, |c| {
         let error = PeriodicError { amplitude: 15e-6, period: 5e-3, phase_rad: 0.4 };
-        c.sensors.screw.periodic = PeriodicErrors::try_from(vec![error]).unwrap();
+        c.sensors.screw.periodic = vec![error];
     });
     let flight = case.fly(3);
     let fitted = |prior| case.with_samples_of(&flight, |samples| fit(samples, &prior)).unwrap().unwrap();

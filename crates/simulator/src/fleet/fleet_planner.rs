@@ -254,7 +254,7 @@ impl<'a> Planner<'a> {
         let mut of_place = seeded_rng(spec.seed, &["place", tail, &place.position]);
         let mut of_stay = seeded_rng(spec.seed, &["stay", tail, &place.position, &unit.serial_number]);
         let mut of_flight = seeded_rng(spec.seed, &["actuator", flight_id, &place.position]);
-        let mut sensors = spec.sensors;
+        let mut sensors = spec.sensors.clone();
         sensors.load.gain_error += spread.load_gain * normal(&mut of_place);
         sensors.screw.nonlinearity += spread.nonlinearity_m * normal(&mut of_place);
         sensors.screw.delay_s += spread.skew_s * normal(&mut of_flight);
@@ -264,11 +264,13 @@ impl<'a> Planner<'a> {
         plant.contact.stiffness_n_per_m *= unit.stiffness_factor;
         plant.contact.offset_m = spread.offset_m * of_stay.random_range(-1.0..=1.0);
         plant = plant.with_friction_factor((spread.friction * normal(&mut of_flight)).exp());
-        let mut profile = spec.profile;
+        let mut profile = spec.profile.clone();
         profile.load_n *= place.load_factor;
         for aircraft in spec.aircraft.iter().filter(|aircraft| aircraft.tail == *tail) {
             sensors.load.bias += aircraft.load_bias_n;
-            profile.buffet = aircraft.buffet.unwrap_or(profile.buffet);
+            if let Some(buffet) = &aircraft.buffet {
+                profile.buffet = buffet.clone();
+            }
         }
         let flight = ActuatorFlight {
             tail,

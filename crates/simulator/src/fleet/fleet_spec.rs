@@ -343,7 +343,7 @@ impl Spec {
         let tail = &aircraft.tail;
         self.check_tail("an aircraft", tail)?;
         finite(&format!("aircraft {tail} load_bias_n"), aircraft.load_bias_n)?;
-        aircraft.buffet.map_or(Ok(()), |buffet| buffet.check(&format!("aircraft {tail} buffet")))
+        aircraft.buffet.as_ref().map_or(Ok(()), |buffet| buffet.check(&format!("aircraft {tail} buffet")))
     }
 
     fn check_change(&self, change: &PlantedChange) -> Result<(), Error> {

@@ -11,7 +11,7 @@ use crate::load::vibration::Vibration;
 ///
 /// The phases stretch with the duration. The load is dynamic pressure × (manoeuvre + gust −
 /// stiffness × deflection), so it reverses many times unless `no_reversal` or `reversals` limits that.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Profile {
     /// Length of the log, seconds, 5 to 20 000. Default 150.

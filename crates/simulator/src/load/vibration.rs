@@ -11,7 +11,6 @@ use smart_default::SmartDefault;
 use crate::error::{Error, not_negative, within};
 use crate::load::shaping_filter::ShapedNoise;
 use crate::seeded_streams::seeded_rng;
-use crate::up_to_three::UpToThree;
 
 /// A narrow spectral line, such as a structural mode or a rotor's harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -25,10 +24,10 @@ pub struct Line {
     pub phase_walk_rad: f64,
 }
 
-/// Vibration as noise in a band and up to three lines.
+/// Vibration as noise in a band and lines.
 ///
 /// Of the load, `rms` and `amplitude` are shares of `load_n`; of the motor, metres at the screw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vibration {
     /// Lower edge of the band, Hz, 0.5 to 500. Default 5.
@@ -39,22 +38,19 @@ pub struct Vibration {
     pub high_hz: f64,
     /// Rms of the noise in the band. Default 0.
     pub rms: f64,
-    /// Lines; TOML knows an array of up to three tables.
-    pub lines: Lines,
+    /// Spectral lines.
+    pub lines: Vec<Line>,
 }
-
-/// Up to three lines; an unused line has no amplitude.
-pub type Lines = UpToThree<Line>;
 
 impl Vibration {
     /// Noise between two frequencies.
     pub fn band(low_hz: f64, high_hz: f64, rms: f64) -> Self {
-        Self { low_hz, high_hz, rms, lines: Lines::default() }
+        Self { low_hz, high_hz, rms, lines: Vec::new() }
     }
 
     /// Whether there is none.
     pub fn is_silent(&self) -> bool {
-        self.rms == 0.0 && self.lines.0.iter().all(|line| line.amplitude == 0.0)
+        self.rms == 0.0 && self.lines.iter().all(|line| line.amplitude == 0.0)
     }
 
     pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
@@ -63,7 +59,7 @@ impl Vibration {
         within(&named("low_hz"), self.low_hz, 0.5, 500.0, range)?;
         within(&named("high_hz"), self.high_hz, self.low_hz, 500.0, range)?;
         not_negative(&named("rms"), self.rms)?;
-        for line in self.lines.0.iter().filter(|line| **line != Line::default()) {
+        for line in &self.lines {
             within(&named("lines.frequency_hz"), line.frequency_hz, 0.5, 500.0, "between 0.5 and 500 Hz")?;
             not_negative(&named("lines.amplitude"), line.amplitude)?;
             not_negative(&named("lines.phase_walk_rad"), line.phase_walk_rad)?;
@@ -88,7 +84,7 @@ impl VibrationSource {
     pub(crate) fn new(vibration: &Vibration, scale: f64, step_s: f64, seed: u64, name: &str) -> Self {
         let draw = |part: &str| seeded_rng(seed, &["vibration", name, part]);
         let mut rng = draw("lines");
-        let live = vibration.lines.0.into_iter().filter(|line| line.amplitude > 0.0);
+        let live = vibration.lines.iter().copied().filter(|line| line.amplitude > 0.0);
         let lines = live.map(|line| (line, rng.random_range(0.0..TAU))).collect();
         let band = || ShapedNoise::band(vibration.low_hz, vibration.high_hz, step_s, draw("noise"));
         let noise = (vibration.rms > 0.0).then(band);
@@ -124,8 +120,7 @@ mod tests {
     #[test]
     fn vibration_has_the_rms_of_its_noise_and_lines_together() {
         let line = Line { frequency_hz: 17.0, amplitude: 0.4, phase_walk_rad: 0.5 };
-        let lines = Lines::from([line, Line::default(), Line::default()]);
-        let all = values(&Vibration { rms: 0.3, lines, ..Vibration::default() }, 400.0, 1);
+        let all = values(&Vibration { rms: 0.3, lines: vec![line], ..Vibration::default() }, 400.0, 1);
         let power = all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64;
         assert!((power / (0.09 + 0.08) - 1.0).abs() < 0.03, "{power}");
     }
@@ -134,15 +129,9 @@ mod tests {
     #[test]
     fn the_phase_of_a_line_walks_as_fast_as_stated() {
         let line = Line { frequency_hz: 20.0, amplitude: 1.0, phase_walk_rad: 1.0 };
-        let lines = Lines::from([line, Line::default(), Line::default()]);
-        let all = values(&Vibration { lines, ..Vibration::default() }, 4000.0, 3);
+        let all = values(&Vibration { lines: vec![line], ..Vibration::default() }, 4000.0, 3);
         let pairs = all.iter().zip(&all[1000..]);
         let measured = 2.0 * pairs.map(|(a, b)| a * b).sum::<f64>() / (all.len() - 1000) as f64;
         assert!((measured - (-0.5_f64).exp()).abs() < 0.05, "{measured}");
-    }
-
-    #[test]
-    fn four_lines_are_refused() {
-        assert!(Lines::try_from(vec![Line::default(); 4]).is_err());
     }
 }

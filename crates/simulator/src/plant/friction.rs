@@ -7,12 +7,13 @@
 //! smeared by a tanh, so a held mass does not creep.
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::error::{Error, not_negative, positive, within};
 
-/// The parameters of equation 1 for one mass, and what departs from it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The parameters of equation 1 for one mass, and what departs from it. Without any key there is no friction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[serde(deny_unknown_fields, default)]
 pub struct Friction {
     /// `F_dry`, N.
     pub dry_n: f64,
@@ -24,48 +25,19 @@ pub struct Friction {
     pub backdriven_load_share: Option<f64>,
     /// Dry and load-dependent friction is `1 + asymmetry` times as high in motion along +X and
     /// `1 − asymmetry` times along −X, −0.9 to 0.9. Default 0.
-    #[serde(default)]
     pub asymmetry: f64,
     /// A grease film: drag `grease_n · 2u/(1 + u²)` with `u = |v|/grease_m_per_s`, zero at rest and
     /// highest, `grease_n`, at that speed. Default 0.
-    #[serde(default)]
     pub grease_n: f64,
     /// Speed at which the drag of the grease film is highest, m/s. Default 0.002.
-    #[serde(default = "default_grease_m_per_s")]
+    #[default(2e-3)]
     pub grease_m_per_s: f64,
     /// Viscous and grease drag at the start of the log over that of a warm actuator, 0.1 to 100. Default 1.
-    #[serde(default = "default_cold_factor")]
+    #[default(1.0)]
     pub cold_factor: f64,
     /// Time constant with which the drag falls to that of a warm actuator, seconds. Default 300.
-    #[serde(default = "default_warm_up_s")]
+    #[default(300.0)]
     pub warm_up_s: f64,
-}
-
-fn default_grease_m_per_s() -> f64 {
-    2e-3
-}
-fn default_cold_factor() -> f64 {
-    1.0
-}
-fn default_warm_up_s() -> f64 {
-    300.0
-}
-
-impl Default for Friction {
-    /// None at all.
-    fn default() -> Self {
-        Self {
-            dry_n: 0.0,
-            load_share: 0.0,
-            viscous_n_s_per_m: 0.0,
-            backdriven_load_share: None,
-            asymmetry: 0.0,
-            grease_n: 0.0,
-            grease_m_per_s: default_grease_m_per_s(),
-            cold_factor: default_cold_factor(),
-            warm_up_s: default_warm_up_s(),
-        }
-    }
 }
 
 /// The level of dry friction against motion along either direction, N.
@@ -258,26 +230,12 @@ struct Bristle {
     damping_n: f64,
 }
 
-/// Bristles that move one way, in units of the level they bend up to on that side.
-struct Bending {
-    level_n: f64,
-    /// Level over base.
-    lift: f64,
-    bend: f64,
-    rate_s_per_m: f64,
-    damping_n: f64,
-}
-
 impl Bristle {
-    fn bending(&self, level_n: f64) -> Bending {
+    /// The bristles in units of the level that they bend up to on one side, and this level over the base.
+    fn up_to(&self, level_n: f64) -> (Self, f64) {
         let lift = if self.base_n > 0.0 { level_n / self.base_n } else { 1.0 };
-        Bending {
-            level_n,
-            lift,
-            bend: self.bend / lift,
-            rate_s_per_m: self.rate_s_per_m / lift,
-            damping_n: self.damping_n * lift,
-        }
+        let (bend, rate_s_per_m) = (self.bend / lift, self.rate_s_per_m / lift);
+        (Self { bend, rate_s_per_m, base_n: level_n, damping_n: self.damping_n * lift }, lift)
     }
 }
 
@@ -304,9 +262,9 @@ impl FrictionBody {
     fn slide(&self, push_n: f64, bristle: &Bristle) -> (f64, f64) {
         let free_n = push_n - bristle.base_n * bristle.bend;
         let side = if free_n < 0.0 { -1.0 } else { 1.0 };
-        let bending = bristle.bending(self.level_n(free_n < 0.0));
+        let (bending, _) = bristle.up_to(self.level_n(free_n < 0.0));
         let (a, e, rate) = (self.inertia_n_s_per_m, bending.bend * side, bending.rate_s_per_m);
-        let level_n = bending.level_n + bending.damping_n;
+        let level_n = bending.base_n + bending.damping_n;
         let b = push_n * side + bending.damping_n * e;
         let linear = a + (level_n - b) * rate;
         let root = (linear * linear + 4.0 * a * rate * free_n.abs()).sqrt();
@@ -322,7 +280,7 @@ impl FrictionBody {
     /// The bend of the bristles after a step at a mean speed.
     pub(crate) fn bristle_update(&self, speed_m_per_s: f64) -> f64 {
         let Some(bristle) = &self.bristle else { return 0.0 };
-        let Bending { lift, bend, rate_s_per_m: r, .. } = bristle.bending(self.level_n(speed_m_per_s < 0.0));
+        let (Bristle { bend, rate_s_per_m: r, .. }, lift) = bristle.up_to(self.level_n(speed_m_per_s < 0.0));
         lift * ((bend + r * speed_m_per_s) / (1.0 + r * speed_m_per_s.abs()))
     }
 }

@@ -99,7 +99,7 @@ struct SensorState {
 
 impl SensorState {
     fn new(channel: &Channel, initial: f64) -> Self {
-        Self { channel: *channel, error: 0.0, lagged: initial }
+        Self { channel: channel.clone(), error: 0.0, lagged: initial }
     }
 
     fn is_ideal(&self) -> bool {

@@ -15,7 +15,6 @@ use smart_default::SmartDefault;
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::load::flight_profile::Profile;
 use crate::seeded_streams::seeded_rng;
-use crate::up_to_three::UpToThree;
 
 /// Height of `u − u³` at its peak, which `nonlinearity` is scaled by: `2/(3√3)`.
 const CUBIC_PEAK: f64 = 0.384_900_179_459_750_5;
@@ -39,23 +38,11 @@ impl PeriodicError {
         }
         self.amplitude * (TAU * position / self.period + self.phase_rad).sin()
     }
-}
 
-/// Up to three periodic errors; an unused one has no amplitude.
-pub type PeriodicErrors = UpToThree<PeriodicError>;
-
-impl PeriodicErrors {
     fn check(&self, key: &str) -> Result<(), Error> {
-        for error in self.0.iter().filter(|error| error.amplitude != 0.0) {
-            finite(&format!("{key}.amplitude"), error.amplitude)?;
-            positive(&format!("{key}.period"), error.period)?;
-            finite(&format!("{key}.phase_rad"), error.phase_rad)?;
-        }
-        Ok(())
-    }
-
-    fn at(&self, position: f64) -> f64 {
-        self.0.iter().map(|error| error.at(position)).sum()
+        finite(&format!("{key}.amplitude"), self.amplitude)?;
+        positive(&format!("{key}.period"), self.period)?;
+        finite(&format!("{key}.phase_rad"), self.phase_rad)
     }
 }
 
@@ -71,7 +58,7 @@ pub enum NoiseColour {
 }
 
 /// One channel; every default is zero, a perfect channel. Lengths in the channel's own unit, m or N.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Channel {
     /// White noise, rms.
@@ -114,8 +101,8 @@ pub struct Channel {
     pub box_average: bool,
     /// The channel's own samples per second, held between; 0 or any rate above the log's: the log's.
     pub rate_hz: f64,
-    /// Errors that repeat with the travel; an array of up to three tables.
-    pub periodic: PeriodicErrors,
+    /// Errors that repeat with the travel.
+    pub periodic: Vec<PeriodicError>,
     /// Coloured noise, rms, added to the white noise.
     pub coloured_rms: f64,
     /// Corner of the coloured noise, Hz. Default 1.
@@ -157,7 +144,7 @@ impl Channel {
         not_negative(&named("clip"), self.clip)?;
         within(&named("lag_s"), self.lag_s, 0.0, 1.0, "between 0 and 1 s")?;
         within(&named("rate_hz"), self.rate_hz, 0.0, 5e3, "between 0 and 5000 Hz")?;
-        self.periodic.check(&named("periodic"))?;
+        self.periodic.iter().try_for_each(|error| error.check(&named("periodic")))?;
         not_negative(&named("coloured_rms"), self.coloured_rms)?;
         within(&named("coloured_hz"), self.coloured_hz, 1e-3, 1e3, "between 0.001 and 1000 Hz")
     }
@@ -229,7 +216,7 @@ impl Channel {
         let last = (values.len().max(2) - 1) as f64;
         for (k, value) in values.iter_mut().enumerate() {
             let bent = self.nonlinearity * nonlinearity_at(*value, profile, name)
-                + self.periodic.at(*value)
+                + self.periodic.iter().map(|error| error.at(*value)).sum::<f64>()
                 + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);
             let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
@@ -317,7 +304,7 @@ impl Clock {
 ///
 /// Defaults are good ones: noise of 1 and 3 µm and 40 N, steps of 0.3 and 2.3 µm and 10 N, no fault. A
 /// channel that a spec writes down starts from a perfect one instead: every key left out is zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {
     /// The motor's resolver, in metres at the screw.
@@ -336,8 +323,8 @@ pub struct Sensors {
 impl Sensors {
     /// Sensors that show the truth at the very instant.
     pub fn perfect() -> Self {
-        let channel = Channel::default();
-        Self { motor: channel, screw: channel, load: channel, clock: Clock::default() }
+        let [motor, screw, load] = std::array::from_fn(|_| Channel::default());
+        Self { motor, screw, load, clock: Clock::default() }
     }
 
     /// τ in `screw_logged(t) = X_screw(t − τ)`, against the motor channel, seconds: delays and lags.
@@ -363,7 +350,7 @@ impl Sensors {
 mod tests {
     use super::*;
 
-    fn read(channel: Channel, value: f64, samples: usize) -> Vec<f64> {
+    fn read(channel: &Channel, value: f64, samples: usize) -> Vec<f64> {
         let profile = Profile { stroke_m: 1.0, sample_rate_hz: 100.0, ..Profile::default() };
         channel.read(vec![value; samples], &[], &profile, "screw", &mut seeded_rng(3, &["sensor"]))
     }
@@ -392,9 +379,8 @@ mod tests {
     #[test]
     fn a_periodic_error_repeats_with_the_travel() {
         let error = PeriodicError { amplitude: 4e-6, period: 5e-3, phase_rad: 0.3 };
-        let none = PeriodicError::default();
-        let channel = Channel { periodic: [error, none, none].into(), ..Channel::default() };
-        let at = |x: f64| read(channel, x, 1)[0] - x;
+        let channel = Channel { periodic: vec![error], ..Channel::default() };
+        let at = |x: f64| read(&channel, x, 1)[0] - x;
         assert!((at(0.0) - 4e-6 * 0.3_f64.sin()).abs() < 1e-15);
         assert!((at(7e-3) - at(2e-3)).abs() < 1e-15 && (at(2e-3) + at(4.5e-3)).abs() < 1e-15);
     }
@@ -412,20 +398,20 @@ mod tests {
 
     #[test]
     fn a_perfect_channel_shows_the_truth() {
-        assert_eq!(read(Channel::default(), 0.123, 50), vec![0.123; 50]);
+        assert_eq!(read(&Channel::default(), 0.123, 50), vec![0.123; 50]);
     }
 
     #[test]
     fn gain_bias_and_drift_add_up_to_the_last_sample() {
         let channel = Channel { gain_error: 0.1, bias: 2.0, drift: 5.0, ..Channel::default() };
-        let values = read(channel, 10.0, 11);
+        let values = read(&channel, 10.0, 11);
         assert!((values[0] - 13.0).abs() < 1e-12 && (values[10] - 18.0).abs() < 1e-12);
     }
 
     #[test]
     fn nonlinearity_peaks_at_its_stated_height() {
         let channel = Channel { nonlinearity: 20e-6, ..Channel::default() };
-        let at = |u: f64| read(channel, u, 1)[0] - u;
+        let at = |u: f64| read(&channel, u, 1)[0] - u;
         assert!((at(1.0 / 3f64.sqrt()) - 20e-6).abs() < 1e-12 && at(1.0).abs() < 1e-15);
     }
 
@@ -442,14 +428,14 @@ mod tests {
 
     #[test]
     fn dropouts_spikes_and_freezes_are_as_frequent_as_asked() {
-        let lost = read(Channel { dropout_share: 0.1, ..Channel::default() }, 1.0, 200_000);
+        let lost = read(&Channel { dropout_share: 0.1, ..Channel::default() }, 1.0, 200_000);
         let share = lost.iter().filter(|v| v.is_nan()).count() as f64 / 200_000.0;
         assert!((share - 0.1).abs() < 0.01, "{share}");
-        let wild = read(Channel { spikes_per_minute: 60.0, spike: 5.0, ..Channel::default() }, 0.0, 200_000);
+        let wild = read(&Channel { spikes_per_minute: 60.0, spike: 5.0, ..Channel::default() }, 0.0, 200_000);
         let count = wild.iter().filter(|v| v.abs() > 0.0).count() as f64;
         assert!((count / 2000.0 - 1.0).abs() < 0.1, "{count}");
         let noisy = Channel { noise_rms: 1.0, freezes_per_minute: 6.0, freeze_s: 1.0, ..Channel::default() };
-        let values = read(noisy, 0.0, 200_000);
+        let values = read(&noisy, 0.0, 200_000);
         let repeats = values.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64;
         assert!((repeats / 200_000.0 - 0.1).abs() < 0.03, "{repeats}");
     }

@@ -1,8 +1,6 @@
 //! One simulated flight: repeatable, loaded as specified, and sampled at its timestamps.
 
-use simulator::{
-    Channel, ContactLaw, ExpectedOutcome, Friction, FrictionLaw, Plant, Profile, Sensors, Vibration, simulate,
-};
+use simulator::{Channel, ExpectedOutcome, Friction, Plant, Profile, Sensors, Vibration, simulate};
 
 fn short() -> Profile {
     Profile { duration_s: 30.0, sample_rate_hz: 100.0, ..Profile::default() }
@@ -34,10 +32,14 @@ fn the_load_reverses_many_times_and_exceeds_its_scale_in_a_twentieth_of_the_crui
 
 #[test]
 fn a_flight_without_reversal_keeps_the_sign_of_its_load_and_is_expected_to_be_refused() {
+    let once = Profile { reversals: Some(1), ..short() };
+    let flight = simulate(&Plant::default(), &once, &Sensors::default(), 9).unwrap();
+    assert_eq!(flight.expected, ExpectedOutcome::Estimate);
     for seed in 0..5 {
-        let profile = Profile { no_reversal: true, ..short() };
+        let reversals = (seed > 2).then_some(0);
+        let profile = Profile { no_reversal: seed < 3, reversals, ..short() };
         let flight = simulate(&Plant::default(), &profile, &Sensors::default(), seed).unwrap();
-        assert!(flight.load_n.iter().all(|f| *f < 0.0));
+        assert!(flight.load_n.iter().all(|f| *f * flight.load_n[0] > 0.0));
         assert_eq!(flight.expected, ExpectedOutcome::Refuse);
     }
 }
@@ -88,18 +90,6 @@ fn buffet_adds_its_rms_to_the_load_and_vibration_to_the_motor() {
     let profile = Profile { motor_vibration: Vibration::band(20.0, 60.0, 10e-6), ..short() };
     let motor_m = simulate(&held, &profile, &Sensors::perfect(), 9).unwrap().motor_m;
     assert!((rms(&motor_m, &vec![0.0; motor_m.len()]) / 10e-6 - 1.0).abs() < 0.05);
-}
-
-#[test]
-fn a_load_with_one_reversal_changes_sign_once_and_with_none_is_expected_to_be_refused() {
-    let fly = |count| {
-        let profile = Profile { reversals: Some(count), ..short() };
-        simulate(&Plant::default(), &profile, &Sensors::perfect(), 9).unwrap()
-    };
-    let flight = fly(1);
-    let changes = flight.load_n.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-    assert_eq!((changes, flight.expected), (1, ExpectedOutcome::Estimate));
-    assert_eq!(fly(0).expected, ExpectedOutcome::Refuse);
 }
 
 /// Keys of load spectrum, sensors, friction and flanks as a spec writes them.
@@ -159,29 +149,6 @@ fn a_flight_without_friction_shows_its_gap_between_the_flanks() {
         free[free.len() / 2]
     };
     assert!((slack(1.0) - 60e-6).abs() < 0.3e-6 && (slack(-1.0) + 60e-6).abs() < 0.3e-6);
-}
-
-#[test]
-fn every_friction_and_contact_law_flies() {
-    let frictions = [
-        FrictionLaw::Coulomb,
-        FrictionLaw::Stribeck { ratio: 1.5, speed_m_per_s: 2e-3 },
-        FrictionLaw::Presliding { travel_m: 5e-6 },
-    ];
-    let contacts = [
-        ContactLaw::Linear,
-        ContactLaw::Soft { share: 0.4, depth_m: 100e-6 },
-        ContactLaw::Hertz { share: 0.5, reference_m: 150e-6 },
-    ];
-    for friction_law in frictions {
-        for law in contacts {
-            let mut plant = Plant { friction_law, ..Plant::default() };
-            plant.contact.law = law;
-            let flight = simulate(&plant, &short(), &Sensors::default(), 2).unwrap();
-            let widest = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| (s - m - 1e-4).abs());
-            assert!(widest.fold(0.0, f64::max) < 1e-3, "{friction_law:?} {law:?}");
-        }
-    }
 }
 
 #[test]
