@@ -15,23 +15,19 @@ use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-use crate::methods::{load_lines_m, spread_m};
+use crate::methods::{METHODS, load_lines_m, spread_m};
+
+/// The methods whose results are compared.
+pub(crate) const GEAR_METHODS: [&str; 5] = [METHODS[0], "its loop width", METHODS[1], METHODS[2], METHODS[3]];
 
 /// The results of every method for one log, degrees.
 #[derive(Debug, Clone, Copy)]
 pub struct GearBenchLog {
     /// Play of this phase as its authors measured it, over three places of the output.
-    pub authors_deg: f64,
-    /// Contact regression over the ramps to 4 N·m, and over all, those to 40 N·m included; NaN where it refuses.
-    pub contact_deg: [f64; 2],
-    /// Loop width at zero load, over the same; NaN where there is none.
-    pub loop_deg: [f64; 2],
-    /// The paper's statistic over the ramps to 4 N·m, and over all, those to 40 N·m included.
-    pub midrange_deg: [f64; 2],
-    /// Load lines, over the same.
-    pub lines_deg: [f64; 2],
-    /// P99 − P1 of δX, over the same.
-    pub spread_deg: [f64; 2],
+    pub(crate) authors_deg: f64,
+    /// Over the ramps to 4 N·m, and over all, those to 40 N·m included: by method of [`GEAR_METHODS`]; NaN where it gives
+    /// no number.
+    pub(crate) found_deg: [[f64; GEAR_METHODS.len()]; 2],
 }
 
 /// Stiffness as its authors give it, 0.084 °/(N·m), N·m/rad.
@@ -74,67 +70,48 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
     let of = |name: &str| columns.get(name).ok_or_else(|| format!("{file}: no column `{name}`"));
     let (time_s, motor_deg, torque_nm, ramp) =
         (of("time_s")?, of("x_motor_deg")?, of("torque_motor_nm")?, of("test_nr")?);
-    let small = ramp.iter().take_while(|n| **n <= LAST_SMALL_RAMP).count();
     let step_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
-    // Radians and newton metres stand for metres and newtons: the filter asks only that they fit each other.
-    let motor_rad: Vec<f64> = motor_deg.iter().map(|x| x.to_radians()).collect();
-    let dx_rad: Vec<f64> = motor_rad.iter().map(|x| -x).collect();
-    let load_nm: Vec<f64> = torque_nm.iter().map(|t| -t).collect();
-    let parts = [small, dx_rad.len()];
-    let published = |end: usize| {
-        let segment = 0..end;
-        let samples = samples(step_s, [&motor_rad, &dx_rad, &load_nm], &segment);
-        let filter = filter(step_s).map_err(|e| format!("{file}: {e}"))?;
-        Ok::<f64, String>(
-            midrange::estimate(&samples, &filter).map_or(f64::NAN, |m| m.gap.gap_m.to_degrees()),
-        )
+    // Motor, relative position and load at a radius. At 1 m, radians and newton metres stand for metres and newtons: the
+    // filter asks only that they fit each other.
+    let at = |radius_m: f64| {
+        let motor_m: Vec<f64> = motor_deg.iter().map(|x| x.to_radians() * radius_m).collect();
+        let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
+        let load_n: Vec<f64> = torque_nm.iter().map(|t| -t / radius_m).collect();
+        [motor_m, dx_m, load_n]
     };
-    let motor_m: Vec<f64> = motor_rad.iter().map(|x| x * RADIUS_M).collect();
-    let dx_m: Vec<f64> = dx_rad.iter().map(|x| x * RADIUS_M).collect();
-    let load_n: Vec<f64> = load_nm.iter().map(|t| t / RADIUS_M).collect();
+    let (angles, lengths) = (at(1.0), at(RADIUS_M));
+    let small = ramp.iter().take_while(|n| **n <= LAST_SMALL_RAMP).count();
+    let found = |end: usize| methods(step_s, end, &angles, &lengths).map_err(|e| format!("{file}: {e}"));
+    Ok(GearBenchLog { authors_deg, found_deg: [found(small)?, found(time_s.len())?] })
+}
+
+/// Every method of [`GEAR_METHODS`] over the beginning of a log, degrees: motor, relative position and load at 1 m, and at
+/// [`RADIUS_M`].
+fn methods(
+    step_s: f64,
+    end: usize,
+    angles: &[Vec<f64>; 3],
+    lengths: &[Vec<f64>; 3],
+) -> Result<[f64; GEAR_METHODS.len()], estimator::Error> {
+    let whole = 0..end;
+    let segments = std::slice::from_ref(&whole);
     let prior = PartPrior {
         reference_load_n: Some(REFERENCE_LOAD_N),
         output_locked: true,
         ..PartPrior::of_stiffness(STIFFNESS_NM_PER_RAD / (RADIUS_M * RADIUS_M))
     };
-    let regression = |end: usize| {
-        let segment = 0..end;
-        let samples = samples(step_s, [&motor_m, &dx_m, &load_n], &segment);
-        let outcome = contact::estimate(&samples, &prior, &mut ContactWorkspace::default())
-            .map_err(|e| format!("{file}: {e}"))?;
-        let degrees = |length_m: Option<f64>| length_m.map_or(f64::NAN, |m| (m / RADIUS_M).to_degrees());
-        let found = outcome.ok();
-        let lengths_m = [
-            found.as_ref().map(|found| found.gap_m),
-            found.and_then(|found| found.loop_width_m).map(|width| width.0),
-        ];
-        Ok::<[f64; 2], String>(lengths_m.map(degrees))
-    };
-    let [[small_gap, small_loop], [whole_gap, whole_loop]] = [regression(parts[0])?, regression(parts[1])?];
-    Ok(GearBenchLog {
-        authors_deg,
-        contact_deg: [small_gap, whole_gap],
-        loop_deg: [small_loop, whole_loop],
-        midrange_deg: [published(parts[0])?, published(parts[1])?],
-        lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),
-        spread_deg: parts.map(|end| spread_m(&dx_rad[..end]).to_degrees()),
-    })
-}
-
-/// The beginning of a log as the estimators take it: motor, relative position and load.
-fn samples<'a>(
-    step_s: f64,
-    [motor, dx, load]: [&'a [f64]; 3],
-    segment: &'a std::ops::Range<usize>,
-) -> Samples<'a> {
-    let end = segment.end;
-    Samples {
-        step_s,
-        motor_m: &motor[..end],
-        dx_m: &dx[..end],
-        load_n: &load[..end],
-        segments: std::slice::from_ref(segment),
-    }
+    let [motor_m, dx_m, load_n] = lengths.each_ref().map(|values| &values[..end]);
+    let samples = Samples { step_s, motor_m, dx_m, load_n, segments };
+    let found = contact::estimate(&samples, &prior, &mut ContactWorkspace::default())?.ok();
+    let gap_m = found.as_ref().map(|found| found.gap_m);
+    let loop_m = found.and_then(|found| found.loop_width_m).map(|width| width.0);
+    let [gap, loop_width] =
+        [gap_m, loop_m].map(|length_m| length_m.map_or(f64::NAN, |m| (m / RADIUS_M).to_degrees()));
+    let [motor_m, dx_m, load_n] = angles.each_ref().map(|values| &values[..end]);
+    let samples = Samples { step_s, motor_m, dx_m, load_n, segments };
+    let midrange = midrange::estimate(&samples, &filter(step_s)?).map_or(f64::NAN, |m| m.gap.gap_m);
+    let of_angles = [midrange, load_lines_m(dx_m, load_n), spread_m(dx_m)].map(f64::to_degrees);
+    Ok([gap, loop_width, of_angles[0], of_angles[1], of_angles[2]])
 }
 
 fn filter(step_s: f64) -> Result<Filter, estimator::Error> {

@@ -16,3 +16,21 @@ pub mod robot_logs;
 pub mod scenarios;
 
 pub use drawing::Drawn;
+
+/// A template with its places `{{NAME}}` filled.
+pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
+    values
+        .iter()
+        .fold(template.to_owned(), |text, (name, value)| text.replace(&format!("{{{{{name}}}}}"), value))
+}
+
+/// Writes a file into a folder, which is created.
+///
+/// # Errors
+/// Why it cannot be written, as text.
+pub fn write(folder: &std::path::Path, name: &str, text: &str) -> Result<(), String> {
+    let file = folder.join(name);
+    std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&file, text))
+        .map_err(|e| format!("{}: {e}", file.display()))
+}

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use validation::methods::{MethodResults, estimate_flight};
 use validation::metrics::ErrorStats;
 use validation::scenarios::{Class, Kind, classes};
-use validation::{accuracy_page, gear_bench, plots, robot_logs};
+use validation::{accuracy_page, gear_bench, plots, robot_logs, write};
 
 /// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]
@@ -140,11 +140,4 @@ fn csv(wanted: &[&Class], results: &[Vec<MethodResults>]) -> String {
         let _ = writeln!(text, "\"{}\",{},{numbers},{codes}", class.name, result.index);
     }
     text
-}
-
-fn write(folder: &Path, name: &str, text: &str) -> Result<(), String> {
-    let file = folder.join(name);
-    std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(&file, text))
-        .map_err(|e| format!("{}: {e}", file.display()))
 }

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use validation::paper::{Claims, page, pictures};
+use validation::write;
 
 /// Draws figures 2 to 7 of the paper from a simulated flight, measures its claims, and writes `paper.md`.
 #[derive(Debug, Parser)]
@@ -34,14 +35,6 @@ fn run(folder: &Path) -> Result<(), String> {
     for (name, picture) in pictures(&claims) {
         write(&folder.join("pictures"), name, &picture.map_err(|e| format!("{name}: {e}"))?)?;
     }
-    Ok(())
-}
-
-fn write(folder: &Path, name: &str, text: &str) -> Result<(), String> {
-    let file = folder.join(name);
-    std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(&file, text))
-        .map_err(|e| format!("{}: {e}", file.display()))?;
-    println!("{}", file.display());
+    println!("{}", folder.join("paper.md").display());
     Ok(())
 }

@@ -114,6 +114,7 @@ impl Claims {
         let flights = fly_all(&sensors)?;
         let usual = filter(Assumed::default(), &sensors, STEP_S)?;
         let own = states(&usual, &flights[0], None)?;
+        let converging = Converging { filter: &usual, flight: &flights[0], right: &own };
         let known_m: Vec<f64> = gaps_m(&usual, &flights)?;
         let assume = |assumed: Assumed| gaps_m(&filter(assumed, &sensors, STEP_S)?, &flights);
         let against_known = |factors: &[f64], assumed: fn(f64) -> Assumed| {
@@ -131,8 +132,13 @@ impl Claims {
         Ok(Self {
             gap: mid_range(&backlash_m(&own))?,
             known: Change::of(1.0, &errors(&known_m)),
-            starts: starts(&usual, &flights[0], &own)?,
-            spreads: spreads(&usual, &flights[0], &own)?,
+            starts: vec![
+                converging.after("backlash 1 mm off", |state| state.x[2] += WRONG_M)?,
+                converging.after("position 1 mm off", |state| state.x[0] += WRONG_M)?,
+                converging.after("speed 0.1 m/s off", |state| state.x[1] += 0.1)?,
+                converging.after("x₀ = 0", |state| state.x.fill(0.0))?,
+            ],
+            spreads: SPREADS.iter().map(|&factor| converging.with_spread(factor)).collect::<Result<_>>()?,
             noise: NOISES.par_iter().map(|&factor| noise(factor)).collect::<Result<_>>()?,
             tuning: tuning.collect::<Result<_>>()?,
             damping: against_known(&DECADES, |damping| Assumed { damping, ..Assumed::default() })?,
@@ -167,55 +173,37 @@ fn noise(factor: f64) -> Result<Change> {
     Ok(Change::of(factor, &errors(&gaps_m(&filter, &fly_all(&sensors)?)?)))
 }
 
-/// S from a start against S from the right one.
-fn convergence(
-    name: String,
-    filter: &Filter,
-    flight: &Flight,
-    right: &[KalmanState],
-    start: KalmanState,
-) -> Result<Convergence> {
-    let found = states(filter, flight, Some(start))?;
-    let error_m: Vec<f64> =
-        found.iter().zip(right).map(|(one, other)| (one.x[2] - other.x[2]).abs()).collect();
-    let last = error_m.iter().rposition(|error| *error > CONVERGED * GAP_M);
-    Ok(Convergence { name, error_m, time_s: last.map_or(0.0, |k| (k + 1) as f64 * STEP_S) })
+/// A flight whose S converges from wrong starts to S from the right one.
+struct Converging<'a> {
+    filter: &'a Filter,
+    flight: &'a Flight,
+    right: &'a [KalmanState],
 }
 
-fn right_start(filter: &Filter, flight: &Flight) -> KalmanState {
-    filter.initial_state(flight.screw_m[0] - flight.motor_m[0], flight.load_n[0])
-}
+impl Converging<'_> {
+    fn after(&self, name: &str, spoil: impl FnOnce(&mut KalmanState)) -> Result<Convergence> {
+        let flight = self.flight;
+        let mut start = self.filter.initial_state(flight.screw_m[0] - flight.motor_m[0], flight.load_n[0]);
+        spoil(&mut start);
+        let found = states(self.filter, flight, Some(start))?;
+        let error_m: Vec<f64> =
+            found.iter().zip(self.right).map(|(one, other)| (one.x[2] - other.x[2]).abs()).collect();
+        let last = error_m.iter().rposition(|error| *error > CONVERGED * GAP_M);
+        let time_s = last.map_or(0.0, |k| (k + 1) as f64 * STEP_S);
+        Ok(Convergence { name: name.to_owned(), error_m, time_s })
+    }
 
-/// Makes a state wrong.
-type Spoil = fn(&mut KalmanState);
-
-fn starts(filter: &Filter, flight: &Flight, right: &[KalmanState]) -> Result<Vec<Convergence>> {
-    let changes: [(&str, Spoil); 4] = [
-        ("backlash 1 mm off", |state| state.x[2] += WRONG_M),
-        ("position 1 mm off", |state| state.x[0] += WRONG_M),
-        ("speed 0.1 m/s off", |state| state.x[1] += 0.1),
-        ("x₀ = 0", |state| state.x.fill(0.0)),
-    ];
-    let start = |(name, change): &(&str, fn(&mut KalmanState))| {
-        let mut state = right_start(filter, flight);
-        change(&mut state);
-        convergence((*name).to_owned(), filter, flight, right, state)
-    };
-    changes.iter().map(start).collect()
-}
-
-fn spreads(filter: &Filter, flight: &Flight, right: &[KalmanState]) -> Result<Vec<Convergence>> {
-    let start = |&factor: &f64| {
-        let mut state = right_start(filter, flight);
-        state.x[2] += WRONG_M;
-        state.p *= factor;
+    /// From a wrong backlash, with P₀ times a factor.
+    fn with_spread(&self, factor: f64) -> Result<Convergence> {
         let name = match factor.log10().round() as i32 {
             0 => "P₀ as configured".to_owned(),
             exponent => format!("P₀ × 10^{exponent}"),
         };
-        convergence(name, filter, flight, right, state)
-    };
-    SPREADS.iter().map(start).collect()
+        self.after(&name, |state| {
+            state.x[2] += WRONG_M;
+            state.p *= factor;
+        })
+    }
 }
 
 /// A gap that doubles within the flight, by windows.

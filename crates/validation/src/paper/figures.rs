@@ -7,7 +7,7 @@ use crate::drawing::{
     Area, Axes, BLUE, Drawn, Failure, GREEN, GREY, GRID, INK, ORANGE, builder, chart, drawing, mesh, text,
 };
 use crate::paper::claims::{Change, Claims, Convergence};
-use crate::paper::{GAP_M, STEP_S};
+use crate::paper::{GAP_M, STEP_S, backlash_m};
 
 const PURPLE: RGBColor = RGBColor(0x7B, 0x4F, 0x9E);
 const COLOURS: [RGBColor; 5] = [BLUE, ORANGE, GREEN, GREY, PURPLE];
@@ -163,12 +163,8 @@ fn end_s(claims: &Claims) -> f64 {
     claims.states.len() as f64 * STEP_S
 }
 
-fn s_m(claims: &Claims) -> Vec<f64> {
-    claims.states.iter().map(|state| state.x[2]).collect()
-}
-
 fn backlash(claims: &Claims) -> Drawn {
-    let points = over_time(&s_m(claims), 1e6);
+    let points = over_time(&backlash_m(&claims.states), 1e6);
     let (low, high) = range(points.iter().map(|(_, y)| *y));
     let end = end_s(claims);
     let level = |name: &str, colour, level_m: f64| -> Curve {
@@ -189,7 +185,7 @@ fn backlash(claims: &Claims) -> Drawn {
 
 /// S against another quantity: dots above the mid-range in one colour, those below in another.
 fn scatter(claims: &Claims, name: &str, x: &[f64]) -> Drawn {
-    let s_um: Vec<f64> = s_m(claims).iter().map(|s| 1e6 * s).collect();
+    let s_um: Vec<f64> = backlash_m(&claims.states).iter().map(|s| 1e6 * s).collect();
     let every = (s_um.len() / DOTS).max(1);
     let picked: Vec<usize> = (SETTLED..s_um.len() - 1).step_by(every).collect();
     let (left, right) = range(picked.iter().map(|k| x[*k]));
