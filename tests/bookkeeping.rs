@@ -11,21 +11,14 @@ use crate::harness::{TestFleet, facts, rewrite, without};
 
 const TABLE: &str = "sample-data/installations.csv";
 
-fn edit(fleet: &TestFleet, file: &str, change: impl Fn(&str) -> String) {
-    let text = std::fs::read_to_string(fleet.path(file)).unwrap();
-    let changed = change(&text);
-    assert_ne!(changed, text, "{file} was not changed");
-    std::fs::write(fleet.path(file), changed).unwrap();
-}
-
 /// The trend of every unit, by serial number.
 fn trend(fleet: &TestFleet) -> BTreeMap<String, Value> {
-    let rows: Vec<Value> = serde_json::from_str(&fleet.run_ok(&["trend", "--json"])).unwrap();
+    let rows = fleet.rows(&["trend"]);
     rows.into_iter().map(|row| (row["serial_number"].as_str().unwrap().to_owned(), row)).collect()
 }
 
 fn run(fleet: &TestFleet) -> Value {
-    serde_json::from_str(&fleet.freeplay(&["run", "--json"]).out).unwrap()
+    fleet.freeplay(&["run", "--json"]).json()
 }
 
 /// Number of exported records that hold a text.
@@ -37,13 +30,11 @@ fn records_with(fleet: &TestFleet, text: &str) -> usize {
 #[test]
 fn a_corrected_table_counts_without_the_logs_and_before_the_next_run() {
     let fleet = TestFleet::processed();
-    edit(&fleet, "pipeline.toml", |text| {
-        text.replacen("limit_m = 150e-6\nwatch_m = 110e-6", "limit_m = 60e-6", 1)
-    });
+    fleet.configure("limit_m = 150e-6\nwatch_m = 110e-6", "limit_m = 60e-6");
     std::fs::rename(fleet.path("sample-data/logs/N414FP"), fleet.path("archive")).unwrap();
     let before = trend(&fleet)["1040-0013"].clone();
     assert_eq!(before["state"], "act", "{before}");
-    edit(&fleet, TABLE, |table| {
+    fleet.edit(TABLE, |table| {
         table.replace(
             "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,,2310.0,3744.0",
             "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,2026-10-01T00:00:00Z,2310.0,3744.0\n\
@@ -96,8 +87,8 @@ fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
     assert_eq!(rows.len(), 10);
     let table = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned();
     std::fs::write(fleet.path("flights.csv"), rows.iter().fold(table, |all, row| all + row)).unwrap();
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
-    for log in fleet.logs().into_iter().filter(|log| log.to_str().unwrap().contains("N412FP")) {
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
+    for log in fleet.logs_of("N412FP") {
         let mut identity = facts(&log);
         identity.retain(|(key, _)| key != "flight_hours" && key != "tail_hours_end");
         identity.iter_mut().filter(|(key, _)| key == "flight_id").for_each(|(_, id)| *id = "FP100".into());
@@ -138,7 +129,7 @@ fn departures_in_another_zone_are_named() {
     let rows: String = fleet.logs().into_iter().map(row).collect();
     std::fs::write(fleet.path("flights.csv"), format!("tail_number,flight_id,departure_utc\n{rows}"))
         .unwrap();
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
     let before = trend(&fleet);
     let notes = run(&fleet)["notes"].to_string();
     assert!(notes.contains("departures are -5 h from those of the logs"), "{notes}");
@@ -155,7 +146,7 @@ fn a_misread_hour_meter_moves_no_usage_and_is_named() {
              N414FP,X1,2026-10-02T00:00:00Z,1.0,{meter}\n"
         )
     };
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
     let with = |meter: &str| {
         std::fs::write(fleet.path("flights.csv"), rows(meter)).unwrap();
         trend(&fleet)["1040-0013"].clone()
@@ -171,7 +162,7 @@ fn a_misread_hour_meter_moves_no_usage_and_is_named() {
 #[test]
 fn a_unit_is_where_the_table_has_it_now() {
     let fleet = TestFleet::processed();
-    edit(&fleet, TABLE, |table| {
+    fleet.edit(TABLE, |table| {
         let out = "1040-0013,2026-09-07T00:00:00Z,2026-11-15T00:00:00Z,";
         let moved = table.replace("1040-0013,2026-09-07T00:00:00Z,,", out);
         let moved = moved.replace(
@@ -180,7 +171,7 @@ fn a_unit_is_where_the_table_has_it_now() {
         );
         moved + "N412FP,aileron_left,EMA-27-1040,1040-0013,2026-11-15T00:00:00Z,,,\n"
     });
-    edit(&fleet, "pipeline.toml", |text| text.replace("as_of = \"newest_record\"", "as_of = \"now\""));
+    fleet.configure("as_of = \"newest_record\"", "as_of = \"now\"");
     let rows = trend(&fleet);
     let place = |serial: &str| {
         let row = &rows[serial];
@@ -194,8 +185,8 @@ fn a_unit_is_where_the_table_has_it_now() {
 #[test]
 fn another_limit_is_told_as_the_cause_of_a_state() {
     let fleet = TestFleet::processed();
-    edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6", "limit_m = 1500e-6", 1));
-    edit(&fleet, "pipeline.toml", |text| text.replacen("watch_m = 110e-6", "watch_m = 20e-6", 1));
+    fleet.configure("limit_m = 150e-6", "limit_m = 1500e-6");
+    fleet.configure("watch_m = 110e-6", "watch_m = 20e-6");
     let summary = run(&fleet);
     let changed = summary["changed"].as_array().unwrap();
     assert!(!changed.is_empty(), "{summary}");
@@ -214,15 +205,14 @@ fn another_limit_is_told_as_the_cause_of_a_state() {
 fn a_path_that_comes_back_with_another_flight_adds_a_flight() {
     let fleet = TestFleet::sample();
     let logs = fleet.logs();
-    edit(&fleet, "pipeline.toml", |text| text.replace("sample-data/logs/**/*.parquet", "inbox/*.parquet"));
+    fleet.configure("sample-data/logs/**/*.parquet", "inbox/*.parquet");
     std::fs::create_dir(fleet.path("inbox")).unwrap();
     for (night, log) in logs.iter().take(3).enumerate() {
         std::fs::copy(log, fleet.path("inbox/N412FP.parquet")).unwrap();
         fleet.run_ok(&["run"]);
         assert_eq!(records_with(&fleet, "N412FP"), 4 * (night + 1));
     }
-    let other = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-    let other = other.replace("inbox/*.parquet", "sample-data/logs/N413FP/*.parquet");
+    let other = fleet.read("pipeline.toml").replace("inbox/*.parquet", "sample-data/logs/N413FP/*.parquet");
     std::fs::write(fleet.path("other.toml"), other).unwrap();
     fleet.run_ok(&["--config", "other.toml", "run"]);
     fleet.run_ok(&["run"]);
@@ -233,11 +223,9 @@ fn a_path_that_comes_back_with_another_flight_adds_a_flight() {
 #[test]
 fn a_corrected_departure_moves_a_flight() {
     let fleet = TestFleet::sample();
-    edit(&fleet, "pipeline.toml", |text| {
-        let text = text.replace("departure_utc = \"departure_utc\", ", "");
-        text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n")
-            .replace("logs/**/*.parquet", "logs/N412FP/*.parquet")
-    });
+    fleet.configure("departure_utc = \"departure_utc\", ", "");
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
+    fleet.configure("logs/**/*.parquet", "logs/N412FP/*.parquet");
     let rows = |first_hour: u32| {
         let row = |n: u32| {
             let hour = if n == 1 { first_hour } else { 10 };
@@ -249,7 +237,7 @@ fn a_corrected_departure_moves_a_flight() {
     };
     rows(10);
     // A log without its row fails, and is stored once the row is there.
-    edit(&fleet, "flights.csv", |text| text.lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
+    fleet.edit("flights.csv", |text| text.lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
     assert_eq!(records_with(&fleet, "N412FP"), 36);
     rows(10);
@@ -261,8 +249,8 @@ fn a_corrected_departure_moves_a_flight() {
     assert_eq!((records_with(&fleet, "N412FP"), records_with(&fleet, "2026-10-01T12:00:00")), (40, 4));
     assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
     // A log that moved to another folder and name is no other flight.
-    let log = fleet.logs().into_iter().find(|log| log.to_str().unwrap().contains("N412FP")).unwrap();
-    std::fs::rename(&log, log.with_file_name("renamed.parquet")).unwrap();
+    let log = &fleet.logs_of("N412FP")[0];
+    std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
     let summary = fleet.run_ok(&["run"]);
     assert!(!summary.contains("absent"), "{summary}");
     assert_eq!(records_with(&fleet, "N412FP"), 40);
@@ -276,10 +264,7 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
     let fleet = TestFleet::sample();
     let log = fleet.logs().swap_remove(0);
     let whole = log.with_file_name("z_whole.parquet");
-    let before = {
-        let fleet = TestFleet::processed();
-        fleet.exported()
-    };
+    let before = TestFleet::processed().exported();
     std::fs::copy(&log, fleet.path("whole")).unwrap();
     rewrite(
         &fleet.path("whole"),
@@ -319,7 +304,7 @@ fn a_unit_keeps_its_history_under_its_numbers_of_today() {
     let fleet = TestFleet::processed();
     let before = trend(&fleet)["1040-0013"].clone();
     // A modification: another part number, on the same serial number, in the same place.
-    edit(&fleet, TABLE, |table| {
+    fleet.edit(TABLE, |table| {
         table.replace(
             "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,,2310.0,3744.0",
             "N414FP,aileron_left,EMA-27-1060,1040-0013,2026-09-07T00:00:00Z,2026-10-01T00:00:00Z,2310.0,3744.0\n\
@@ -330,7 +315,7 @@ fn a_unit_keeps_its_history_under_its_numbers_of_today() {
     // A new name plate.
     std::fs::write(fleet.path("aliases.csv"), "former_serial_number,serial_number\n1040-0005,SN-5\n")
         .unwrap();
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\naliases = \"aliases.csv\"\n"));
+    fleet.configure("[logs]\n", "[logs]\naliases = \"aliases.csv\"\n");
     let rows = trend(&fleet);
     assert_eq!(rows["SN-5"]["flights"], 10);
     assert!(!rows.contains_key("1040-0005"));
@@ -341,7 +326,7 @@ fn a_unit_keeps_its_history_under_its_numbers_of_today() {
 #[test]
 fn a_hangar_check_above_the_limit_makes_the_state_until_a_renewal() {
     let fleet = TestFleet::processed();
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\ninspections = \"checks.csv\"\n"));
+    fleet.configure("[logs]\n", "[logs]\ninspections = \"checks.csv\"\n");
     let check = |rows: &str| {
         std::fs::write(fleet.path("checks.csv"), format!("serial_number,date_utc,play_m\n{rows}")).unwrap();
     };
@@ -365,7 +350,7 @@ fn a_hangar_check_above_the_limit_makes_the_state_until_a_renewal() {
         "part_number,serial_number,utc,kind\nEMA-27-1040,1040-0005,2026-11-02T00:00:00Z,reshim\n",
     )
     .unwrap();
-    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nmaintenance = \"work.csv\"\n"));
+    fleet.configure("[logs]\n", "[logs]\nmaintenance = \"work.csv\"\n");
     assert_ne!(trend(&fleet)["1040-0005"]["state"], "act");
     // One that cannot be right is refused before anything is stored.
     check("1040-0005,2026-11-01T00:00:00Z,410\n");
@@ -392,7 +377,7 @@ fn table(version: usize, text: &str) -> String {
 fn any_order_of_commands_ends_where_one_run_does() {
     let source = TestFleet::sample();
     source.configure("logs/**/*.parquet", "logs/N412FP/*.parquet");
-    let whole = std::fs::read_to_string(source.path(TABLE)).unwrap();
+    let whole = source.read(TABLE);
     let logs: Vec<PathBuf> = source.logs().into_iter().take(5).collect();
     let name = |log: &Path| log.strip_prefix(source.path("")).unwrap().to_owned();
     for seed in 0..if is_gate() { 24 } else { 2 } {

@@ -9,6 +9,7 @@ use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::Value;
 
 use crate::gate::is_gate;
 
@@ -40,12 +41,25 @@ pub(crate) struct TestFleet {
     folder: tempfile::TempDir,
 }
 
-/// How a command result.
+/// How a command ended, and what it printed.
 #[derive(Debug)]
 pub(crate) struct CommandResult {
     pub(crate) code: Option<i32>,
     pub(crate) out: String,
     pub(crate) err: String,
+}
+
+impl CommandResult {
+    pub(crate) fn of(command: &mut std::process::Command) -> Self {
+        let output = command.output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Self { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// Standard output as JSON.
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_str(&self.out).unwrap()
+    }
 }
 
 impl TestFleet {
@@ -113,9 +127,7 @@ impl TestFleet {
     }
 
     pub(crate) fn freeplay(&self, args: &[&str]) -> CommandResult {
-        let output = self.command(args).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+        CommandResult::of(&mut self.command(args))
     }
 
     /// Runs a command that must end well.
@@ -123,6 +135,33 @@ impl TestFleet {
         let result = self.freeplay(args);
         assert_eq!(result.code, Some(0), "{args:?}: {result:?}");
         result.out
+    }
+
+    /// Output of a command with `--json` that must end well.
+    pub(crate) fn json(&self, args: &[&str]) -> Value {
+        serde_json::from_str(&self.run_ok(&[args, &["--json"]].concat())).unwrap()
+    }
+
+    /// The same, for a command that prints rows.
+    pub(crate) fn rows(&self, args: &[&str]) -> Vec<Value> {
+        serde_json::from_value(self.json(args)).unwrap()
+    }
+
+    pub(crate) fn read(&self, file: &str) -> String {
+        std::fs::read_to_string(self.path(file)).unwrap()
+    }
+
+    /// A file of JSON.
+    pub(crate) fn read_json(&self, file: &str) -> Value {
+        serde_json::from_str(&self.read(file)).unwrap()
+    }
+
+    /// Changes a text file.
+    pub(crate) fn edit(&self, file: &str, change: impl FnOnce(&str) -> String) {
+        let text = self.read(file);
+        let changed = change(&text);
+        assert_ne!(changed, text, "{file} was not changed");
+        std::fs::write(self.path(file), changed).unwrap();
     }
 
     /// Every stored record as CSV, without what differs between two runs of the same logs.
@@ -133,18 +172,28 @@ impl TestFleet {
 
     /// Replaces text in the configuration.
     pub(crate) fn configure(&self, from: &str, to: &str) {
-        let file = self.path("pipeline.toml");
-        let text = std::fs::read_to_string(&file).unwrap();
-        assert!(text.contains(from), "{from} is not in the configuration");
-        std::fs::write(file, text.replacen(from, to, 1)).unwrap();
+        assert!(self.read("pipeline.toml").contains(from), "{from} is not in the configuration");
+        self.edit("pipeline.toml", |text| text.replacen(from, to, 1));
+    }
+
+    /// Adds a table to the configuration.
+    pub(crate) fn configure_also(&self, table: &str) {
+        self.edit("pipeline.toml", |text| format!("{text}\n{table}"));
+    }
+
+    /// Paths that fit a pattern, by name.
+    pub(crate) fn glob(&self, pattern: &str) -> Vec<PathBuf> {
+        glob::glob(self.path(pattern).to_str().unwrap()).unwrap().flatten().collect()
     }
 
     /// The logs of the fleet, by name.
     pub(crate) fn logs(&self) -> Vec<PathBuf> {
-        let pattern = self.path("sample-data/logs/*/*.parquet");
-        let mut logs: Vec<PathBuf> = glob::glob(pattern.to_str().unwrap()).unwrap().flatten().collect();
-        logs.sort();
-        logs
+        self.glob("sample-data/logs/*/*.parquet")
+    }
+
+    /// The logs of a tail, by name.
+    pub(crate) fn logs_of(&self, tail: &str) -> Vec<PathBuf> {
+        self.glob(&format!("sample-data/logs/{tail}/*.parquet"))
     }
 }
 
@@ -231,6 +280,13 @@ pub(crate) fn facts(log: &Path) -> Facts {
         .filter_map(|p| Some((p.key.clone(), p.value.clone()?)))
         .filter(|p| p.0 != "ARROW:schema")
         .collect()
+}
+
+/// The identity of a log with another value of a key.
+pub(crate) fn facts_with(log: &Path, key: &str, value: &str) -> Facts {
+    let mut facts = facts(log);
+    facts.iter_mut().filter(|(known, _)| known == key).for_each(|(_, old)| value.clone_into(old));
+    facts
 }
 
 /// Rewrites some columns and rows of a log as doubles, under an identity.

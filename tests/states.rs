@@ -20,8 +20,12 @@ fn trend(units: &[(&str, Vec<f64>)], as_of: &[&str]) -> Vec<Value> {
     let header = "serial_number,departure_utc,gap_m,gap_se_m,flight_hours\n".to_owned();
     let table: String = std::iter::once(header).chain(units.iter().map(|(s, gaps)| rows(s, gaps))).collect();
     std::fs::write(fleet.path("history.csv"), table).unwrap();
-    let args = ["trend", "--estimates", "history.csv", "--limit-m", "150e-6", "--json"];
-    serde_json::from_str(&fleet.run_ok(&[&args, as_of].concat())).unwrap()
+    assess(&fleet, as_of)
+}
+
+/// The trend of the table in a folder, with a limit of 150 µm.
+fn assess(fleet: &TestFleet, as_of: &[&str]) -> Vec<Value> {
+    fleet.rows(&[&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"], as_of].concat())
 }
 
 #[test]
@@ -36,30 +40,22 @@ fn a_unit_measured_above_its_limit_says_so() {
         ("5-hours-from-it", rise(26)),
         ("6-calm", vec![70.0; 30]),
     ];
-    let mut found = Vec::new();
-    for (serial, gaps) in units {
+    let expected = [
+        ("plan", Some("inspect")),
+        ("act", Some("replace")),
+        ("act", Some("replace")),
+        ("act", Some("replace")),
+        ("plan", Some("inspect")),
+        ("normal", None),
+    ];
+    for ((serial, gaps), expected) in units.into_iter().zip(expected) {
         let day = format!("2026-01-{:02}T12:00:00Z", gaps.len());
         let row = trend(&[(serial, gaps.clone())], &["--as-of", &day]).swap_remove(0);
         let gap_um = row["gap_m"].as_f64().unwrap() * 1e6;
         assert!((gap_um - gaps[gaps.len() - 1]).abs() < 2.0, "{serial}: {gap_um}");
-        found.push((
-            serial,
-            row["state"].as_str().unwrap().to_owned(),
-            row["action"].as_str().map(str::to_owned),
-        ));
+        assert_eq!((row["state"].as_str().unwrap(), row["action"].as_str()), expected, "{serial}");
         assert_eq!(row["latest_utc"].as_str().unwrap()[..10], day[..10], "{row}");
     }
-    let expected = [
-        ("1-one-above", "plan", Some("inspect")),
-        ("2-three-above", "act", Some("replace")),
-        ("3-two-in-all", "act", Some("replace")),
-        ("4-rise", "act", Some("replace")),
-        ("5-hours-from-it", "plan", Some("inspect")),
-        ("6-calm", "normal", None),
-    ];
-    let expected =
-        expected.map(|(serial, state, action)| (serial, state.to_owned(), action.map(str::to_owned)));
-    assert_eq!(found, expected);
 }
 
 #[test]
@@ -80,17 +76,7 @@ fn records_dated_ahead_and_negative_usage_are_named_and_decide_nothing() {
     let table =
         format!("serial_number,departure_utc,gap_m,gap_se_m,flight_hours\n{}{ahead}", rows("U", &[70.0; 30]));
     std::fs::write(fleet.path("history.csv"), table).unwrap();
-    let args = [
-        "trend",
-        "--estimates",
-        "history.csv",
-        "--limit-m",
-        "150e-6",
-        "--as-of",
-        "2026-02-01T00:00:00Z",
-        "--json",
-    ];
-    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    let found = assess(&fleet, &["--as-of", "2026-02-01T00:00:00Z"]);
     let reason = found[0]["reason"].as_str().unwrap();
     assert_eq!(found[0]["state"], "normal", "{reason}");
     assert!(
@@ -120,9 +106,7 @@ fn neither_a_flag_nor_a_step_of_the_whole_tail_hides_records_above_the_limit() {
     let last_above: Vec<f64> = (0..28).map(|day| if day < 27 { 70.0 } else { 190.0 }).collect();
     add("E", &last_above, &|day| if day < 27 { ",T88," } else { ",T88,estimators_disagree" });
     std::fs::write(fleet.path("history.csv"), table).unwrap();
-    let day = ["--as-of", "2026-01-28T12:00:00Z", "--json"];
-    let args = [&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"], &day[..]].concat();
-    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    let found = assess(&fleet, &["--as-of", "2026-01-28T12:00:00Z"]);
     for row in &found {
         let (serial, reason) = (row["serial_number"].as_str().unwrap(), row["reason"].as_str().unwrap());
         let is_doubted = serial == "E";
@@ -141,7 +125,7 @@ fn a_lowered_limit_makes_every_unit_of_the_logs_due() {
         fleet.configure(&format!("limit_m = {limit}\nwatch_m = {watch}"), "limit_m = 20e-6\nwatch_m = 10e-6");
     }
     let run = fleet.freeplay(&["run", "--quiet", "--fail-on", "act"]);
-    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&["trend", "--json"])).unwrap();
+    let found = fleet.rows(&["trend"]);
     let states: Vec<&str> = found.iter().map(|row| row["state"].as_str().unwrap()).collect();
     assert_eq!((states.len(), run.code), (12, Some(4)), "{run:?}");
     assert!(states.iter().all(|state| *state == "act"), "{states:?}");

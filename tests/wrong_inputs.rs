@@ -1,15 +1,9 @@
 //! Wrong settings and tables that gave a wrong number or lost one without a word: each is found, and named.
 
-use crate::harness::{TestFleet, facts, rewrite};
-
-fn edit(fleet: &TestFleet, file: &str, change: impl FnOnce(String) -> String) {
-    let path = fleet.path(file);
-    std::fs::write(&path, change(std::fs::read_to_string(&path).unwrap())).unwrap();
-}
+use crate::harness::{TestFleet, facts, facts_with, rewrite};
 
 fn gaps_um(fleet: &TestFleet) -> Vec<f64> {
-    let rows = fleet.run_ok(&["query", "tail", "N412FP", "--json"]);
-    let rows: Vec<serde_json::Value> = serde_json::from_str(&rows).unwrap();
+    let rows = fleet.rows(&["query", "tail", "N412FP"]);
     rows.iter().map(|row| row["gap_m"].as_f64().unwrap() * 1e6).collect()
 }
 
@@ -68,7 +62,7 @@ fn flight_hours_in_minutes_are_refused_with_their_row() {
 #[test]
 fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_part() {
     let fleet = TestFleet::sample_data();
-    edit(&fleet, "sample-data/installations.csv", |table| {
+    fleet.edit("sample-data/installations.csv", |table| {
         let kept = table.lines().filter(|row| !(row.starts_with("N412FP") && row.contains("1060-0012")));
         kept.collect::<Vec<_>>().join("\n")
     });
@@ -81,16 +75,15 @@ fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_pa
 #[test]
 fn work_on_a_unit_that_was_never_installed_is_named() {
     let fleet = TestFleet::sample_data();
-    edit(&fleet, "sample-data/maintenance.csv", |table| {
-        table + "EMA-27-1040,1040-9999,2026-10-05T00:00:00Z,reshim\n"
+    fleet.edit("sample-data/maintenance.csv", |table| {
+        table.to_owned() + "EMA-27-1040,1040-9999,2026-10-05T00:00:00Z,reshim\n"
     });
-    edit(&fleet, "sample-data/inspections.csv", |table| table.replacen("1040-0013", "1040-0099", 1));
+    fleet.edit("sample-data/inspections.csv", |table| table.replacen("1040-0013", "1040-0099", 1));
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert!(run.out.contains("maintenance.csv: EMA-27-1040 / 1040-9999: no such unit"), "{}", run.out);
     assert!(run.out.contains("1040-0099: no such unit"), "{}", run.out);
     let json = fleet.freeplay(&["run", "--tail", "N412FP", "--json"]);
-    let json: serde_json::Value = serde_json::from_str(&json.out).unwrap();
-    assert_eq!(json["unknown_units"].as_array().unwrap().len(), 2);
+    assert_eq!(json.json()["unknown_units"].as_array().unwrap().len(), 2);
 }
 
 /// Inputs are not written over; a device is written to and stays one; a link stays a link.
@@ -141,8 +134,7 @@ fn the_samples_of_another_aircraft_are_named_with_both_flights() {
 fn units_and_formats_of_single_files_are_refused_with_what_is_wanted() {
     let fleet = TestFleet::sample();
     let log = &fleet.logs()[0];
-    let mut own = facts(log);
-    own.iter_mut().filter(|(key, _)| key == "flight_hours").for_each(|(_, value)| *value = "110.4".into());
+    let own = facts_with(log, "flight_hours", "110.4");
     rewrite(log, &log.with_file_name("minutes.parquet"), &own, |_| true, |_| true);
     let run = fleet.freeplay(&["run"]);
     assert_eq!(run.code, Some(1), "{run:?}");

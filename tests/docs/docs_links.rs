@@ -1,7 +1,7 @@
 //! The book in `docs/`: every page is in its contents, and every link leads somewhere.
 
 use std::collections::BTreeSet;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use regex::Regex;
 
@@ -28,27 +28,15 @@ fn broken(page: &Page, link: &str, pages: &[Page]) -> Option<String> {
         return None;
     }
     let (file, heading) = link.split_once('#').unwrap_or((link, ""));
-    let here = Path::new(&page.name);
-    let name = if file.is_empty() { here.to_owned() } else { plain(&here.parent()?.join(file)) };
-    if !top().join(&name).exists() {
+    let here = top().join(&page.name);
+    let target = if file.is_empty() { here } else { here.parent()?.join(file) };
+    let Ok(target) = target.canonicalize() else {
         return Some(format!("{}: `{link}` leads to no file", page.name));
-    }
-    let target = pages.iter().find(|p| Path::new(&p.name) == name);
-    let found = heading.is_empty() || target?.anchors.iter().any(|a| a == heading);
-    (!found).then(|| format!("{}: `{link}` names no heading there", page.name))
-}
-
-/// A path without `..`.
-fn plain(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for part in path.components() {
-        match part {
-            Component::ParentDir => drop(plain.pop()),
-            Component::CurDir => {}
-            other => plain.push(other),
-        }
-    }
-    plain
+    };
+    let is_target = |page: &&Page| top().join(&page.name).canonicalize().is_ok_and(|path| path == target);
+    let has_heading = |page: &Page| page.anchors.iter().any(|anchor| anchor == heading);
+    let is_found = heading.is_empty() || pages.iter().find(is_target).is_none_or(has_heading);
+    (!is_found).then(|| format!("{}: `{link}` names no heading there", page.name))
 }
 
 /// Readers do not find a page that is missing from the contents. Pages in folders below are those of other programs.

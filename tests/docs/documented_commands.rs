@@ -131,9 +131,7 @@ impl<'p> Try<'p> {
     fn block(&mut self, block: &Block, output: &mut String) {
         for change in block.marks.iter().filter_map(|mark| mark.strip_prefix("edit: ")) {
             let [file, from, to]: [String; 3] = serde_json::from_str(change).unwrap();
-            let (file, text) = (self.fleet.path(&file), fs::read_to_string(self.fleet.path(&file)).unwrap());
-            assert!(text.contains(&from), "{from} is not in {}", file.display());
-            fs::write(file, text.replacen(&from, &to, 1)).unwrap();
+            self.fleet.edit(&file, |text| text.replacen(&from, &to, 1));
         }
         if let Some(command) = block.mark("first:") {
             self.run(&Step { script: command.to_owned(), shown: None, code: 0 });

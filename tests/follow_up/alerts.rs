@@ -15,7 +15,7 @@ const IN_PLAN: [&str; 2] = ["1040-0009", "1040-0013"];
 /// The small fleet with a baseline of states; the next run finds two units in `plan`.
 fn fleet(alerts: &str) -> TestFleet {
     let fleet = processed_fleet();
-    append(&fleet, alerts);
+    fleet.configure_also(alerts);
     let first = fleet.freeplay(&["run", "--quiet"]);
     assert!(matches!(first.code, Some(0 | 5)), "{first:?}");
     fleet.configure(SHORT_HORIZON, LONG_HORIZON);
@@ -25,15 +25,9 @@ fn fleet(alerts: &str) -> TestFleet {
 /// The small fleet until September, where one unit is in `watch`, with a baseline.
 fn fleet_of_september() -> TestFleet {
     let fleet = TestFleet::sample();
-    append(&fleet, "[alerts.files]\nfolder = \"alerts\"\n");
+    fleet.configure_also("[alerts.files]\nfolder = \"alerts\"\n");
     fleet.run_ok(&["run", "--quiet", "--until", "2026-09-22"]);
     fleet
-}
-
-fn append(fleet: &TestFleet, text: &str) {
-    let file = fleet.path("pipeline.toml");
-    let old = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(file, old + "\n" + text).unwrap();
 }
 
 fn run(fleet: &TestFleet) -> CommandResult {
@@ -41,18 +35,21 @@ fn run(fleet: &TestFleet) -> CommandResult {
 }
 
 fn summary(result: &CommandResult) -> Value {
-    serde_json::from_str::<Value>(&result.out).unwrap()["alerts"].clone()
+    result.json()["alerts"].clone()
 }
 
 fn alerts(fleet: &TestFleet) -> Vec<Value> {
-    serde_json::from_str(&fleet.run_ok(&["store", "alerts", "--json"])).unwrap()
+    fleet.rows(&["store", "alerts"])
 }
 
 fn files(fleet: &TestFleet, folder: &str) -> Vec<Value> {
-    let mut files: Vec<_> =
-        std::fs::read_dir(fleet.path(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    files.iter().map(|file| serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()).collect()
+    let read = |file: std::path::PathBuf| fleet.read_json(file.to_str().unwrap());
+    fleet.glob(&format!("{folder}/*")).into_iter().map(read).collect()
+}
+
+/// Messages that the command `cat >> got` received.
+fn got(fleet: &TestFleet) -> Vec<Value> {
+    fleet.read("got").lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 fn serials(messages: &[Value]) -> Vec<&str> {
@@ -111,7 +108,7 @@ fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
         let killed = run(&fleet);
         assert_eq!(killed.code, None, "{killed:?}");
         // The run itself was complete before.
-        let info: Value = serde_json::from_str(&fleet.run_ok(&["store", "info", "--json"])).unwrap();
+        let info = fleet.json(&["store", "info"]);
         assert_eq!((&info["last_run"]["ended"], &info["last_run"]["exit_code"]), (&"well".into(), &0.into()));
         let statuses = |fleet: &TestFleet| -> Vec<String> {
             let rows = alerts(fleet);
@@ -126,8 +123,7 @@ fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
         assert_eq!(next.code, Some(5), "{next:?}");
         assert!(next.err.contains("error[alert_unconfirmed]"), "{}", next.err);
         assert_eq!((&summary(&next)["sent"], &summary(&next)["unconfirmed"]), (&1.into(), &1.into()));
-        let got = std::fs::read_to_string(fleet.path("got")).unwrap();
-        assert_eq!(got.lines().count(), received + 1, "{got}");
+        assert_eq!(got(&fleet).len(), received + 1);
         let after = run(&fleet);
         assert_eq!((after.code, &summary(&after)["unconfirmed_before"]), (Some(0), &1.into()));
         // A person has compared, and wants it again.
@@ -136,10 +132,9 @@ fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
             rows.iter().find(|row| row["status"] == "unconfirmed").unwrap()["alert_id"].as_str().unwrap();
         fleet.run_ok(&["store", "alerts", "--resend", id]);
         assert_eq!(summary(&run(&fleet))["sent"], 1);
-        let got = std::fs::read_to_string(fleet.path("got")).unwrap();
-        let ids: Vec<Value> = got.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-        assert_eq!(ids.len(), received + 2);
-        assert_eq!(ids.iter().filter(|message| message["id"] == id).count(), received + 1);
+        let got = got(&fleet);
+        assert_eq!(got.len(), received + 2);
+        assert_eq!(got.iter().filter(|message| message["id"] == id).count(), received + 1);
         assert_eq!(fleet.freeplay(&["store", "alerts", "--resend", "none"]).code, Some(2));
     }
 }
@@ -175,9 +170,7 @@ fn a_failing_command_a_timeout_and_a_bad_folder_lose_no_result() {
     assert_eq!(fleet.freeplay(&["run", "--fail-on", "plan", "--quiet"]).code, Some(4));
     fleet.configure("echo no route >&2; exit 75", "cat >> got");
     run(&fleet);
-    let got = std::fs::read_to_string(fleet.path("got")).unwrap();
-    let got: Vec<Value> = got.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(serials(&got), IN_PLAN);
+    assert_eq!(serials(&got(&fleet)), IN_PLAN);
 }
 
 /// A channel that was renamed with messages in it: they go through another one, or are taken back.
@@ -256,28 +249,6 @@ fn an_address_gets_each_change_once_after_it_answered_with_an_error() {
     assert!(!rows.contains("SECRET"), "{rows}");
 }
 
-#[test]
-fn a_channel_that_cannot_be_meant_is_refused() {
-    for (text, code) in [
-        ("[alerts.a]\n", "alert_channel"),
-        ("[alerts.a]\nfolder = \"x\"\nurl = \"https://example.com/\"\n", "alert_channel"),
-        ("[alerts.a]\ncommand = []\n", "alert_channel"),
-        ("[alerts.a]\nfolder = \"s3://bucket/x\"\n", "alert_channel"),
-        ("[alerts.a]\nurl = \"ftp://example.com/SECRET\"\n", "alert_channel"),
-        ("[alerts.a]\nfolder = \"x\"\nstates = [\"atc\"]\n", "unknown_state"),
-        ("[alerts.a]\nfolder = \"x\"\ntails = [\"[\"]\n", "bad_pattern"),
-        ("[alerts.a]\nfolder = \"x\"\ntimeout_s = 0\n", "not_positive"),
-        ("[alerts.a]\nfoldr = \"x\"\n", "unknown_key"),
-    ] {
-        let fleet = TestFleet::sample();
-        append(&fleet, text);
-        let result = fleet.freeplay(&["run"]);
-        assert_eq!(result.code, Some(2), "{text}: {result:?}");
-        assert!(result.err.contains(&format!("error[{code}]")), "{text}: {}", result.err);
-        assert!(!result.err.contains("SECRET"), "{}", result.err);
-    }
-}
-
 /// The scripts of the documentation, with a stand-in for `sendmail` and a receiver on loopback.
 #[test]
 #[cfg(unix)]
@@ -293,19 +264,15 @@ fn the_examples_of_a_mail_and_of_a_chat_message_work() {
     }
     std::fs::set_permissions(fleet.path("bin/sendmail"), PermissionsExt::from_mode(0o755)).unwrap();
     let script = |name: &str| top().join("docs/alerts").join(name).display().to_string();
-    append(
-        &fleet,
-        &format!(
-            "[alerts.mail]\ncommand = [\"python3\", {:?}, \"planner@example.com\", \"freeplay@example.com\"]\n\
-             [alerts.chat]\ncommand = [\"python3\", {:?}, \"hook\"]\n",
-            script("mail.py"),
-            script("chat.py")
-        ),
-    );
+    fleet.configure_also(&format!(
+        "[alerts.mail]\ncommand = [\"python3\", {:?}, \"planner@example.com\", \"freeplay@example.com\"]\n\
+         [alerts.chat]\ncommand = [\"python3\", {:?}, \"hook\"]\n",
+        script("mail.py"),
+        script("chat.py")
+    ));
     // A name that would add a header to a mail, and address everyone in a chat.
-    let table = fleet.path("sample-data/installations.csv");
-    let text = std::fs::read_to_string(&table).unwrap();
-    std::fs::write(&table, text.replace("1040-0013", "\"<!channel> @all\nBcc: all@example.com\"")).unwrap();
+    let name = "\"<!channel> @all\nBcc: all@example.com\"";
+    fleet.edit("sample-data/installations.csv", |text| text.replace("1040-0013", name));
     let path = format!("{}:{}", fleet.path("bin").display(), std::env::var("PATH").unwrap());
     let run = |args: &[&str]| {
         let output = fleet.command(args).env("PATH", &path).output().unwrap();
@@ -313,7 +280,7 @@ fn the_examples_of_a_mail_and_of_a_chat_message_work() {
     };
     run(&["run", "--quiet", "--until", "2026-09-22"]);
     run(&["run", "--quiet"]);
-    let mails = std::fs::read_to_string(fleet.path("mails")).unwrap();
+    let mails = fleet.read("mails");
     let headers = |name: &str| mails.lines().filter(|line| line.starts_with(name)).count();
     assert_eq!((headers("To: planner@example.com"), headers("Message-ID: <2026")), (3, 3), "{mails}");
     assert_eq!(headers("Bcc:"), 0, "{mails}");

@@ -15,10 +15,6 @@ use crate::harness::TestFleet;
 /// State, date, gap and limit of a unit.
 type Shown = (String, Option<Timestamp>, Option<f64>, Option<f64>);
 
-fn rows(fleet: &TestFleet, args: &[&str]) -> Vec<Value> {
-    serde_json::from_str(&fleet.run_ok(&[args, &["--json"]].concat())).unwrap()
-}
-
 fn date(value: &Value) -> Option<Timestamp> {
     value.as_str().map(|text| text.parse().unwrap())
 }
@@ -71,11 +67,9 @@ fn fleets() -> Vec<TestFleet> {
 fn every_surface_has_the_same_states_dates_and_counts() {
     let mut seen = BTreeMap::<String, usize>::new();
     for fleet in fleets() {
-        let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), config + "\n[alerts.files]\nfolder = \"alerts\"\n")
-            .unwrap();
+        fleet.configure_also("[alerts.files]\nfolder = \"alerts\"\n");
         fleet.run_ok(&["run", "--quiet", "--metrics", "freeplay.prom"]);
-        let units = rows(&fleet, &["trend"]);
+        let units = fleet.rows(&["trend"]);
         let trend = by_serial(units.iter().map(|unit| (unit, unit)));
         let counts = trend.values().fold(BTreeMap::<&str, u64>::new(), |mut counts, shown| {
             *counts.entry(&shown.0).or_default() += 1;
@@ -83,7 +77,7 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         });
         counts.iter().for_each(|(state, n)| *seen.entry((*state).to_owned()).or_default() += *n as usize);
 
-        let requests = rows(&fleet, &["work", "list"]);
+        let requests = fleet.rows(&["work", "list"]);
         let due: Vec<Option<Timestamp>> = requests.iter().map(|request| date(&request["due_utc"])).collect();
         assert!(due.is_sorted(), "by date: {due:?}");
         let dates =
@@ -92,9 +86,8 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         let wanted = wanted.map(|(serial, shown)| (Some(serial.as_str()), Some(shown.0.as_str()), shown.1));
         assert_eq!(dates.collect::<BTreeSet<_>>(), wanted.collect());
 
-        let message = std::fs::read_dir(fleet.path("alerts")).unwrap().next().unwrap().unwrap().path();
-        let message: Value = serde_json::from_slice(&std::fs::read(message).unwrap()).unwrap();
-        let metrics = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
+        let message = fleet.read_json(fleet.glob("alerts/*")[0].to_str().unwrap());
+        let metrics = fleet.read("freeplay.prom");
         for state in ["normal", "watch", "unassessed", "plan", "act"] {
             let n = counts.get(state).copied().unwrap_or_default();
             assert_eq!(message["states"][state].as_u64().unwrap_or_default(), n, "{state}: {message}");
@@ -115,8 +108,7 @@ fn every_surface_has_the_same_states_dates_and_counts() {
         }
 
         fleet.run_ok(&["report", "--quiet", "--output", "report"]);
-        let report = std::fs::read(fleet.path("report/report.json")).unwrap();
-        let report: Value = serde_json::from_slice(&report).unwrap();
+        let report = fleet.read_json("report/report.json");
         let units = report["units"].as_array().unwrap();
         assert_eq!(by_serial(units.iter().map(|unit| (unit, &unit["statement"]))), trend);
         dates_stay(&fleet, &trend, date(&report["newest_departure_utc"]).unwrap());
@@ -132,7 +124,7 @@ fn dates_stay(fleet: &TestFleet, trend: &BTreeMap<String, Shown>, newest: Timest
         plans.filter_map(|(serial, shown)| Some((serial, shown.1?))).collect();
     for days in [12, 28, 60, 90] {
         let as_of = (newest + SignedDuration::from_hours(24 * days)).to_string();
-        let units = rows(fleet, &["trend", "--as-of", &as_of]);
+        let units = fleet.rows(&["trend", "--as-of", &as_of]);
         let now = by_serial(units.iter().map(|unit| (unit, unit)));
         for (serial, before) in &before {
             let (state, due, ..) = &now[*serial];

@@ -13,13 +13,12 @@ fn fleet() -> TestFleet {
     fleet
 }
 
-fn requests(fleet: &TestFleet, status: &str) -> Vec<Value> {
-    let rows = fleet.run_ok(&["work", "list", "--status", status, "--json"]);
-    serde_json::from_str(&rows).unwrap()
+fn requests(fleet: &TestFleet, status: &str) -> Value {
+    fleet.json(&["work", "list", "--status", status])
 }
 
 fn summary(fleet: &TestFleet) -> Value {
-    serde_json::from_str::<Value>(&fleet.run_ok(&["run", "--json"])).unwrap()["work_requests"].clone()
+    fleet.json(&["run"])["work_requests"].clone()
 }
 
 fn ids(rows: &Value) -> Vec<&str> {
@@ -53,14 +52,13 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
 
     // The report shows both.
     fleet.run_ok(&["report", "--output", "report", "--quiet"]);
-    let index = std::fs::read_to_string(fleet.path("report/index.html")).unwrap();
+    let index = fleet.read("report/index.html");
     assert!(
         index.contains("W1 acknowledged")
             && index.contains("W2 deferred to <span class=\"d\">2099-01-31</span>"),
         "{index}"
     );
-    let report: Value =
-        serde_json::from_slice(&std::fs::read(fleet.path("report/report.json")).unwrap()).unwrap();
+    let report = fleet.read_json("report/report.json");
     let units = report["units"].as_array().unwrap();
     let with: Vec<&Value> = units.iter().filter(|unit| unit["work_requests"][0].is_object()).collect();
     assert_eq!(with.len(), 2);
@@ -68,12 +66,9 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
     // The mechanic enters a repair of one, and the store takes the other out of the aircraft.
     let repair = format!("{header}EMA-27-1040,1040-0009,2026-11-15T10:00:00Z,reshim\n");
     std::fs::write(fleet.path("maintenance.csv"), repair).unwrap();
-    let table = fleet.path("sample-data/installations.csv");
-    let text = std::fs::read_to_string(&table).unwrap();
-    let open = "1040-0013,2026-09-07T00:00:00Z,,";
-    assert!(text.contains(open));
-    let removed = "1040-0013,2026-09-07T00:00:00Z,2026-11-16T00:00:00Z,";
-    std::fs::write(&table, text.replace(open, removed)).unwrap();
+    let table = "sample-data/installations.csv";
+    let (open, removed) = (",2026-09-07T00:00:00Z,,", ",2026-09-07T00:00:00Z,2026-11-16T00:00:00Z,");
+    fleet.edit(table, |text| text.replace(&format!("1040-0013{open}"), &format!("1040-0013{removed}")));
     let after = summary(&fleet);
     assert_eq!((ids(&after["closed"]), &after["open"]), (vec!["W1", "W2"], &0.into()), "{after}");
     let closed = requests(&fleet, "closed");
@@ -82,9 +77,8 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
     assert_eq!(fleet.run_ok(&["work", "list"]), "no work request\n");
 
     // Installed on another aircraft, as it was.
-    let text = std::fs::read_to_string(&table).unwrap();
     let again = "N415FP,aileron_left,EMA-27-1040,1040-0013,2026-11-17T00:00:00Z,,,\n";
-    std::fs::write(&table, text + again).unwrap();
+    fleet.edit(table, |text| text.to_owned() + again);
     let after = summary(&fleet);
     assert_eq!(after["new"][0]["request_id"], "W2", "{after}");
     assert_eq!(after["new"][0]["tail_number"], "N415FP");

@@ -13,9 +13,7 @@ fn limited(fleet: &TestFleet, args: &str, kib: u64) -> CommandResult {
     let mut command = std::process::Command::new("sh");
     command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).current_dir(fleet.path("."));
     command.env("MALLOC_ARENA_MAX", "2").env_remove("FREEPLAY_CONFIG");
-    let output = command.stdin(Stdio::null()).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    CommandResult::of(command.stdin(Stdio::null()))
 }
 
 /// Each hostile log twice, under names that sort before and after those of the thirty sound ones, under 1 GiB.
@@ -59,7 +57,7 @@ fn hostile_tables_are_refused_with_code_2() {
         assert!(is_named, "{}: {}", hostile.name, result.err);
     }
     // CSV: columns, rows and names beyond what any table has, each with a short answer.
-    let sound = std::fs::read_to_string(fleet.path("sample-data/installations.csv")).unwrap();
+    let sound = fleet.read("sample-data/installations.csv");
     let columns: Vec<String> = (0..200_000).map(|k| format!("c{k}")).collect();
     let name = "p".repeat(1_000_000);
     fleet.configure("table.parquet", "table.csv");
@@ -102,8 +100,7 @@ fn normalize_overwrites_nothing_but_its_own() {
         "{both:?}"
     );
     fleet.run_ok(&["normalize", &log, "--output", "normalized"]);
-    let written: Vec<_> =
-        glob::glob(fleet.path("normalized/*/*/*").to_str().unwrap()).unwrap().flatten().collect();
+    let written = fleet.glob("normalized/*/*/*");
     assert_eq!(written.len(), 4, "{written:?}");
     std::fs::write(&written[0], "years").unwrap();
     assert_eq!(fleet.freeplay(&["normalize", &log, "--output", "normalized"]).code, Some(1));

@@ -4,9 +4,8 @@ use crate::harness::TestFleet;
 
 /// A value of the metrics file.
 fn metric(fleet: &TestFleet, name: &str) -> Option<f64> {
-    let text = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
     let name = format!("freeplay_{name} ");
-    text.lines().find_map(|line| line.strip_prefix(&name)?.parse().ok())
+    fleet.read("freeplay.prom").lines().find_map(|line| line.strip_prefix(&name)?.parse().ok())
 }
 
 /// The rules `FreeplayRunFailed` and `FreeplayRunOverdue` fire on what is written after code 2 and 3.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::harness::{CommandResult, Table, TestFleet, facts, write_log};
+use crate::harness::{CommandResult, Table, TestFleet, facts, facts_with, write_log};
 
 /// Clears a terminal, colours it, begins a line that looks like a message, and reverses the text that follows.
 const HOSTILE: &str = "\u{1b}[2J\u{1b}[31m\u{7}\nerror[forged]: x\u{202e}";
@@ -55,14 +55,13 @@ fn fleet() -> TestFleet {
     }
     std::fs::write(folder.join(format!("text{HOSTILE}.parquet")), "no log").unwrap();
     let log = &fleet.logs()[9];
-    let mut known = facts(log);
-    known.iter_mut().filter(|(key, _)| key == "departure_utc").for_each(|(_, v)| HOSTILE.clone_into(v));
+    let known = facts_with(log, "departure_utc", HOSTILE);
     let time = Table::read(log).numbers("time_s");
     let columns = vec![("time_s".to_owned(), time.clone()), (format!("other{HOSTILE}"), time)];
     write_log(&folder.join(format!("dated{HOSTILE}.parquet")), columns.clone(), &known);
     write_log(&folder.join(format!("lacks{HOSTILE}.parquet")), columns, &facts(log));
     fleet.configure("sample-data/logs/**/*.parquet", "hostile/*.parquet");
-    let table = std::fs::read_to_string(fleet.path("sample-data/installations.csv")).unwrap();
+    let table = fleet.read("sample-data/installations.csv");
     let mut rows = table.lines();
     let mut text = format!("{}\n", rows.next().unwrap());
     for row in rows.filter(|row| row.starts_with("N412FP")) {
@@ -93,8 +92,7 @@ fn a_hostile_name_has_no_effect_in_any_command() {
     let run = fleet.freeplay(&["run"]);
     is_harmless(&["run"], &run);
     assert!(run.out.contains("36 records of 9 flights"), "{run:?}");
-    let flight = fleet.freeplay(&["query", "position", &hostile("aileron_left"), "--json"]);
-    let rows: serde_json::Value = serde_json::from_str(&flight.out).unwrap();
+    let rows = fleet.json(&["query", "position", &hostile("aileron_left")]);
     let flight = rows[0]["flight_id"].as_str().unwrap().to_owned();
     let (tail, position) = (format!("{TAIL}{HOSTILE}"), hostile("aileron_left"));
     let log = format!("hostile/0{HOSTILE}.parquet");
@@ -128,12 +126,12 @@ fn a_hostile_name_has_no_effect_in_any_command() {
 fn a_hostile_name_stays_a_comment_or_a_string_in_a_proposed_configuration() {
     let fleet = fleet();
     fleet.run_ok(&["init", "proposed", "--from", "hostile"]);
-    let text = std::fs::read_to_string(fleet.path("proposed/pipeline.toml")).unwrap();
+    let text = fleet.read("proposed/pipeline.toml");
     assert!(!text.contains(['\u{1b}', '\u{202e}', '\u{7}']), "{text}");
     assert!(!text.lines().any(|line| line.starts_with("error[forged]")), "{text}");
     let checked = fleet.freeplay(&["check", "--config", "proposed/pipeline.toml"]);
     assert!(!checked.err.contains("config_invalid"), "{checked:?}");
-    let table = std::fs::read_to_string(fleet.path("proposed/installations.csv")).unwrap();
+    let table = fleet.read("proposed/installations.csv");
     assert!(!table.lines().any(|line| line.starts_with(['=', '+', '-', '@'])), "{table}");
 }
 

@@ -6,19 +6,14 @@ use serde_json::Value;
 
 use crate::harness::{TestFleet, print_line};
 
-fn rows(json: &str) -> Vec<Value> {
-    serde_json::from_str(json).unwrap()
-}
-
 /// `paper.gap_m` of `truth.json` was made by an independent program on the same channels.
 #[test]
 fn the_papers_statistic_agrees_with_the_reference_to_1e_9() {
     let fleet = TestFleet::of("flights");
-    let truth: BTreeMap<String, Value> =
-        serde_json::from_slice(&std::fs::read(fleet.path("truth.json")).unwrap()).unwrap();
+    let truth: BTreeMap<String, Value> = serde_json::from_str(&fleet.read("truth.json")).unwrap();
     for (name, truth) in &truth {
         let log = format!("{name}.parquet");
-        let found = rows(&fleet.run_ok(&["estimate", &log, "--part", &name[..1], "--json"])).remove(0);
+        let found = fleet.json(&["estimate", &log, "--part", &name[..1]])[0].clone();
         let (gap_m, wanted_m) =
             (found["gap_midrange_m"].as_f64().unwrap(), truth["paper"]["gap_m"].as_f64().unwrap());
         let true_m = truth["true_gap_m"].as_f64().unwrap();
@@ -48,7 +43,7 @@ fn the_whole_job_runs_on_them_too() {
 fn a_real_robot_ends_with_a_record_or_a_refusal_for_each_axis() {
     let fleet = TestFleet::of("kr300");
     fleet.run_ok(&["run"]);
-    let found = rows(&fleet.run_ok(&["query", "tail", "KR300", "--json"]));
+    let found = fleet.rows(&["query", "tail", "KR300"]);
     let axes: Vec<&str> = found.iter().map(|r| r["position"].as_str().unwrap()).collect();
     assert_eq!(axes, ["AX1", "AX2", "AX3"]);
     for row in &found {

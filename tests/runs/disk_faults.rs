@@ -8,7 +8,7 @@
 use crate::gate::is_gate;
 use crate::harness::{TestFleet, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records, seed};
-use crate::runs::interruption::{small, whole_flights};
+use crate::runs::interruption::{small, stored_records, whole_flights};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -43,6 +43,11 @@ fn done(command: &mut Command) -> Result<(), String> {
     if result.status.success() { Ok(()) } else { Err(format!("{command:?}: {}", errors.trim())) }
 }
 
+/// What a machine can do, or a line that says why the test is skipped.
+fn if_possible<T>(result: Result<T, String>) -> Option<T> {
+    result.inspect_err(|why| print_line(&format!("skipped: not possible here: {why}"))).ok()
+}
+
 /// A disk that is full at some byte: the run reports it with code 3, earlier results stay whole, and with
 /// free space again the next run finishes.
 #[test]
@@ -53,10 +58,8 @@ fn a_full_disk_leaves_the_store_whole_and_the_next_run_finishes() {
         let fleet = few();
         let disk = fleet.path("results");
         let size = format!("size={kib}k");
-        let _mounted = match Mounted::new(&["-t", "tmpfs", "-o", &size, "tmpfs"], &disk) {
-            Ok(mounted) => mounted,
-            Err(why) => return print_line(&format!("skipped: no file system can be mounted here: {why}")),
-        };
+        let mounted = Mounted::new(&["-t", "tmpfs", "-o", &size, "tmpfs"], &disk);
+        let Some(_mounted) = if_possible(mounted) else { return };
         let result = fleet.freeplay(&["run", "--jobs", "1"]);
         // A disk that is full after the results were stored leaves work requests and alerts to the next run.
         let named = match result.code {
@@ -157,30 +160,22 @@ fn cut(
 
 /// Files of the store at this moment.
 fn files_of(fleet: &TestFleet) -> usize {
-    glob::glob(fleet.path("disk/results/**/*").to_str().unwrap()).unwrap().count()
+    fleet.glob("disk/results/**/*").len()
 }
 
 /// Number of stored records, if the store is whole and holds at least what finished runs had reported as stored.
 /// A run that finished must have recorded its exit code.
 fn state(fleet: &TestFleet, promised: usize, ended: bool) -> Result<usize, String> {
-    let store = match store::Store::open(fleet.path("disk/results")) {
-        Err(error) if error.diagnostic().code == "store_missing" && promised == 0 => return Ok(0),
-        opened => opened.map_err(|e| e.to_string())?,
-    };
-    let records = store.records(&store::Query::default()).map_err(|e| e.to_string())?;
-    let keys: std::collections::BTreeSet<_> = records.iter().map(store::RecordKey::of).collect();
-    if keys.len() != records.len() || records.len() % 4 != 0 {
-        return Err(format!("{} records, {} of them different", records.len(), keys.len()));
+    let folder = fleet.path("disk/results");
+    let records = stored_records(&folder)?;
+    if records < promised {
+        return Err(format!("{promised} records were promised, {records} are there"));
     }
-    if records.len() < promised {
-        return Err(format!("{promised} records were promised, {} are there", records.len()));
-    }
-    let runs = store.runs().map_err(|e| e.to_string())?;
-    if ended && runs.last().is_none_or(|run| run.exit_code != Some(0)) {
+    let runs = || store::Store::open(&folder).and_then(|store| store.runs()).map_err(|e| e.to_string());
+    if ended && runs()?.last().is_none_or(|run| run.exit_code != Some(0)) {
         return Err("the last run finished, and its run record does not hold it".to_owned());
     }
-    let found = store.verify();
-    if found.is_empty() { Ok(records.len()) } else { Err(format!("{found:?}")) }
+    Ok(records)
 }
 
 fn on_a_disk() -> TestFleet {
@@ -198,10 +193,7 @@ fn a_power_cut_at_any_instant_loses_nothing_that_was_promised() {
     let (mut chance, mut partly) = (fastrand::Rng::with_seed(seed), 0);
     for number in 0..cuts {
         let fleet = on_a_disk();
-        let mut disk = match Disk::new(&fleet) {
-            Ok(disk) => disk,
-            Err(why) => return print_line(&format!("skipped: no disk image can be mounted here: {why}")),
-        };
+        let Some(mut disk) = if_possible(Disk::new(&fleet)) else { return };
         let kept = cut(&mut disk, &mut chance, None, number % 4 != 0);
         let kept = kept.unwrap_or_else(|wrong| panic!("cut {number}, seed {seed}: {wrong}"));
         partly += usize::from((1..40).contains(&kept));
@@ -219,16 +211,13 @@ fn is_caught(what: &str, flags: &[&str]) {
         (crate::harness::top().join("tests/data/disk/nosync.c"), library.path().join("lie.so"));
     let mut compile = Command::new("cc");
     compile.args(["-shared", "-fPIC", "-o"]).arg(&lie).arg(source).args(flags);
-    if let Err(why) = done(&mut compile) {
-        return print_line(&format!("skipped: no C compiler: {why}"));
+    if if_possible(done(&mut compile)).is_none() {
+        return;
     }
     let mut chance = fastrand::Rng::with_seed(1);
     for number in 1..=CONTROL_CUTS {
         let fleet = on_a_disk();
-        let mut disk = match Disk::new(&fleet) {
-            Ok(disk) => disk,
-            Err(why) => return print_line(&format!("skipped: no disk image can be mounted here: {why}")),
-        };
+        let Some(mut disk) = if_possible(Disk::new(&fleet)) else { return };
         if let Err(wrong) = cut(&mut disk, &mut chance, Some(&lie), false) {
             return print_line(&format!("without syncing {what}, cut {number} was caught: {wrong}"));
         }

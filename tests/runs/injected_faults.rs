@@ -87,18 +87,13 @@ impl Injector {
     }
 
     fn run(&self, fleet: &TestFleet, args: &[&str], fault: &Fault) -> CommandResult {
-        let output = self.command(fleet, args, fault).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+        CommandResult::of(&mut self.command(fleet, args, fault))
     }
 
     /// A command under a clock that is ahead by `ahead_s` seconds.
     pub(crate) fn with_clock(&self, fleet: &TestFleet, args: &[&str], ahead_s: i64) -> CommandResult {
         let mut command = fleet.command(args);
-        command.env("LD_PRELOAD", &self.library).env("CLOCK_OFFSET_S", ahead_s.to_string());
-        let output = command.output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+        CommandResult::of(command.env("LD_PRELOAD", &self.library).env("CLOCK_OFFSET_S", ahead_s.to_string()))
     }
 
     /// A run one of whose calls on the store fails.
@@ -110,37 +105,8 @@ impl Injector {
     pub(crate) fn full_disk(&self, fleet: &TestFleet) -> CommandResult {
         let count = self.count(fleet, &["run", "--jobs", "1", "--limit", "1"], "results", "write");
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        let fault = Fault { last: 0, ..Fault::at("results", "write", "28", count / 2) };
+        let fault = Fault { last: 0, ..Fault::at("results", "write", ENOSPC, count / 2) };
         self.run(fleet, &["run", "--jobs", "1"], &fault)
-    }
-
-    /// A run that is killed in the middle of its writes.
-    pub(crate) fn killed(&self, fleet: &TestFleet) {
-        let count = self.count(fleet, &["run", "--jobs", "1"], "results", "write");
-        std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        let fault = Fault::at("results", "write", "kill", count * 3 / 4);
-        assert_eq!(self.run(fleet, &["run", "--jobs", "1"], &fault).code, None);
-    }
-
-    /// A run in which the second log never ends, with a short time limit.
-    pub(crate) fn hanging_log(&self, fleet: &TestFleet) -> CommandResult {
-        let fault = self.hang(fleet);
-        let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
-        self.run(fleet, &["run", "--jobs", "1"], &fault)
-    }
-
-    /// A run while another one hangs in its second log.
-    pub(crate) fn beside_a_run_that_hangs(&self, fleet: &TestFleet) -> CommandResult {
-        let fault = self.hang(fleet);
-        let mut other = self.command(fleet, &["run", "--jobs", "1", "-q"], &fault);
-        let mut other = other.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let started = fleet.path("results/runs/_delta_log/00000000000000000001.json");
-        wait_until(|| started.exists());
-        let found = fleet.freeplay(&["run"]);
-        other.kill().unwrap();
-        other.wait().unwrap();
-        found
     }
 
     /// A hang in the middle of the reads of the small tail's second flight.
@@ -149,6 +115,13 @@ impl Injector {
         let count = self.count(fleet, &["run", "--jobs", "1"], under, "read");
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
         Fault { last: 0, ..Fault::at(under, "read", "hang", count / 2) }
+    }
+
+    /// The same, with a time limit of a second.
+    fn hang_with_limit(&self, fleet: &TestFleet) -> Fault {
+        let fault = self.hang(fleet);
+        fleet.configure_also("[run]\nlog_timeout_s = 1\n");
+        fault
     }
 
     /// How many calls a command makes.
@@ -182,15 +155,13 @@ fn calls(count: usize) -> Vec<usize> {
     (1 + step / 2..=count).step_by(step).collect()
 }
 
-/// The logs that the small fleet's configuration names.
-fn logs_of(fleet: &TestFleet) -> Vec<PathBuf> {
-    fleet.logs().into_iter().filter(|log| log.to_string_lossy().contains("N413FP")).collect()
-}
+/// The tail whose logs the small fleet's configuration names.
+const TAIL: &str = "N413FP";
 
 /// Three flights of four actuators.
 pub(crate) fn few() -> TestFleet {
     let fleet = small();
-    let kept = logs_of(&fleet).into_iter().take(3).collect::<Vec<_>>();
+    let kept = &fleet.logs_of(TAIL)[..3];
     fleet.logs().iter().filter(|log| !kept.contains(log)).for_each(|log| std::fs::remove_file(log).unwrap());
     fleet
 }
@@ -210,7 +181,7 @@ fn grown() -> TestFleet {
     static GROWN: OnceLock<TestFleet> = OnceLock::new();
     TestFleet::once(&GROWN, || {
         let fleet = few();
-        let log = logs_of(&fleet)[0].clone();
+        let log = fleet.logs_of(TAIL)[0].clone();
         let bytes = std::fs::read(&log).unwrap();
         std::fs::remove_file(&log).unwrap();
         fleet.run_ok(&["run", "-q"]);
@@ -237,13 +208,44 @@ struct Struck<'a> {
     args: &'static [&'static str],
     /// Records that the store must have after the command without a fault.
     wanted: &'a str,
+    /// Pages of a report that must be there after it.
+    pages: Vec<String>,
 }
 
 const RUN: &[&str] = &["run", "--jobs", "1"];
 
-impl Struck<'_> {
-    /// Runs the command with a fault, and then without: the second must end with every record, and the first must
-    /// have reported an error if the store lacks one. Returns the first exit code.
+/// Names of the files of a report.
+fn pages(fleet: &TestFleet) -> Vec<String> {
+    let name = |path: PathBuf| path.strip_prefix(fleet.path("")).unwrap().to_string_lossy().into_owned();
+    fleet.glob("pages/**/*").into_iter().map(name).collect()
+}
+
+impl<'a> Struck<'a> {
+    fn new(
+        injector: &'a Injector,
+        before: TestFleet,
+        args: &'static [&'static str],
+        wanted: &'a str,
+    ) -> Self {
+        let mut command = Self { injector, before, args, wanted, pages: Vec::new() };
+        if args[0] == "report" {
+            let plain = command.before.copied();
+            plain.run_ok(args);
+            command.pages = pages(&plain);
+            assert!(command.pages.len() > 4, "{:?}", command.pages);
+        }
+        command
+    }
+
+    /// How many calls the command makes.
+    fn count(&self, under: &'static str, kind: &'static str) -> usize {
+        let count = self.injector.count(&self.before.copied(), self.args, under, kind);
+        assert!(count > 0, "no call of {:?} on {under} was seen", self.args);
+        count
+    }
+
+    /// Runs the command with a fault, and then without: the second must end with every record and page, and the first
+    /// must have reported an error if one is missing. Returns the first exit code.
     fn tried(&self, fault: &Fault) -> Option<i32> {
         let fleet = self.before.copied();
         let struck = self.injector.run(&fleet, self.args, fault);
@@ -256,6 +258,9 @@ impl Struck<'_> {
         if struck.code == Some(0) || !is_run {
             assert!(fleet.exported() == self.wanted, "{fault:?} was not reported: {struck:?}");
         }
+        if struck.code == Some(0) {
+            assert_eq!(pages(&fleet), self.pages, "{fault:?} was not reported: {struck:?}");
+        }
         let healed = fleet.freeplay(self.args);
         assert_eq!(
             healed.code,
@@ -263,6 +268,7 @@ impl Struck<'_> {
             "without a fault after {fault:?}: {healed:?}; it followed {struck:?}"
         );
         assert!(fleet.exported() == self.wanted, "records differ without a fault after {fault:?}");
+        assert_eq!(pages(&fleet), self.pages, "pages differ without a fault after {fault:?}");
         whole_flights(&fleet);
         struck.code
     }
@@ -273,18 +279,28 @@ impl Struck<'_> {
     }
 }
 
-/// Exit codes and how often each came.
-#[derive(Default)]
-struct ExitCodes(BTreeMap<Option<i32>, usize>);
-
-impl std::fmt::Display for ExitCodes {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let shown = |(code, count): (&Option<i32>, &usize)| {
-            let code = code.map_or_else(|| "killed".to_owned(), |code| code.to_string());
-            format!("{code}: {count}")
-        };
-        f.write_str(&self.0.iter().map(shown).collect::<Vec<_>>().join(", "))
+/// Tries faults, and prints a row of the table in `docs/reliability.md`: what they struck, the calls that can fail, those
+/// that were tried, and how often each exit code came. No try lost or doubled a row, as `tried` would have failed.
+fn print_row(
+    what: &str,
+    count: usize,
+    faults: impl IntoIterator<Item = Fault>,
+    tried: impl Fn(&Fault) -> Option<i32>,
+) {
+    let mut codes = BTreeMap::<Option<i32>, usize>::new();
+    for fault in faults {
+        *codes.entry(tried(&fault)).or_default() += 1;
     }
+    let shown = |(code, count): (&Option<i32>, &usize)| match code {
+        Some(code) => format!("{code}: {count}"),
+        None => format!("killed: {count}"),
+    };
+    let shown: Vec<String> = codes.iter().map(shown).collect();
+    print_line(&format!(
+        "| {what} | {count} | {} | {} | 0 |",
+        codes.values().sum::<usize>(),
+        shown.join(", ")
+    ));
 }
 
 /// The name of an error number.
@@ -298,7 +314,7 @@ fn name(mode: &'static str) -> &'static str {
     }
 }
 
-/// Tries a fault at each call of a command; prints a row of the table in `docs/reliability.md`.
+/// Tries a fault at calls of a command.
 fn strike(
     args: &'static [&'static str],
     (make, store): (fn() -> TestFleet, &str),
@@ -306,29 +322,19 @@ fn strike(
     from: bool,
 ) {
     let Some(injector) = Injector::get() else { return };
-    let before = make();
-    let count = injector.count(&before.copied(), args, under, kind);
-    let command = Struck { injector, before, args, wanted: few_records() };
-    let mut codes = ExitCodes::default();
-    let tried = calls(count);
-    for &at in &tried {
-        let fault = Fault::at(under, kind, mode, at);
-        let fault = if from { Fault { last: 0, ..fault } } else { fault };
-        *codes.0.entry(command.tried(&fault)).or_default() += 1;
-    }
+    let command = Struck::new(injector, make(), args, few_records());
+    let count = command.count(under, kind);
+    let fault = |at| Fault { last: if from { 0 } else { at }, ..Fault::at(under, kind, mode, at) };
     let place = match under {
         "results" => "the store",
         "sample-data/logs" => "logs",
+        "pages" => "a page",
         table => table,
     };
     let all = if from { " and all that follow" } else { "" };
-    print_line(&format!(
-        "| `{}`, {store} | {} at a {kind} of {place}{all} | {count} | {} | {codes} | 0 |",
-        args[0..args.len().min(2)].join(" ").replace(" --jobs", ""),
-        name(mode),
-        tried.len()
-    ));
-    assert!(count > 0, "no call was seen");
+    let (args, mode) = (args[..args.len().min(2)].join(" ").replace(" --jobs", ""), name(mode));
+    let what = format!("`{args}`, {store} | {mode} at a {kind} of {place}{all}");
+    print_row(&what, count, calls(count).into_iter().map(fault), |fault| command.tried(fault));
 }
 
 const NEW: (fn() -> TestFleet, &str) = (few, "new store");
@@ -403,23 +409,20 @@ fn a_read_that_fails_makes_no_command_print_less() {
         assert_eq!(sound.code, Some(0), "{command:?}: {sound:?}");
         let count = injector.count(&fleet, command, "results", "read");
         for mode in [EIO, ESTALE] {
-            let (mut codes, tried) = (ExitCodes::default(), calls(count));
-            for &at in &tried {
-                let struck = injector.run(&fleet, command, &Fault::at("results", "read", mode, at));
-                assert!(matches!(struck.code, Some(0..=3 | 5)), "{mode} at {at}: {struck:?}");
+            let tried = |fault: &Fault| {
+                let struck = injector.run(&fleet, command, fault);
+                assert!(matches!(struck.code, Some(0..=3 | 5)), "{fault:?}: {struck:?}");
                 if struck.code == Some(0) {
-                    assert_eq!(struck.out, sound.out, "{command:?}: {} at {at} is silent", name(mode));
+                    assert_eq!(struck.out, sound.out, "{command:?}: {fault:?} is silent");
                 } else {
                     assert!(struck.err.contains("error["), "{command:?}: {struck:?}");
                 }
-                *codes.0.entry(struck.code).or_default() += 1;
-            }
-            print_line(&format!(
-                "| `{}` | {} at a read of the store | {count} | {} | {codes} | 0 |",
-                command[..2].join(" ").replace(" --format", ""),
-                name(mode),
-                tried.len()
-            ));
+                struck.code
+            };
+            let shown = command[..2].join(" ").replace(" --format", "");
+            let what = format!("`{shown}` | {} at a read of the store", name(mode));
+            let faults = calls(count).into_iter().map(|at| Fault::at("results", "read", mode, at));
+            print_row(&what, count, faults, tried);
         }
     }
 }
@@ -432,7 +435,7 @@ fn a_log_folder_that_fails_from_some_call_on_is_reported_and_heals() {
 /// Three flights as a Delta table from which the second was withdrawn; its file is still in the folder.
 fn table() -> TestFleet {
     let fleet = few();
-    let logs = logs_of(&fleet);
+    let logs = fleet.logs_of(TAIL);
     let names: Vec<&str> = logs.iter().map(|log| log.file_name().unwrap().to_str().unwrap()).collect();
     crate::logs::layouts::delta_log(logs[0].parent().unwrap(), &names, &names[1..2]);
     fleet
@@ -447,11 +450,9 @@ fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
     plain.run_ok(RUN);
     let wanted = plain.exported();
     assert_eq!(wanted.lines().count() - 1, 8);
-    let command = Struck { injector, before: table(), args: RUN, wanted: &wanted };
+    let command = Struck::new(injector, table(), RUN, &wanted);
     for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
-        let count = injector.count(&command.before.copied(), RUN, under, "read");
-        assert!(count > 0, "no call on {under}");
-        for &at in &calls(count) {
+        for at in calls(command.count(under, "read")) {
             command.tried(&Fault::at(under, "read", mode, at));
         }
         let always = injector.run(
@@ -524,37 +525,8 @@ fn a_fault_in_a_compaction_loses_nothing() {
 #[test]
 fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
     const REPORT: &[&str] = &["report", "--output", "pages"];
-    strike(REPORT, STORED, ("results", "read", EIO), false);
-    let Some(injector) = Injector::get() else { return };
-    let names = |fleet: &TestFleet| {
-        let pattern = fleet.path("pages/**/*");
-        let found = glob::glob(pattern.to_str().unwrap()).unwrap().flatten();
-        found.map(|path| path.strip_prefix(fleet.path("")).unwrap().to_owned()).collect::<Vec<_>>()
-    };
-    let before = stored();
-    let plain = before.copied();
-    plain.run_ok(REPORT);
-    let wanted = names(&plain);
-    assert!(wanted.len() > 4, "{wanted:?}");
-    for mode in [EIO, "kill"] {
-        let count = injector.count(&before.copied(), REPORT, "pages", "write");
-        let (mut codes, tried) = (ExitCodes::default(), calls(count));
-        for &at in &tried {
-            let fleet = before.copied();
-            let struck = injector.run(&fleet, REPORT, &Fault::at("pages", "write", mode, at));
-            assert!(matches!(struck.code, None | Some(0..=3 | 5)), "{mode} at {at}: {struck:?}");
-            if struck.code == Some(0) {
-                assert_eq!(names(&fleet), wanted, "{mode} at {at} was not reported: {struck:?}");
-            }
-            *codes.0.entry(struck.code).or_default() += 1;
-            fleet.run_ok(REPORT);
-            assert_eq!(names(&fleet), wanted, "after {mode} at {at}");
-        }
-        let mode = if mode == EIO { "EIO" } else { mode };
-        print_line(&format!(
-            "| `report` | {mode} at a write of a page | {count} | {} | {codes} | 0 |",
-            tried.len()
-        ));
+    for fault in [("results", "read", EIO), ("pages", "write", EIO), ("pages", "write", "kill")] {
+        strike(REPORT, STORED, fault, false);
     }
 }
 
@@ -568,23 +540,21 @@ fn two_faults_in_one_run_lose_nothing() {
     let seed = seed();
     let mut chance = fastrand::Rng::with_seed(seed);
     for (make, store) in [NEW, GROWN] {
-        let command = Struck { injector, before: make(), args: RUN, wanted };
-        let count = injector.count(&command.before.copied(), RUN, "results", "both");
-        let tries = sample().min(count);
-        let mut codes = ExitCodes::default();
-        for _ in 0..tries {
-            let mut below = |count: usize| (chance.f64() * count as f64) as usize;
+        let command = Struck::new(injector, make(), RUN, wanted);
+        let count = command.count("results", "both");
+        let mut below = |count: usize| (chance.f64() * count as f64) as usize;
+        let mut drawn = || {
             let (first, second) = (below(count), below(count));
             let (mode, also) = (MODES[below(3)], MODES[below(4)]);
             let fault = Fault::at("results", "both", mode, 1 + first.min(second));
-            let fault = Fault { also: Some((1 + first.max(second), also)), ..fault };
-            let code = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| command.tried(&fault)));
-            let Ok(code) = code else { panic!("seed {seed}: {:?}", reduced(&command, fault)) };
-            *codes.0.entry(code).or_default() += 1;
-        }
-        print_line(&format!(
-            "| `run`, {store} | two of EIO, ESTALE, ENOSPC and kill at calls of the store | {count} | {tries} | {codes} | 0 |"
-        ));
+            Fault { also: Some((1 + first.max(second), also)), ..fault }
+        };
+        let faults: Vec<Fault> = (0..sample().min(count)).map(|_| drawn()).collect();
+        let what = format!("`run`, {store} | two of EIO, ESTALE, ENOSPC and kill at calls of the store");
+        print_row(&what, count, faults, |fault| {
+            let code = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| command.tried(fault)));
+            code.unwrap_or_else(|_| panic!("seed {seed}: {:?}", reduced(&command, *fault)))
+        });
     }
 }
 
@@ -604,10 +574,8 @@ fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
     let Some(injector) = Injector::get() else { return };
     for jobs in ["1", "2"] {
         let fleet = few();
-        let logs = logs_of(&fleet).len();
-        let fault = injector.hang(&fleet);
-        let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
+        let logs = fleet.logs_of(TAIL).len();
+        let fault = injector.hang_with_limit(&fleet);
         let began = Instant::now();
         let struck = injector.run(&fleet, &["run", "--jobs", jobs], &fault);
         assert!(began.elapsed() < Duration::from_mins(1), "{:?}", began.elapsed());
@@ -625,10 +593,8 @@ fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
 fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
     let Some(injector) = Injector::get() else { return };
     let fleet = small();
-    let fault = injector.hang(&fleet);
-    let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
-    let logs = logs_of(&fleet);
+    let fault = injector.hang_with_limit(&fleet);
+    let logs = fleet.logs_of(TAIL);
     let names: Vec<&str> = logs.iter().take(3).map(|log| log.to_str().unwrap()).collect();
     for command in ["estimate", "check"] {
         // A hang from the first read of that log on.

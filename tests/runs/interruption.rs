@@ -1,8 +1,10 @@
 //! Interrupted runs: finished flights are kept, and the next run reaches the same store as an uninterrupted one.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::time::Duration;
 
-use crate::harness::{TestFleet, print_line, spread, wait_until};
+use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records};
 
 /// Sends an interrupt to a process.
@@ -11,15 +13,22 @@ fn interrupt(child: &std::process::Child) {
     std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
 }
 
+/// A run of one worker that has begun.
+#[cfg(unix)]
+fn begun(fleet: &TestFleet) -> std::process::Child {
+    let mut run = fleet.command(&["run", "--jobs", "1", "--no-progress"]);
+    let mut child = run.stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
+    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
+    child
+}
+
 /// A run that receives an interrupt finishes the flights in progress and reports the others.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     let fleet = TestFleet::sample();
-    let mut child =
-        fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
-    let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
-    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
+    let child = begun(&fleet);
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
@@ -34,9 +43,7 @@ fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
 #[test]
 fn an_interrupt_is_answered_within_a_second() {
     let fleet = TestFleet::sample();
-    let mut child = fleet.command(&["run", "--jobs", "1", "--no-progress"]).stdout(null()).spawn().unwrap();
-    let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
-    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
+    let mut child = begun(&fleet);
     let struck = std::time::Instant::now();
     interrupt(&child);
     interrupt(&child);
@@ -60,26 +67,32 @@ fn null() -> std::process::Stdio {
     std::process::Stdio::null()
 }
 
-/// Opens the store as another program would, and counts its records: four for each flight, each once.
-pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
-    let store = match store::Store::open(fleet.path("results")) {
+/// Opens a store as another program would, and counts its records: four for each flight, each once; or what is wrong.
+pub(crate) fn stored_records(folder: &Path) -> Result<usize, String> {
+    let store = match store::Store::open(folder) {
         Ok(store) => store,
         // Killed before the store was made, or while it was.
-        Err(error) if error.diagnostic().code == "store_missing" => return 0,
-        Err(error) => panic!("the store does not open: {error}"),
+        Err(error) if error.diagnostic().code == "store_missing" => return Ok(0),
+        Err(error) => return Err(format!("the store does not open: {error}")),
     };
-    let records = store.records(&store::Query::default()).unwrap();
-    let mut flights = std::collections::BTreeMap::<String, std::collections::BTreeSet<String>>::new();
+    let records = store.records(&store::Query::default()).map_err(|e| e.to_string())?;
+    let mut flights = BTreeMap::<String, BTreeSet<String>>::new();
     for record in &records {
-        let new = flights
-            .entry(record.flight.flight_id.to_string())
-            .or_default()
-            .insert(record.position.to_string());
-        assert!(new, "{} of {} is there twice", record.position, record.flight.flight_id);
+        let (flight, position) = (record.flight.flight_id.to_string(), record.position.to_string());
+        if !flights.entry(flight).or_default().insert(position) {
+            return Err(format!("{} of {} is there twice", record.position, record.flight.flight_id));
+        }
     }
-    assert!(flights.values().all(|positions| positions.len() == 4), "half a flight: {flights:?}");
-    assert!(store.verify().is_empty(), "{:?}", store.verify());
-    records.len()
+    if !flights.values().all(|positions| positions.len() == 4) {
+        return Err(format!("half a flight: {flights:?}"));
+    }
+    let found = store.verify();
+    if found.is_empty() { Ok(records.len()) } else { Err(format!("{found:?}")) }
+}
+
+/// Number of records in the fleet's store, which must be whole.
+pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
+    stored_records(&fleet.path("results")).unwrap()
 }
 
 /// A file that may not grow: the write fails at some byte, the run reports it with code 3, and what was stored
@@ -93,16 +106,12 @@ fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
         let program = env!("CARGO_BIN_EXE_freeplay");
         // Blocks of 512 bytes: the limit takes effect inside data files and inside the table's log.
         let limited = format!("ulimit -f {blocks}; exec '{program}' run --jobs 1");
-        let result = std::process::Command::new("sh")
-            .args(["-c", &limited])
-            .current_dir(fleet.path(""))
-            .env_remove("FREEPLAY_CONFIG")
-            .output()
-            .unwrap();
-        let errors = String::from_utf8_lossy(&result.stderr);
-        assert!(matches!(result.status.code(), Some(0 | 3)), "{blocks} blocks: {:?} {errors}", result.status);
-        failed += usize::from(result.status.code() == Some(3));
-        assert!(result.status.code() != Some(3) || errors.contains("error["), "{blocks} blocks: {errors}");
+        let mut limit = std::process::Command::new("sh");
+        limit.args(["-c", &limited]).current_dir(fleet.path("")).env_remove("FREEPLAY_CONFIG");
+        let result = CommandResult::of(&mut limit);
+        assert!(matches!(result.code, Some(0 | 3)), "{blocks} blocks: {result:?}");
+        failed += usize::from(result.code == Some(3));
+        assert!(result.code != Some(3) || result.err.contains("error["), "{blocks} blocks: {result:?}");
         whole_flights(&fleet);
         fleet.run_ok(&["run"]);
         assert_eq!(fleet.exported(), few_records(), "{blocks} blocks");
@@ -150,7 +159,7 @@ fn a_run_that_waits_can_be_interrupted() {
     interrupt(&child);
     let result = child.wait_with_output().unwrap();
     assert_eq!(result.status.code(), Some(130), "{result:?}");
-    let metrics = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
+    let metrics = fleet.read("freeplay.prom");
     assert!(metrics.contains("\nfreeplay_run_exit_code 130\n"), "{metrics}");
     drop(held);
 }

@@ -4,10 +4,6 @@ use serde_json::Value;
 
 use crate::harness::{TestFleet, wait_until};
 
-fn json(fleet: &TestFleet, args: &[&str]) -> Value {
-    serde_json::from_str(&fleet.run_ok(args)).unwrap()
-}
-
 /// A run with one log in error, killed as soon as the store holds records of its first commit.
 fn killed() -> TestFleet {
     let fleet = TestFleet::sample();
@@ -26,10 +22,10 @@ fn records(fleet: &TestFleet) -> usize {
 }
 
 #[test]
-fn a_killed_night_has_its_account_too() {
+fn a_killed_run_has_the_status_of_each_of_its_logs() {
     let fleet = killed();
     let stored = records(&fleet);
-    let runs = json(&fleet, &["store", "runs", "--json"]);
+    let runs = fleet.json(&["store", "runs"]);
     let run = &runs[0];
     let figure = |name: &str| run[name].as_i64().unwrap();
     assert_eq!((run["ended"].as_str(), &run["exit_code"]), (Some("killed"), &Value::Null));
@@ -38,7 +34,7 @@ fn a_killed_night_has_its_account_too() {
     assert_eq!(figure("estimated") + figure("refused"), stored as i64);
     assert!(figure("not_reached") > 0, "{run}");
 
-    let logs = json(&fleet, &["store", "runs", "--run", "last", "--json"]);
+    let logs = fleet.json(&["store", "runs", "--run", "last"]);
     let logs = logs.as_array().unwrap();
     assert_eq!(logs.len(), 30, "every log has a class");
     let with = |class: &str| logs.iter().filter(|log| log["class"] == class).count() as i64;
@@ -48,18 +44,18 @@ fn a_killed_night_has_its_account_too() {
     let output = fleet.run_ok(&["store", "info"]);
     let left = format!("{} not processed; `freeplay run` processes them", figure("not_reached"));
     assert!(output.contains("did not exit cleanly") && output.contains(&left), "{output}");
-    assert_eq!(json(&fleet, &["store", "info", "--json"])["last_run"]["ended"], "killed");
+    assert_eq!(fleet.json(&["store", "info"])["last_run"]["ended"], "killed");
 }
 
 #[test]
 fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
     let fleet = killed();
-    let before = json(&fleet, &["store", "runs", "--json"])[0].clone();
+    let before = fleet.json(&["store", "runs"])[0].clone();
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
     let line = format!("did not finish: {} log", before["done"]);
     assert!(result.out.contains(&line), "{line} is not in {}", result.out);
-    let runs = json(&fleet, &["store", "runs", "--json"]);
+    let runs = fleet.json(&["store", "runs"]);
     let same = ["run_id", "ended", "done", "estimated", "refused", "errors", "not_reached"];
     assert!(same.iter().all(|name| runs[0][name] == before[name]), "{runs:#} was {before:#}");
     assert_eq!(
@@ -67,7 +63,7 @@ fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
         (Some("logs in error"), &Value::from(0))
     );
     let first = before["run_id"].as_str().unwrap();
-    let logs = json(&fleet, &["store", "runs", "--run", first, "--json"]);
+    let logs = fleet.json(&["store", "runs", "--run", first]);
     assert_eq!(logs.as_array().unwrap().len(), 30, "its account stays");
     let result = fleet.freeplay(&["run"]);
     assert!(!result.out.contains("did not finish"), "it is reported once: {}", result.out);

@@ -12,9 +12,7 @@ fn check_with_heap(fleet: &TestFleet, limit_kib: usize) -> CommandResult {
     let script = format!("ulimit -d {limit_kib}; exec \"$0\" check \"$1\"");
     let mut command = Command::new("sh");
     command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).arg(&logs[0]);
-    let output = command.current_dir(fleet.path("")).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    CommandResult::of(command.current_dir(fleet.path("")))
 }
 
 /// 120,000 installations took 240 MB when each cell, and each position's list, had memory of its own.

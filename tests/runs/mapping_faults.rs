@@ -4,13 +4,9 @@ use serde_json::Value;
 
 use crate::harness::TestFleet;
 
-fn rows(text: &str) -> Vec<Value> {
-    serde_json::from_str(text).unwrap()
-}
-
 /// Units and their states by `freeplay trend`.
 fn states(fleet: &TestFleet) -> Vec<(String, Value)> {
-    let trends = rows(&fleet.run_ok(&["trend", "--json"]));
+    let trends = fleet.rows(&["trend"]);
     trends
         .iter()
         .map(|row| (row["serial_number"].as_str().unwrap().to_owned(), row["state"].clone()))
@@ -32,7 +28,8 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
         "{}",
         checked.err
     );
-    let channels = rows(&fleet.freeplay(&["check", "--json"]).out);
+    let channels = fleet.freeplay(&["check", "--json"]).json();
+    let channels = channels.as_array().unwrap();
     let refused = channels.iter().filter(|row| row["remedy"].as_str().is_some_and(|r| r.contains(REMEDY)));
     assert!(
         refused.clone().count() > 0 && refused.clone().all(|row| row["channel"] == "load"),
@@ -41,7 +38,7 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
 
     let result = fleet.freeplay(&["run", "--json"]);
     assert_eq!(result.code, Some(1), "{result:?}");
-    let summary: Value = serde_json::from_str(&result.out).unwrap();
+    let summary = result.json();
     let faults = summary["mapping_faults"].as_array().unwrap();
     let parts: Vec<&str> = faults.iter().filter_map(|fault| fault["part_number"].as_str()).collect();
     assert_eq!(parts, ["EMA-27-1040", "EMA-27-1060"], "{faults:?}");
@@ -63,15 +60,14 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
     let again = fleet.run_ok(&["run"]);
     assert!(again.contains("mapping") && again.contains(REMEDY), "{again}");
 
-    let stored = rows(&fleet.run_ok(&["query", "tail", "N412FP", "--json"]));
+    let stored = fleet.rows(&["query", "tail", "N412FP"]);
     let refused = stored.iter().find(|row| row["reason"] == "load_sign_flipped").unwrap();
     assert!(refused["remedy"].as_str().unwrap().contains(REMEDY), "{refused}");
     assert!(fleet.run_ok(&["query", "tail", "N412FP"]).contains(REMEDY));
     let (flight, position) = (refused["flight_id"].as_str().unwrap(), refused["position"].as_str().unwrap());
     assert!(fleet.run_ok(&["explain", flight, position]).contains(REMEDY));
     fleet.run_ok(&["report", "--output", "pages"]);
-    let report = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
-    let report: Value = serde_json::from_str(&report).unwrap();
+    let report = fleet.read_json("pages/report.json");
     // One computation: run, trend and report name the same faults.
     let trend = fleet.run_ok(&["trend"]);
     for fault in report["mapping_faults"].as_array().unwrap() {
@@ -80,9 +76,8 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
         assert!(trend.contains(fault) && again.contains(fault), "{fault}: {trend}\n{again}");
     }
     assert_eq!(report["mapping_faults"].as_array().unwrap().len(), faults.len());
-    let reasons = rows(&fleet.run_ok(&["trend", "--format", "json"]));
+    let reasons = fleet.rows(&["trend"]);
     let named = |row: &&Value| row["reason"].as_str().unwrap().contains("load_sign_flipped on");
     assert!(reasons.iter().filter(|row| row["removed_utc"].is_null()).all(|row| named(&row)), "{reasons:?}");
-    let page = std::fs::read_to_string(fleet.path("pages/index.html")).unwrap();
-    assert!(page.contains("Wrong mapping or setting."));
+    assert!(fleet.read("pages/index.html").contains("Wrong mapping or setting."));
 }

@@ -21,9 +21,8 @@ fn an_older_store_is_read_as_it_is() {
     assert!(info.contains("52 of 13 flights, 8 units, 2 tails"), "{info}");
     assert!(info.contains("3 logs processed (12 estimated, 0 refused, 0 failed), 0 not processed"), "{info}");
     assert!(fleet.run_ok(&["query", "tail", "N412FP"]).contains("\n40 records\n"));
-    let runs: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "runs", "--json"])).unwrap();
-    let counts: Vec<_> =
-        runs.as_array().unwrap().iter().map(|r| (r["done"].as_i64(), r["errors"].as_i64())).collect();
+    let runs = fleet.rows(&["store", "runs"]);
+    let counts: Vec<_> = runs.iter().map(|r| (r["done"].as_i64(), r["errors"].as_i64())).collect();
     assert_eq!(counts, [(2, 0), (9, 1), (1, 0), (3, 0)].map(|(done, errors)| (Some(done), Some(errors))));
     assert_eq!(std::fs::read(fleet.path("results/store.json")).unwrap(), mark, "reading changes nothing");
 }
@@ -47,10 +46,8 @@ fn a_run_on_an_older_store_ends_where_a_new_one_does() {
 fn files_of_two_releases_are_one_table() {
     let fleet = old();
     fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "3"]);
-    let rows: serde_json::Value =
-        serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
+    let rows = fleet.rows(&["query", "tail", "N412FP"]);
     let has_skew_se = |row: &serde_json::Value| row["skew_se_s"].is_number();
-    let rows = rows.as_array().unwrap();
     assert!(rows.iter().any(has_skew_se) && !rows.iter().all(has_skew_se), "old rows and new ones");
     assert!(rows.iter().all(|row| row["gap_m"].is_number() == (row["status"] == "estimated")));
     let log = fleet.path("results/gaps/_delta_log");
@@ -62,7 +59,5 @@ fn files_of_two_releases_are_one_table() {
     assert_eq!(schemas.len(), 1, "the table's new columns were committed once");
     assert!(fleet.run_ok(&["store", "verify"]).ends_with("OK: all data files present and unchanged\n"));
     fleet.run_ok(&["store", "compact"]);
-    let after: serde_json::Value =
-        serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
-    assert_eq!(after.as_array().unwrap(), rows);
+    assert_eq!(fleet.rows(&["query", "tail", "N412FP"]), rows);
 }

@@ -1,9 +1,7 @@
 //! Ways for a run to fail without an error: each is injected, and must be reported by its code. Mistakes in files and
-//! settings are in `tests/data/errors.md`.
+//! settings are in `tests/data/errors.md`, failing disks and logs that never end in `injected_faults`.
 
-use std::path::PathBuf;
-
-use crate::harness::{CommandResult, TestFleet, copy, facts, print_line, rewrite};
+use crate::harness::{CommandResult, TestFleet, facts_with, print_line, rewrite};
 use crate::runs::injected_faults::Injector;
 
 const DAY_S: i64 = 86_400;
@@ -11,25 +9,15 @@ const DAY_S: i64 = 86_400;
 /// The first two flights of one tail.
 fn tiny() -> TestFleet {
     let fleet = TestFleet::sample();
-    for log in fleet.logs() {
-        let name = log.file_name().unwrap().to_string_lossy().into_owned();
-        if !(name.ends_with("N413FP-0001.parquet") || name.ends_with("N413FP-0002.parquet")) {
-            std::fs::remove_file(log).unwrap();
-        }
-    }
+    let kept = &fleet.logs_of("N413FP")[..2];
+    fleet.logs().iter().filter(|log| !kept.contains(log)).for_each(|log| std::fs::remove_file(log).unwrap());
     fleet
-}
-
-fn first(fleet: &TestFleet) -> PathBuf {
-    fleet.logs()[0].clone()
 }
 
 /// Copies the first log under another identity.
 fn relabel(fleet: &TestFleet, name: &str, key: &str, value: &str) {
-    let log = first(fleet);
-    let mut labels = facts(&log);
-    labels.iter_mut().filter(|(known, _)| known == key).for_each(|(_, old)| value.clone_into(old));
-    rewrite(&log, &log.with_file_name(name), &labels, |_| true, |_| true);
+    let log = &fleet.logs()[0];
+    rewrite(log, &log.with_file_name(name), &facts_with(log, key, value), |_| true, |_| true);
 }
 
 fn run(fleet: &TestFleet) -> CommandResult {
@@ -40,39 +28,6 @@ fn run(fleet: &TestFleet) -> CommandResult {
 type Way = (&'static str, fn(&TestFleet, &Injector) -> CommandResult, i32, &'static str);
 
 const WAYS: &[Way] = &[
-    (
-        "a log cannot be listed",
-        |f, _| {
-            let link = first(f).with_file_name("loop.parquet");
-            std::os::unix::fs::symlink("loop.parquet", link).unwrap();
-            run(f)
-        },
-        1,
-        "file_unreadable",
-    ),
-    (
-        "a tail sends nothing while others do",
-        |f, _| {
-            copy(
-                &crate::harness::top().join("tests/data/three-aircraft/sample-data/logs/N412FP"),
-                &f.path("sample-data/logs/N412FP"),
-            );
-            let newest = f.logs().into_iter().rfind(|log| log.to_string_lossy().contains("N412FP")).unwrap();
-            for log in
-                f.logs().into_iter().filter(|log| log.to_string_lossy().contains("N412FP") && *log != newest)
-            {
-                std::fs::remove_file(log).unwrap();
-            }
-            let mut labels = facts(&newest);
-            let departure = labels.iter_mut().find(|(key, _)| key == "departure_utc").unwrap();
-            "2026-11-15T08:00:00Z".clone_into(&mut departure.1);
-            rewrite(&newest, &newest.with_file_name("late.parquet"), &labels, |_| true, |_| true);
-            std::fs::remove_file(newest).unwrap();
-            run(f)
-        },
-        0,
-        "N413FP since",
-    ),
     (
         "a log is dated ahead",
         |f, _| {
@@ -98,26 +53,6 @@ const WAYS: &[Way] = &[
         "after this machine's clock",
     ),
     ("the disk is full", |f, injector| injector.full_disk(f), 3, "No space left on device"),
-    ("another run holds the store", |f, injector| injector.beside_a_run_that_hangs(f), 3, "store_held"),
-    (
-        "the run before was killed",
-        |f, injector| {
-            injector.killed(f);
-            run(f)
-        },
-        0,
-        "did not finish",
-    ),
-    (
-        "two logs hold one flight",
-        |f, _| {
-            let log = first(f);
-            rewrite(&log, &log.with_file_name("other.parquet"), &facts(&log), |_| true, |row| row < 5000);
-            run(f)
-        },
-        1,
-        "duplicate_flight",
-    ),
     (
         "an aircraft is not in the table",
         |f, _| {
@@ -136,7 +71,6 @@ const WAYS: &[Way] = &[
         1,
         "load_too_small",
     ),
-    ("a log never ends", |f, injector| injector.hanging_log(f), 1, "log_timeout"),
 ];
 
 #[test]

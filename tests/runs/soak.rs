@@ -26,18 +26,12 @@ fn bare() -> (TestFleet, Vec<std::path::PathBuf>) {
     let fleet = TestFleet::sample();
     let source = fleet.path("source");
     std::fs::create_dir_all(&source).unwrap();
-    let mut logs = Vec::new();
-    for log in fleet.logs() {
-        let name = log.file_name().unwrap().to_owned();
-        if name.to_string_lossy().contains("N413FP") {
-            std::fs::rename(&log, source.join(&name)).unwrap();
-            logs.push(source.join(&name));
-        } else {
-            std::fs::remove_file(&log).unwrap();
-        }
+    for log in fleet.logs_of("N413FP") {
+        std::fs::rename(&log, source.join(log.file_name().unwrap())).unwrap();
     }
     fleet.configure("sample-data/logs/**/*.parquet", "logs/*.parquet");
     std::fs::create_dir_all(fleet.path("logs")).unwrap();
+    let logs = fleet.glob("source/*.parquet");
     (fleet, logs)
 }
 

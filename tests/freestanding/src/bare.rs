@@ -48,14 +48,3 @@ unsafe extern "C" fn memset(to: *mut u8, byte: i32, count: usize) -> *mut u8 {
     }
     to
 }
-
-unsafe extern "C" {
-    /// Exists nowhere: a program with a path that can panic keeps the handler and with it this symbol, and does not
-    /// link.
-    safe fn a_path_of_this_program_can_panic() -> !;
-}
-
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    a_path_of_this_program_can_panic()
-}

@@ -7,6 +7,8 @@
 #![no_main]
 
 mod bare;
+#[path = "../../on_board/src/panics.rs"]
+mod panics;
 mod vector;
 
 use estimator::{ActuatorModel, Error, Filter, NoiseModel, StreamingGap, Stream};

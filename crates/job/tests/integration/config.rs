@@ -128,11 +128,28 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("unit = \"deg\"", "unit = \"deg\"\nlatency_s = -1e5", "out_of_range"),
         ("[clock]", "[run]\nmax_rows = 0x0\n[clock]", "not_positive"),
         ("[clock]", "[[override]]\nclock.tick_s = nan\n[clock]", "not_positive"),
+        ("[clock]", "[[override]]\ntails = [\"N4*\"]\nchannel.load.sgn = 1\n[clock]", "unknown_key"),
+        ("[clock]", "[alerts.a]\n[clock]", "alert_channel"),
+        ("[clock]", "[alerts.a]\nfolder = \"x\"\nurl = \"https://example.com/\"\n[clock]", "alert_channel"),
+        ("[clock]", "[alerts.a]\ncommand = []\n[clock]", "alert_channel"),
+        ("[clock]", "[alerts.a]\nfolder = \"s3://bucket/x\"\n[clock]", "alert_channel"),
+        ("[clock]", "[alerts.a]\nfolder = \"x\"\nstates = [\"atc\"]\n[clock]", "unknown_state"),
+        ("[clock]", "[alerts.a]\nfolder = \"x\"\ntails = [\"[\"]\n[clock]", "bad_pattern"),
+        ("[clock]", "[alerts.a]\nfolder = \"x\"\ntimeout_s = 0\n[clock]", "not_positive"),
+        ("[clock]", "[alerts.a]\nfoldr = \"x\"\n[clock]", "unknown_key"),
     ];
     for (line, by, code) in cases {
         let found = diagnostics(line, by);
         assert_eq!(found.iter().map(|c| c.0.as_str()).collect::<Vec<_>>(), [code], "{by}: {found:?}");
     }
+}
+
+/// The address of a channel may hold a secret.
+#[test]
+fn an_address_that_is_none_of_http_is_refused_and_not_shown() {
+    let text = format!("{GOOD}\n[alerts.a]\nurl = \"ftp://example.com/SECRET\"\n");
+    let found = parse(&text).unwrap_err();
+    assert!(found[0].code == "alert_channel" && !found[0].to_string().contains("SECRET"), "{found:?}");
 }
 
 #[test]
