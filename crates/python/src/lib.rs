@@ -39,7 +39,6 @@ fn _freeplay(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(store_results::check, module)?)?;
     module.add_function(wrap_pyfunction!(numpy_input::data_pointer, module)?)?;
     module.add_function(wrap_pyfunction!(spark_worker::process_task, module)?)?;
-    module.add_function(wrap_pyfunction!(spark_worker::empty_result, module)?)?;
     module.add_function(wrap_pyfunction!(spark_worker::run_distributed, module)?)?;
     Ok(())
 }

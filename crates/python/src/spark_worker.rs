@@ -4,7 +4,6 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use arrow::array::RecordBatch;
 use pipeline::Request;
 use pipeline::run::distributed::{self, Task};
 use pipeline::run::scheduler::Context;
@@ -13,30 +12,22 @@ use records::Diagnostic;
 use store::Holder;
 
 use crate::VERSION;
-use crate::arrow_capsule;
 use crate::config::Config;
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
 use crate::functions::run_summary;
-use crate::table::Table;
 
-/// Processes one log of a distributed run; an error of the log is returned as a row.
+/// Processes one log of a distributed run; its result, or its error, as JSON.
 #[pyfunction]
-pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyResult<Table> {
+pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyResult<String> {
     let task: Task = serde_json::from_str(task)
         .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))?;
     let installations = config.installations(py)?;
-    let rows = py.detach(|| distributed::process_task(&config.inner, installations, &task, VERSION));
-    Ok(Table::of(rows.map_err(|error| to_run_exception(py, error))?))
+    let result = py.detach(|| distributed::process_task(&config.inner, installations, &task, VERSION));
+    result.map_err(|error| to_run_exception(py, error))
 }
 
-/// Result table without rows, for its schema.
-#[pyfunction]
-pub(crate) fn empty_result() -> Table {
-    Table::of(RecordBatch::new_empty(distributed::schema()))
-}
-
-/// Run whose logs are processed by `engine`, which receives batches of tasks and returns an Arrow table of results; the
-/// run's account as JSON.
+/// Run whose logs are processed by `engine`, which receives batches of tasks and returns their results; the run's
+/// summary as JSON.
 #[pyfunction]
 #[pyo3(signature = (config, engine, at_a_time, redo, retry, wait_s))]
 pub(crate) fn run_distributed(
@@ -58,7 +49,7 @@ pub(crate) fn run_distributed(
         let asked = Python::attach(|py| {
             let json = |task: &Task| serde_json::to_string(task).unwrap_or_default();
             let tasks: Vec<String> = tasks.iter().map(json).collect();
-            arrow_capsule::batches(engine.call1(py, (tasks,))?.bind(py))
+            engine.call1(py, (tasks,))?.extract(py)
         });
         asked.map_err(|error| {
             let what = error.to_string();

@@ -30,10 +30,8 @@ pub(crate) struct ProcessedLog {
     /// new.
     pub(crate) account: LogRecord,
     /// Its records.
-    #[serde(skip)]
     pub(crate) records: Vec<GapRecord>,
     /// Its errors.
-    #[serde(rename = "complaints")]
     pub(crate) diagnostics: Vec<Diagnostic>,
 }
 
@@ -56,8 +54,8 @@ impl ProcessedLog {
 
     pub(crate) fn event(&self, work: &WorkItem) -> Event {
         let (log, bytes) = (work.log_path.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
-        let new = |count: i64| if self.is_known() { 0 } else { count as usize };
-        let (estimated, refused) = (new(self.account.estimated), new(self.account.refused));
+        let refused = self.records.iter().filter(|record| record.estimate.status == Status::Refused).count();
+        let estimated = self.records.len() - refused;
         Event::Finished { log, bytes, estimated, refused, diagnostics: self.diagnostics.clone() }
     }
 }

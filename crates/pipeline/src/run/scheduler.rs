@@ -15,7 +15,7 @@ use jiff::Timestamp;
 use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_identity};
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
-use records::{Diagnostic, GapRecord, Installations, PartNumber, Status};
+use records::{Diagnostic, GapRecord, Installations, PartNumber};
 use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
 
 use crate::assess::changes::RunFacts;
@@ -373,9 +373,6 @@ impl WorkerContext<'_> {
             processed_utc: Timestamp::now(),
         };
         let (records, diagnostics) = self.records(opened, &stamp);
-        let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count();
-        account.refused = refused as i64;
-        account.estimated = (records.len() - refused) as i64;
         summary::set_error(&mut account, &diagnostics);
         ProcessedLog { account, records, diagnostics }
     }

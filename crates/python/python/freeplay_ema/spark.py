@@ -2,7 +2,7 @@
 
 Only the DataFrame API of Spark Connect is used (``spark.range`` and ``mapInArrow``), so that classic Spark,
 Databricks serverless and Sail work the same way: no jar, no SparkContext, no RDD. The driver plans and stores, a worker
-does one log for each task with one thread, and a failed log is returned as an error row.
+does one log for each task with one thread; a failed log has a result with its error.
 
 Spark runs a task at least once. An answer counts once, whichever copy arrives; records take the place of those of the
 same flight, and a log whose settings are unchanged is known and not done again. Only the driver writes.
@@ -17,12 +17,11 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import freeplay_ema as fp
-from freeplay_ema import ArrowStream, Config, RunError, RunSummary, Settings, _freeplay
+from freeplay_ema import Config, RunError, RunSummary, Settings, _freeplay
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from pyspark.sql import SparkSession
-    from pyspark.sql.types import StructType
 
 __all__ = ["run"]
 
@@ -67,17 +66,16 @@ def _patterns(
     return [os.path.abspath(pattern) for pattern in several]
 
 
-def _engine(spark: SparkSession, settings: Config) -> Callable[[list[str]], ArrowStream]:
+def _engine(spark: SparkSession, settings: Config) -> Callable[[list[str]], list[str]]:
     """What answers tasks by a Spark job of as many partitions: one log for each task of Spark's."""
     files, digest = tuple(str(file) for file in settings.files), settings.digest()
-    schema = _spark_schema()
 
-    def answers(tasks: list[str]) -> ArrowStream:
+    def answers(tasks: list[str]) -> list[str]:
         # range() makes exactly one row for each partition; repartition() would put several into some.
         count = len(tasks)
-        rows = spark.range(0, count, 1, count).mapInArrow(_worker(files, digest, tasks), schema)
-        table: ArrowStream = rows.toArrow()
-        return table
+        rows = spark.range(0, count, 1, count).mapInArrow(_worker(files, digest, tasks), "result string")
+        results: list[str] = rows.toArrow().column("result").to_pylist()
+        return results
 
     return answers
 
@@ -92,8 +90,8 @@ def _worker(
 
         config = spark._same(files, digest)
         for batch in batches:
-            for number in batch.column(0).to_pylist():
-                yield from pa.table(_freeplay.process_task(config, tasks[number])).to_batches()
+            results = [_freeplay.process_task(config, tasks[number]) for number in batch.column(0).to_pylist()]
+            yield pa.RecordBatch.from_pydict({"result": pa.array(results, pa.string())})
 
     return work
 
@@ -112,23 +110,3 @@ def _same(files: tuple[str, ...], digest: str) -> Config:
         text = f"error[{diagnostic['code']}]: {diagnostic['what']}\n  file    {files[0]}\nhint: {diagnostic['hint']}"
         raise RunError(text, json.dumps([diagnostic]))
     return config
-
-
-def _spark_schema() -> StructType:
-    """The columns of an answer, in Spark's words."""
-    import pyarrow as pa
-    from pyspark.sql import types as spark_types
-
-    def kind(arrow: pa.DataType) -> spark_types.DataType:
-        if pa.types.is_timestamp(arrow):
-            return spark_types.TimestampType()
-        if pa.types.is_list(arrow):
-            return spark_types.ArrayType(kind(arrow.value_type))
-        if pa.types.is_floating(arrow):
-            return spark_types.DoubleType()
-        return spark_types.LongType() if pa.types.is_integer(arrow) else spark_types.StringType()
-
-    columns = pa.table(_freeplay.empty_result()).schema
-    return spark_types.StructType(
-        [spark_types.StructField(field.name, kind(field.type), True) for field in columns]
-    )
