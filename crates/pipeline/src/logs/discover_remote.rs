@@ -5,14 +5,8 @@ use std::path::Path;
 use object_io::{Address, ListEntry};
 
 use crate::error::Error;
+use crate::logs::local_files::AS_FILES;
 use crate::logs::table_folders::TableFolders;
-
-/// Keys are matched as files are: `*` stays within a folder, `**` does not.
-const AS_FILES: glob::MatchOptions = glob::MatchOptions {
-    case_sensitive: true,
-    require_literal_separator: true,
-    require_literal_leading_dot: false,
-};
 
 /// Objects of a folder by which a table is recognised; their names sort before those of data files.
 const MOST_NOTED: usize = 1000;

@@ -4,31 +4,28 @@
 //! folders that hold links to each other, end.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
-use glob::{Pattern, PatternError};
+use glob::{MatchOptions, Pattern, PatternError};
+use walkdir::{DirEntry, WalkDir};
+
+use crate::logs::temporary_files::parts_written_out;
+
+/// `*` stays within a folder, `**` does not.
+pub(crate) const AS_FILES: MatchOptions = MatchOptions {
+    case_sensitive: true,
+    require_literal_separator: true,
+    require_literal_leading_dot: false,
+};
 
 /// What fits a pattern, and what could not be listed or was passed over.
 #[derive(Debug, Default)]
 pub(crate) struct LocalFiles {
-    /// Paths that fit, folders among them.
+    /// Paths that fit.
     pub(crate) paths: BTreeSet<PathBuf>,
-    /// Folders that cannot be listed, and links that lead back.
+    /// Folders that cannot be listed, links that lead nowhere, and links that lead back.
     pub(crate) faults: Vec<(PathBuf, io::Error)>,
-    /// Folders below `**`, without links.
-    entered: BTreeSet<(usize, PathBuf)>,
-}
-
-/// One part of a pattern.
-enum Part {
-    /// As it is written.
-    Plain(PathBuf),
-    /// Any name that fits.
-    Names(Pattern),
-    /// Any number of folders.
-    Folders,
 }
 
 /// Searches the files below `folder` that fit a pattern.
@@ -37,100 +34,66 @@ enum Part {
 /// When it is no pattern.
 pub(crate) fn matching(folder: &Path, pattern: &str) -> Result<LocalFiles, PatternError> {
     Pattern::new(pattern)?;
-    let part = |component: Component<'_>| {
-        let name = component.as_os_str();
-        match (component, name.to_str()) {
-            (Component::Normal(_), Some("**")) => Ok(Part::Folders),
-            (Component::Normal(_), Some(text)) if text.contains(['*', '?', '[']) => {
-                Pattern::new(text).map(Part::Names)
-            }
-            _ => Ok(Part::Plain(PathBuf::from(name))),
-        }
-    };
-    let parts = Path::new(pattern).components().map(part).collect::<Result<Vec<_>, _>>()?;
     let mut found = LocalFiles::default();
-    found.walk(folder, &parts);
-    Ok(found)
-}
-
-impl LocalFiles {
-    fn walk(&mut self, folder: &Path, parts: &[Part]) {
-        let Some((part, rest)) = parts.split_first() else { return };
-        match part {
-            Part::Plain(name) => self.take(folder.join(name), rest),
-            Part::Names(pattern) => {
-                for path in self.entries(folder) {
-                    let fits = |name: &std::ffi::OsStr| pattern.matches(&name.to_string_lossy());
-                    if path.file_name().is_some_and(fits) {
-                        self.take(path, rest);
-                    }
-                }
-            }
-            Part::Folders if rest.is_empty() => self.below(folder, parts, true),
-            Part::Folders => self.below(folder, parts, false),
-        }
+    let parts: Vec<_> = Path::new(pattern).components().collect();
+    let (written, rest) = parts.split_at(parts_written_out(Path::new(pattern)));
+    let root = folder.join(written.iter().collect::<PathBuf>());
+    if rest.is_empty() {
+        found.paths.extend(root.symlink_metadata().is_ok().then_some(root));
+        return Ok(found);
     }
-
-    /// A path that fits so far: one of the answers, or a folder to go on in.
-    fn take(&mut self, path: PathBuf, rest: &[Part]) {
-        if !rest.is_empty() {
-            if !matches!(rest[0], Part::Plain(_)) && !path.is_dir() {
-                return;
-            }
-            self.walk(&path, rest);
-        } else if path.symlink_metadata().is_ok() {
-            self.paths.insert(path);
-        }
-    }
-
-    /// Every folder below one, itself included, each once.
-    fn below(&mut self, folder: &Path, parts: &[Part], takes_folders: bool) {
-        let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let Ok(real) = here.canonicalize() else { return };
-        if !self.entered.insert((parts.len(), real.clone())) {
-            // A link to a folder around it is a loop; another way to a folder is none.
-            if here.is_symlink()
-                && here.parent().and_then(|p| p.canonicalize().ok()).is_some_and(|p| p.starts_with(&real))
-            {
-                let loops = io::Error::other("the link leads back to a folder around it");
-                self.faults.push((folder.to_owned(), loops));
-            }
-            return;
-        }
-        if takes_folders {
-            self.paths.insert(folder.to_owned());
-        } else {
-            self.walk(folder, &parts[1..]);
-        }
+    let texts: Vec<_> = rest.iter().map(|part| part.as_os_str().to_string_lossy()).collect();
+    let whole = Pattern::new(&texts.join("/"))?;
+    let names = texts.iter().map(|text| Pattern::new(text)).collect::<Result<Vec<_>, _>>()?;
+    let across_folders = texts.iter().position(|text| text == "**");
+    let listed = if root.as_os_str().is_empty() { Path::new(".") } else { &root };
+    let below = |path: &Path| path.strip_prefix(listed).unwrap_or(path).to_owned();
+    // `**` at the end stands for folders, which are no logs.
+    let fits = |path: &Path| {
+        texts.last().is_some_and(|last| last != "**")
+            && whole.matches_with(&below(path).to_string_lossy(), AS_FILES)
+    };
+    let mut entered = BTreeSet::new();
+    // A folder that the names of the pattern lead to; below `**`, each only once.
+    let is_entered = |entry: &DirEntry| {
+        let depth = entry.depth();
+        let is_named = |name: &Pattern| name.matches(&entry.file_name().to_string_lossy());
+        let is_across = depth == 0 || across_folders.is_some_and(|first| depth > first);
+        let mut is_new = || entry.path().canonicalize().is_ok_and(|real| entered.insert(real));
+        !entry.file_type().is_dir()
+            || ((is_across || is_named(&names[depth - 1])) && (across_folders.is_none() || is_new()))
+    };
+    let walk = WalkDir::new(listed)
+        .max_depth(across_folders.map_or(rest.len(), |_| usize::MAX))
+        .follow_links(true)
         // Folders before links to them, which are other names of the same.
-        let (links, folders): (Vec<_>, Vec<_>) =
-            self.entries(folder).into_iter().filter(|path| path.is_dir()).partition(|path| path.is_symlink());
-        folders.iter().chain(&links).for_each(|path| self.below(path, parts, takes_folders));
-    }
-
-    /// Paths in a folder, in order; without those that vanish meanwhile.
-    fn entries(&mut self, folder: &Path) -> Vec<PathBuf> {
-        let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let entries = fs::read_dir(listed).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-        match entries {
-            Ok(entries) => {
-                let mut paths: Vec<_> = entries.iter().map(|entry| folder.join(entry.file_name())).collect();
-                paths.sort_unstable();
-                paths
+        .sort_by(|a, b| (a.path_is_symlink(), a.file_name()).cmp(&(b.path_is_symlink(), b.file_name())));
+    for entry in walk.into_iter().filter_entry(is_entered) {
+        match entry {
+            Ok(entry) => {
+                let fits = !entry.file_type().is_dir() && fits(entry.path());
+                found.paths.extend(fits.then(|| root.join(below(entry.path()))));
             }
             Err(error) => {
-                let is_gone = matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory);
-                if !is_gone && !self.faults.iter().any(|(path, _)| path == folder) {
-                    self.faults.push((folder.to_owned(), error));
-                }
-                Vec::new()
+                let path = error.path().unwrap_or(listed).to_owned();
+                let is_fault = match error.loop_ancestor() {
+                    Some(_) => across_folders.is_some(),
+                    // What vanished meanwhile is no fault.
+                    None => path.symlink_metadata().is_ok() && (path.is_dir() || fits(&path)),
+                };
+                let loops = || io::Error::other("the link leads back to a folder around it");
+                let error = error.into_io_error().unwrap_or_else(loops);
+                found.faults.extend(is_fault.then(|| (root.join(below(&path)), error)));
             }
         }
     }
+    Ok(found)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn names(found: &LocalFiles, folder: &Path) -> Vec<String> {
