@@ -10,6 +10,7 @@ use records::{QuantityChange, QuantityRow, TrendRow, WorkRequest};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
+use crate::charts::frame::day;
 use crate::format::{level, or_no_data};
 use crate::state_badge::StateBadge;
 
@@ -213,6 +214,12 @@ impl UnitView {
     pub(crate) fn place(&self) -> String {
         let words = [self.row.tail_number.as_deref(), self.row.position.as_deref()];
         words.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Day and gap, µm, of each flight with an estimate.
+    pub(crate) fn gaps(&self) -> Vec<[f64; 2]> {
+        let gap = |flight: &ReportFlight| Some([day(flight.departure_utc), flight.gap_m? * 1e6]);
+        self.flights.iter().filter_map(gap).collect()
     }
 
     /// Gap divided by limit.

@@ -1,6 +1,5 @@
 //! State badge: word, shape and colour of a unit's state, so that no reader depends on colour.
 
-use records::assessment::action::state_rank;
 use trend::State;
 
 /// State of a unit as readers see it; a removed unit has none. An unknown word must never be read as normal.
@@ -11,11 +10,6 @@ impl StateBadge {
     /// Parses the `state` of an assessment; `None` is a removed unit, an unknown word an unassessed one.
     pub fn from_state(word: Option<&str>) -> Self {
         Self(word.map(|word| word.parse().unwrap_or(State::Unassessed)))
-    }
-
-    /// Rank by urgency, the most urgent first; a removed unit last.
-    pub fn rank(self) -> u8 {
-        state_rank(self.0.map(State::as_str))
     }
 
     /// Word shown to readers.
@@ -49,9 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_word_is_never_normal_and_ranks_follow_the_states() {
+    fn an_unknown_word_is_never_normal() {
         assert_eq!(StateBadge::from_state(Some("fine")), StateBadge(Some(State::Unassessed)));
-        let ranks = State::ALL.map(|state| StateBadge::from_state(Some(state.as_str())).rank());
-        assert!(ranks.is_sorted_by(|a, b| a > b), "{ranks:?}");
     }
 }

@@ -8,6 +8,7 @@ use jiff::Timestamp;
 use job::Config;
 use job::flight_log::FlightLog;
 use rayon::prelude::*;
+use records::report_rows::ReportFlight;
 use records::{Diagnostic, Installations};
 use store::{Query, Store};
 
@@ -30,12 +31,17 @@ pub struct FlightPlots {
     pub left_out: usize,
 }
 
-/// One actuator in one flight: its place in the report, and in its log.
-#[derive(Debug, Clone)]
+/// One actuator in one flight: its place in the report.
+#[derive(Debug, Clone, Copy)]
 struct Wanted {
     unit: usize,
     flight: usize,
-    position: String,
+}
+
+impl Wanted {
+    fn of(self, report: &Report) -> &ReportFlight {
+        &report.units[self.unit].flights[self.flight]
+    }
 }
 
 /// Draws the last `flights_per_unit` flights of each unit that needs action, or of each unit if the report is limited to
@@ -50,28 +56,20 @@ pub fn draw(
     installations: &Arc<Installations>,
     store: &Store,
 ) -> Result<FlightPlots, Error> {
+    let latest = |unit: usize| {
+        let flights = 0..report.units[unit].flights.len();
+        flights.rev().take(flights_per_unit).map(move |flight| Wanted { unit, flight })
+    };
+    let mut wanted: Vec<Wanted> = by_urgency(report).into_iter().flat_map(latest).collect();
+    let left_out = wanted.len().saturating_sub(MAX_PLOTS);
+    wanted.truncate(MAX_PLOTS);
     let mut logs = BTreeMap::<StoredLog, Vec<Wanted>>::new();
-    let (mut chosen, mut left_out) = (0, 0);
-    for unit in by_urgency(report) {
-        let (view, first) = (&report.units[unit], report.units[unit].flights.len());
-        let flights = first.saturating_sub(flights_per_unit)..first;
-        if chosen == MAX_PLOTS {
-            left_out += flights.len();
-            continue;
-        }
-        let logs_of_flights = log_paths(view, flights.start, store)?;
-        for flight in flights.rev() {
-            let row = &view.flights[flight];
-            let Some(log) = logs_of_flights.get(&(row.tail_number.to_string(), row.departure_utc)) else {
-                continue;
-            };
-            if chosen == MAX_PLOTS {
-                left_out += 1;
-                continue;
-            }
-            chosen += 1;
-            let wanted = Wanted { unit, flight, position: row.position.to_string() };
-            logs.entry(log.clone()).or_default().push(wanted);
+    for of_unit in wanted.chunk_by(|a, b| a.unit == b.unit) {
+        let log_paths = log_paths(&report.units[of_unit[0].unit], of_unit[of_unit.len() - 1].flight, store)?;
+        for wanted in of_unit {
+            let row = wanted.of(report);
+            let log = log_paths.get(&(row.tail_number.to_string(), row.departure_utc));
+            log.into_iter().for_each(|log| logs.entry(log.clone()).or_default().push(*wanted));
         }
     }
     let drawn: Vec<Result<Vec<(Wanted, Page)>, Diagnostic>> = logs
@@ -106,17 +104,16 @@ fn by_urgency(report: &Report) -> Vec<usize> {
 /// Path of a log, and the digest that it had when its records were stored.
 type StoredLog = (String, String);
 
-/// Logs of a unit's flights from one on, by tail and departure.
+/// Logs of a unit's flights from the `first` on, by tail and departure.
 fn log_paths(
     unit: &UnitView,
     first: usize,
     store: &Store,
 ) -> Result<BTreeMap<(String, Timestamp), StoredLog>, Error> {
-    let Some(first) = unit.flights.get(first) else { return Ok(BTreeMap::new()) };
     let query = Query {
         serial_number: Some(unit.row.serial_number.clone()),
         part_number: unit.row.part_number.clone(),
-        since_utc: Some(first.departure_utc),
+        since_utc: Some(unit.flights[first].departure_utc),
         ..Query::default()
     };
     let key = |record: records::GapRecord| {
@@ -146,18 +143,17 @@ fn of_log(
         estimate_plots::of_log(&files, &name, &of_log, &units, None)
     })?;
     let page = |wanted: &Wanted| {
-        let unit = &report.units[wanted.unit];
-        let plot = plots.iter().find(|(position, _)| position.to_string() == wanted.position);
+        let (unit, row) = (&report.units[wanted.unit], wanted.of(report));
+        let plot = plots.iter().find(|(position, _)| position.as_str() == &*row.position);
         let (_, plot) = plot.ok_or_else(|| {
-            let what = format!("the log has no position {} any more", wanted.position);
+            let what = format!("the log has no position {} any more", row.position);
             Diagnostic::new("no_position", what).in_file(log)
         })?;
-        let row = &unit.flights[wanted.flight];
         let path = flight_path(&row.tail_number, row.departure_utc, &row.position);
         let back = format!("../{}", unit_path(unit));
         let html = estimate_plot_html(std::slice::from_ref(plot), Some((&back, &unit.name())))
             .map_err(|e| Diagnostic::new("cannot_draw", e).in_file(log))?;
-        Ok((wanted.clone(), Page::html(path, &html)))
+        Ok((*wanted, Page::html(path, &html)))
     };
     wanted.iter().map(page).collect()
 }

@@ -49,13 +49,9 @@ impl Axes {
 
     fn draw(self, unit: &UnitView) -> String {
         let Some((from, to)) = self.span else { return String::new() };
-        let gap = |flight: &records::report_rows::ReportFlight| {
-            Some([day(flight.departure_utc), flight.gap_m? * 1e6])
-        };
-        let gaps: Vec<[f64; 2]> = unit.flights.iter().filter_map(gap).collect();
         let x = [day(from), day(to).max(day(from) + 1.0)];
         let limit = unit.row.limit_m.map(|limit_m| limit_m * 1e6);
-        sparkline([200.0, 64.0], x, 1.08e6 * self.full_m, &thinned(&gaps, MAX_POINTS), limit)
+        sparkline([200.0, 64.0], x, 1.08e6 * self.full_m, &thinned(&unit.gaps(), MAX_POINTS), limit)
     }
 }
 

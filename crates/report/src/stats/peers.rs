@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::charts::frame::{day, thinned};
+use crate::charts::frame::thinned;
 use crate::model::{Report, UnitView};
 
 /// Fewest peers whose median a rate is compared with.
@@ -32,10 +32,8 @@ impl<'a> Peers<'a> {
             let mut rates: Vec<f64> = installed.filter_map(|unit| unit.row.rate_m_per_hour).collect();
             rates.sort_by(f64::total_cmp);
             let some = units.iter().step_by(units.len().div_ceil(SHOWN.0 + 1).max(1));
-            let curve = |unit: &&'a UnitView| {
-                let gaps = unit.flights.iter().filter_map(|f| Some([day(f.departure_utc), f.gap_m? * 1e6]));
-                (unit.row.serial_number.as_str(), thinned(&gaps.collect::<Vec<_>>(), SHOWN.1))
-            };
+            let curve =
+                |unit: &&'a UnitView| (unit.row.serial_number.as_str(), thinned(&unit.gaps(), SHOWN.1));
             (units[0].row.part_number.as_deref(), PartUnits { rates, curves: some.map(curve).collect() })
         });
         Self(parts.collect())
