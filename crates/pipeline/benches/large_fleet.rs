@@ -110,10 +110,6 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
     let noise = |quantity: usize| fleet::scatter((tail_at, place, quantity, flight));
     let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
     let estimate = GapEstimate {
-        status: Status::Estimated,
-        reason: None,
-        gap_m: Some(gap_um * 1e-6),
-        gap_se_m: Some(1e-6),
         gap_p05_m: Some((gap_um - 1.645) * 1e-6),
         gap_p95_m: Some((gap_um + 1.645) * 1e-6),
         gap_midrange_m: Some((gap_um + 0.4) * 1e-6),
@@ -134,7 +130,7 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
         load_delay_s: Some(3e-4 * noise(5)),
         load_delay_se_s: Some(3e-4),
         nis: Some(1.0 + 0.1 * noise(6)),
-        ..GapEstimate::refused("")
+        ..fleet::estimated(gap_um)
     };
     let estimate = if refused { GapEstimate::refused("no_load_reversal") } else { estimate };
     let [tail, serial] = [tail(tail_at), serial(tail_at, place)];

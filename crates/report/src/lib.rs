@@ -15,9 +15,7 @@ mod stats;
 
 pub use assets::assets;
 pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
-pub use model::{
-    Event, FleetPriorView, Installation, Quality, QuantityView, Report, TimedInterval, UnitView,
-};
+pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 pub use page::{Error, Page, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
 pub use pages::part::part_pages;

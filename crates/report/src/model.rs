@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use records::report_rows::{
     ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
 };
-use records::{QuantityChange, QuantityRow, TrendRow, WorkRequest};
+use records::{Installation, QuantityChange, QuantityRow, TrendRow, WorkRequest};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -171,16 +171,6 @@ impl Event {
             _ => "measurement moved",
         }
     }
-}
-
-/// An installation of the unit on a tail.
-#[derive(Debug, Clone, Serialize)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Installation {
-    pub tail_number: String,
-    pub position: String,
-    pub installed_utc: Timestamp,
-    pub removed_utc: Option<Timestamp>,
 }
 
 impl Report {

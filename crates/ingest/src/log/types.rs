@@ -11,7 +11,7 @@ use crate::channel::quality::Quality;
 use crate::time::clock::TimestampRepairs;
 
 /// The files of one flight log: usually one.
-#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct LogFiles {
     /// The main log, in one piece or in several.
     pub main: Vec<PathBuf>,

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use ::report::{Event, FleetPriorView, Installation, Quality, QuantityView, Report, TimedInterval, UnitView};
+use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 use jiff::Timestamp;
 use job::Config;
-use records::{Installations, PartNumber, Quantity, QuantityRow};
+use records::{Installation, Installations, PartNumber, Quantity, QuantityRow};
 use store::{LogOutcome, LogRecord, Store};
 use trend::Forecast;
 
@@ -152,8 +152,7 @@ impl ReportComposer<'_> {
         extras: Vec<FlightExtras>,
     ) -> UnitView {
         let name = row.unit();
-        let installations: Vec<Installation> =
-            self.installations.of(&name).into_iter().map(installation).collect();
+        let installations: Vec<Installation> = self.installations.of(&name).into_iter().cloned().collect();
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let before = self.before.get(&1).and_then(|units| units.get(&name));
         let checks = self.checks.iter().filter(|check| check.is_of(&name));
@@ -210,15 +209,6 @@ impl ReportComposer<'_> {
             })
         };
         LOOK_BACK_DAYS.iter().filter_map(of_day).collect()
-    }
-}
-
-fn installation(of: &records::Installation) -> Installation {
-    Installation {
-        tail_number: of.tail_number.to_string(),
-        position: of.position.to_string(),
-        installed_utc: of.installed_utc,
-        removed_utc: of.removed_utc,
     }
 }
 

@@ -82,17 +82,13 @@ fn refuse_foreign(dir: &Path, named: &Path) -> Result<(), Error> {
 
 /// Everything in a folder, folders included, as paths from it with `/`, in order. Links are entries.
 fn entries(dir: &Path) -> Vec<String> {
-    fn walk(dir: &Path, before: &str, found: &mut Vec<String>) {
-        for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
-            let name = format!("{before}{}", entry.file_name().to_string_lossy());
-            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                walk(&entry.path(), &format!("{name}/"), found);
-            }
-            found.push(name);
-        }
-    }
-    let mut found = Vec::new();
-    walk(dir, "", &mut found);
+    let below = |entry: walkdir::DirEntry| {
+        let parts = entry.path().strip_prefix(dir).ok()?.components();
+        let names: Vec<_> = parts.map(|part| part.as_os_str().to_string_lossy()).collect();
+        Some(names.join("/"))
+    };
+    let mut found: Vec<String> =
+        walkdir::WalkDir::new(dir).min_depth(1).into_iter().flatten().filter_map(below).collect();
     found.sort_unstable();
     found
 }

@@ -6,8 +6,7 @@
 //! same key; a log without a result is *not reached*, and the next run processes it. Only this process writes, so the
 //! guarantees of the store hold.
 
-use std::collections::{BTreeMap, HashMap};
-use std::path::PathBuf;
+use std::collections::HashMap;
 
 use ingest::LogFiles;
 use job::Config;
@@ -29,10 +28,8 @@ use crate::run::worker_pool::StepCount;
 pub struct Task {
     /// Its name in records and messages.
     pub log_path: String,
-    /// Its files, the main log's first.
-    pub main: Vec<PathBuf>,
-    /// Files of other kinds, by the name of their group.
-    pub groups: BTreeMap<String, Vec<PathBuf>>,
+    /// Its files.
+    pub files: LogFiles,
     /// The run it is done for.
     pub run_id: String,
 }
@@ -52,15 +49,15 @@ pub fn process_task(
     program_version: &str,
 ) -> Result<String, Error> {
     // Content can be known only to a plan that has accounts, and this one has none.
+    let unidentified = job::flight_log::digest_without_identity(config, installations);
     let inputs = RunInputs {
         config: config.clone(),
         installations: installations.clone(),
-        plan: Plan::default(),
+        plan: Plan { unidentified, ..Plan::default() },
         run_id: task.run_id.clone(),
         program_version: program_version.to_owned(),
     };
-    let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
-    let log_path = task.log_path.clone();
+    let (files, log_path) = (task.files.clone(), task.log_path.clone());
     let work = WorkItem { files, fault: None, log_path, stat: None, why: WorkReason::New, before: None };
     let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
     let worker = WorkerContext { inputs: &inputs, budget: &budget, steps: &steps };
@@ -98,7 +95,12 @@ fn process_batch(
     watch: &dyn Fn(Event),
 ) -> Result<Vec<ProcessedLog>, Error> {
     let sound = works.iter().filter(|work| work.fault.is_none());
-    let tasks: Vec<Task> = sound.map(|work| task(work, &inputs.run_id)).collect();
+    let task = |work: &WorkItem| Task {
+        log_path: work.log_path.clone(),
+        files: work.files.clone(),
+        run_id: inputs.run_id.clone(),
+    };
+    let tasks: Vec<Task> = sound.map(task).collect();
     let mut answers =
         if tasks.is_empty() { HashMap::new() } else { read(engine(&tasks).map_err(Error::Engine)?)? };
     let outcome = |work: &WorkItem| {
@@ -110,15 +112,6 @@ fn process_batch(
         Some(done)
     };
     Ok(works.iter().filter_map(outcome).collect())
-}
-
-fn task(work: &WorkItem, run_id: &str) -> Task {
-    Task {
-        log_path: work.log_path.clone(),
-        main: work.files.main.clone(),
-        groups: work.files.groups.clone(),
-        run_id: run_id.to_owned(),
-    }
 }
 
 /// Outcome of a log, as if it had been processed by this process.

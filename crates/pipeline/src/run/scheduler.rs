@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use ingest::ActuatorColumns;
 use jiff::Timestamp;
-use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_identity};
+use job::flight_log::{FlightLog, catch_panic, config_digest};
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, PartNumber};
@@ -234,11 +234,7 @@ impl RunInputs {
     /// Outcome of a log with an error.
     pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> ProcessedLog {
         let mut account = summary::of_log(work, &self.run_id);
-        let digest = match self.plan.unidentified.as_str() {
-            "" => digest_without_identity(&self.config, &self.installations),
-            known => known.to_owned(),
-        };
-        account.config_digest = Some(digest);
+        account.config_digest = Some(self.plan.unidentified.clone());
         ProcessedLog::in_error(account, diagnostic)
     }
 
