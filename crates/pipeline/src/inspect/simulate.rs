@@ -101,17 +101,13 @@ fn write_data(
 
 /// The tables of a fleet, by name; only installations are always there.
 fn tables(plan: &Plan, spec: &Spec) -> Vec<(&'static str, String)> {
-    let mut tables = vec![("installations", installations(plan))];
-    if spec.flights_per_log > 1 {
-        tables.push(("flights", flights(plan)));
-    }
-    if spec.reshims.iter().any(|shim| shim.is_recorded) {
-        tables.push(("maintenance", maintenance(plan)));
-    }
-    if !spec.play_checks.is_empty() {
-        tables.push(("inspections", inspections(plan)));
-    }
-    tables
+    let tables = [
+        ("installations", true, installations(plan)),
+        ("flights", spec.flights_per_log > 1, flights(plan)),
+        ("maintenance", spec.reshims.iter().any(|shim| shim.is_recorded), maintenance(plan)),
+        ("inspections", !spec.play_checks.is_empty(), inspections(plan)),
+    ];
+    tables.into_iter().filter(|(_, is_there, _)| *is_there).map(|(name, _, table)| (name, table)).collect()
 }
 
 /// Flies one flight and writes its log: a column for each channel of each actuator.

@@ -34,7 +34,7 @@ struct FleetView<'a> {
     peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
     more_work: Vec<String>,
-    quantity_changes: Vec<Change>,
+    quantity_changes: Vec<Change<'a>>,
     more_quantity_changes: usize,
     map: Map<'a>,
     tail_pages: Vec<String>,

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use records::{Quantity, QuantityChange};
 
 use crate::charts::quantities::small_chart;
-use crate::format::{NO_DATA, date};
+use crate::format::NO_DATA;
 use crate::model::{QuantityView, Report, UnitView};
 use crate::page::{tail_path, unit_path};
 
@@ -26,12 +26,11 @@ pub(crate) struct Level {
 }
 
 /// A change as a row of a table.
-pub(crate) struct Change {
-    pub(crate) since: String,
-    pub(crate) whose: &'static str,
+pub(crate) struct Change<'a> {
+    pub(crate) row: &'a QuantityChange,
+    /// Page of the unit or tail, and its name.
     pub(crate) link: Option<String>,
     pub(crate) name: String,
-    pub(crate) evidence: String,
 }
 
 /// Charts of the quantities that changed on a unit, with their steps and its events.
@@ -93,11 +92,15 @@ fn significant(value: f64) -> String {
 }
 
 /// What changed on some of the fleet's units, tails and parts.
-pub(crate) fn changes(report: &Report, root: &str, wanted: impl Fn(&QuantityChange) -> bool) -> Vec<Change> {
+pub(crate) fn changes<'a>(
+    report: &'a Report,
+    root: &str,
+    wanted: impl Fn(&QuantityChange) -> bool,
+) -> Vec<Change<'a>> {
     report.quantity_changes.iter().filter(|change| wanted(change)).map(|c| change(report, root, c)).collect()
 }
 
-fn change(report: &Report, root: &str, change: &QuantityChange) -> Change {
+fn change<'a>(report: &Report, root: &str, change: &'a QuantityChange) -> Change<'a> {
     let is_unit = |unit: &&UnitView| {
         Some(&unit.row.serial_number) == change.serial_number.as_ref()
             && unit.row.part_number == change.part_number
@@ -113,11 +116,5 @@ fn change(report: &Report, root: &str, change: &QuantityChange) -> Change {
         (None, Some(tail), _) => tail.clone(),
         (None, None, part) => part.clone().unwrap_or_else(|| NO_DATA.to_owned()),
     };
-    Change {
-        since: date(change.since_utc),
-        whose: change.scope,
-        link: link.map(|path| format!("{root}{path}")),
-        name,
-        evidence: change.evidence.clone(),
-    }
+    Change { row: change, link: link.map(|path| format!("{root}{path}")), name }
 }

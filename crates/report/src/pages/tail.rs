@@ -24,7 +24,7 @@ struct View<'a> {
     peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
     removed: Vec<&'a UnitView>,
-    quantity_changes: Vec<Change>,
+    quantity_changes: Vec<Change<'a>>,
     log_errors: Vec<&'a ReportLogErrorRow>,
 }
 

@@ -33,7 +33,7 @@ struct View<'a> {
     chart: String,
     /// The latest flight whose gap varies along the stroke: its largest gap in words, and its picture.
     profile: Option<(String, String)>,
-    quantity_changes: Vec<Change>,
+    quantity_changes: Vec<Change<'a>>,
     charts: Vec<Chart>,
     levels: Vec<Level>,
     /// The forecast as far as it is drawn.
