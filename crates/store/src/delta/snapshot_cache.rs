@@ -10,9 +10,12 @@ use crate::delta::location::{Entry, Location};
 use crate::delta::log_storage::LOG;
 use crate::delta::snapshot::Snapshot;
 
-/// A snapshot with the listing of its log, shared by all who hold the table.
+/// A snapshot with the listing of its log.
+type Kept = (Snapshot, Vec<Entry>);
+
+/// The snapshot that is kept, shared by all who hold the table.
 #[derive(Clone, Default)]
-pub(crate) struct SnapshotCache(Arc<Mutex<Option<(Snapshot, Vec<Entry>)>>>);
+pub(crate) struct SnapshotCache(Arc<Mutex<Option<Kept>>>);
 
 /// The file of a commit below its table's folder.
 pub(crate) fn commit_file(version: u64) -> String {

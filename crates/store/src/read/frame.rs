@@ -33,10 +33,10 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
     };
     let arrays: Vec<ArrayRef> = batches.iter().map(array).collect::<Result<_, _>>()?;
     if arrays.first().is_some_and(|array| array.data_type() == &DataType::Int64) {
-        let numbers = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>());
+        let numbers = arrays.iter().flat_map(AsArray::as_primitive::<Int64Type>);
         return Ok(Int64Chunked::from_iter_options(name.into(), numbers).into_column());
     }
-    let texts = arrays.iter().flat_map(|array| array.as_string::<i32>());
+    let texts = arrays.iter().flat_map(AsArray::as_string::<i32>);
     Ok(StringChunked::from_iter_options(name.into(), texts).into_column())
 }
 
