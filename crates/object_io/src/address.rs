@@ -4,26 +4,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use object_store::ObjectStore;
+use strum::{IntoStaticStr, VariantArray};
 
 use crate::error::Error;
 
 /// Client of a bucket, shared by all requests to that bucket.
 pub type Client = Arc<dyn ObjectStore>;
 
-/// Kind of object store.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Kind of object store, by the beginning of its addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase", suffix = "://")]
 pub(crate) enum Scheme {
     S3,
     Gs,
     Az,
-}
-
-impl Scheme {
-    const ALL: [(Self, &'static str); 3] = [(Self::S3, "s3://"), (Self::Gs, "gs://"), (Self::Az, "az://")];
-
-    fn prefix(self) -> &'static str {
-        Self::ALL.iter().find(|(scheme, _)| *scheme == self).map_or("", |(_, prefix)| prefix)
-    }
 }
 
 /// Whether a path is an object address, or is meant as one: `S3://` and `s3:/` would otherwise become a folder's name.
@@ -49,7 +43,9 @@ impl Address {
     /// [`Error::Address`] when it names no bucket, or its scheme is misspelled or unknown.
     pub fn parse(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
-        let scheme = Scheme::ALL.iter().find_map(|(s, prefix)| Some((*s, text.strip_prefix(prefix)?)));
+        let scheme = Scheme::VARIANTS
+            .iter()
+            .find_map(|scheme| Some((*scheme, text.strip_prefix(<&str>::from(scheme))?)));
         let Some((scheme, rest)) = scheme else {
             if !is_address(text) {
                 return Ok(None);
@@ -100,7 +96,7 @@ impl Address {
 
     /// The bucket as an address, with a trailing slash.
     pub fn bucket_url(&self) -> String {
-        format!("{}{}/", self.scheme.prefix(), self.bucket)
+        format!("{}{}/", <&str>::from(self.scheme), self.bucket)
     }
 }
 

@@ -15,7 +15,7 @@ use futures::{StreamExt, stream};
 use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt};
 
 use crate::address::{Address, Client};
-use crate::byte_ranges::RangeSet;
+use crate::byte_ranges::FetchedBlocks;
 use crate::client::block_on;
 use crate::error::Error;
 
@@ -29,7 +29,7 @@ pub struct ObjectFile {
     client: Client,
     meta: ObjectMeta,
     file: File,
-    had: Mutex<RangeSet>,
+    had: Mutex<FetchedBlocks>,
 }
 
 impl ObjectFile {
@@ -63,7 +63,7 @@ impl ObjectFile {
             ranges.into_iter().map(clip).filter(|range| !range.is_empty()).collect();
         // Held while it is fetched: two actuators that want the same column fetch it once.
         let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
-        let missing = had.missing(&wanted);
+        let missing = had.missing(&wanted, self.meta.size);
         if missing.is_empty() {
             return Ok(());
         }
@@ -72,7 +72,7 @@ impl ObjectFile {
             let mut pieces = stream::iter(pieces).buffer_unordered(AT_ONCE);
             while let Some((range, bytes)) = pieces.next().await {
                 write_at(&self.file, &bytes?, range.start).map_err(|e| spool_error(&self.address, e))?;
-                had.add(range);
+                had.add(&range);
             }
             Ok(())
         })?

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::stream::BoxStream;
-use futures::{FutureExt, StreamExt, stream};
+use futures::{StreamExt, stream};
 use object_store::path::Path;
 use object_store::{
     CopyOptions, Error, GetOptions, GetRange, GetResult, GetResultPayload, ListResult, MultipartUpload,
@@ -106,8 +106,8 @@ impl RetryingStore {
         Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))
     }
 
-    /// Listing of the keys after `last`.
-    fn resume_list(
+    /// The keys after `last`.
+    fn list_after(
         &self,
         prefix: Option<&Path>,
         last: Option<&Path>,
@@ -116,6 +116,34 @@ impl RetryingStore {
             Some(last) => self.inner.list_with_offset(prefix, last),
             None => self.inner.list(prefix),
         }
+    }
+
+    /// The same; after an error the listing resumes after the last received key.
+    fn resumable_list(
+        &self,
+        prefix: Option<&Path>,
+        last: Option<&Path>,
+    ) -> BoxStream<'static, Result<ObjectMeta>> {
+        let (store, prefix) = (self.clone(), prefix.cloned());
+        let first = (store.list_after(prefix.as_ref(), last), last.cloned(), store.backoff());
+        let next =
+            move |(mut open, mut last, mut backoff): (BoxStream<'static, Result<ObjectMeta>>, _, Backoff)| {
+                let (store, prefix) = (store.clone(), prefix.clone());
+                async move {
+                    loop {
+                        match open.next().await.transpose() {
+                            Ok(None) => return Ok(None),
+                            Ok(Some(meta)) => {
+                                last = Some(meta.location.clone());
+                                return Ok(Some((meta, (open, last, store.backoff()))));
+                            }
+                            Err(error) => backoff.wait_after(error).await?,
+                        }
+                        open = store.list_after(prefix.as_ref(), last.as_ref());
+                    }
+                }
+            };
+        stream::try_unfold(first, next).boxed()
     }
 }
 
@@ -166,7 +194,7 @@ impl ObjectStore for RetryingStore {
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.resumable_list(prefix.cloned(), None)
+        self.resumable_list(prefix, None)
     }
 
     fn list_with_offset(
@@ -174,7 +202,7 @@ impl ObjectStore for RetryingStore {
         prefix: Option<&Path>,
         offset: &Path,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.resumable_list(prefix.cloned(), Some(offset.clone()))
+        self.resumable_list(prefix, Some(offset))
     }
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
@@ -183,49 +211,5 @@ impl ObjectStore for RetryingStore {
 
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
         self.with_retry(|| self.inner.copy_opts(from, to, options.clone())).await
-    }
-}
-
-/// A listing that resumes after the last received key.
-struct ResumableList {
-    store: RetryingStore,
-    prefix: Option<Path>,
-    last: Option<Path>,
-    open: BoxStream<'static, Result<ObjectMeta>>,
-    backoff: Backoff,
-    has_failed: bool,
-}
-
-impl ResumableList {
-    async fn next(mut self) -> Option<(Result<ObjectMeta>, Self)> {
-        while !self.has_failed {
-            match self.open.next().await? {
-                Ok(meta) => {
-                    self.last = Some(meta.location.clone());
-                    self.backoff = self.store.backoff();
-                    return Some((Ok(meta), self));
-                }
-                Err(error) => match self.backoff.wait_after(error).await {
-                    Ok(()) => self.open = self.store.resume_list(self.prefix.as_ref(), self.last.as_ref()),
-                    Err(error) => {
-                        self.has_failed = true;
-                        return Some((Err(error), self));
-                    }
-                },
-            }
-        }
-        None
-    }
-}
-
-impl RetryingStore {
-    fn resumable_list(
-        &self,
-        prefix: Option<Path>,
-        last: Option<Path>,
-    ) -> BoxStream<'static, Result<ObjectMeta>> {
-        let (open, backoff) = (self.resume_list(prefix.as_ref(), last.as_ref()), self.backoff());
-        let listing = ResumableList { store: self.clone(), prefix, last, open, backoff, has_failed: false };
-        stream::unfold(listing, |listing| listing.next().boxed()).boxed()
     }
 }
