@@ -1,10 +1,12 @@
 //! Names of columns: the words that name a channel, a unit, a redundant sensor or a position.
 
+use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 use crate::mapping::Role;
 use crate::mapping::column_pattern::PLACEHOLDER;
-use crate::mapping::units::{Dimension, Unit};
+use crate::mapping::units::{Dimension, SPELLINGS, Unit};
 
 /// A name's words: cut at what is no letter or digit, where a digit follows the name of a channel (`LVDT2`), and where a
 /// capital follows a small letter, but for a unit (`kN`).
@@ -86,27 +88,17 @@ const SENSOR_KINDS: &str = "resolver rslvr encoder enc lvdt rvdt loadcell";
 const FILLERS: &str = "position pos posn angle ang rotation displacement disp length cell sensor meas measured actual feedback fbk \
                        value raw counts of the";
 
-/// The unit of which a text is the symbol, in letters of either case and with any sign of multiplication or none.
+/// The unit that a text names, in letters of either case and with any sign of multiplication or none.
 pub(super) fn unit_of(text: &str) -> Option<Unit> {
+    static KNOWN: LazyLock<HashMap<String, Unit>> =
+        LazyLock::new(|| SPELLINGS.iter().map(|(text, unit)| (plain(text), *unit)).collect());
+    KNOWN.get(&plain(text)).copied()
+}
+
+/// A text in small letters without signs of multiplication.
+fn plain(text: &str) -> String {
     let is_sign = |c: char| matches!(c, '.' | '·' | '-' | '*' | '_') || c.is_whitespace();
-    let text = text.to_lowercase().replace(is_sign, "");
-    Unit::from_symbol(match text.as_str() {
-        "n" | "newtons" => "N",
-        "kn" | "kilonewton" | "kilonewtons" => "kN",
-        "dan" => "daN",
-        "nm" | "newtonmeter" | "newtonmetre" => "N.m",
-        "knm" => "kN.m",
-        "lbfin" | "lbin" | "inlbf" | "inlb" | "inlbs" => "lbf.in",
-        "lbfft" | "lbft" | "ftlbf" | "ftlb" | "ftlbs" => "lbf.ft",
-        "degc" | "°c" | "c" => "degC",
-        "degf" | "°f" => "degF",
-        "k" => "K",
-        "pound" | "pounds" => "lbf",
-        "meter" | "meters" | "metre" | "metres" => "m",
-        "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm",
-        "revs" | "revolution" | "revolutions" | "rotations" => "rev",
-        other => other,
-    })
+    text.to_lowercase().replace(is_sign, "")
 }
 
 /// Words of quantities that are no position, load or temperature.

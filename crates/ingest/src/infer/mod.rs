@@ -18,13 +18,14 @@ use crate::error::Error;
 use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, place_in, time_unit, unit_of};
 use crate::infer::identity_sources::{fact_of, facts_of, folders, is_instant};
 use crate::log::row_partition::DistinctTexts;
-use crate::log::row_table::{EXCEL_ZERO_S, RowTable};
+use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
-use crate::mapping::units::Unit;
+use crate::mapping::units::{TimeUnit, Unit, from_symbol};
 use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
 use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
 use crate::time::clock::DAY_S;
+use crate::time::timestamps::EXCEL_ZERO_S;
 
 pub use identity_sources::{folder_value, path_identity, path_position, path_tail};
 
@@ -249,9 +250,6 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
     known.into_iter().find(|(_, steps)| steps.contains(&step)).map(|(unit, _)| unit)
 }
 
-/// Units of times, and how many seconds each is.
-const UNITS: [(&str, f64); 5] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", DAY_S)];
-
 /// A column of numbers; none where it cannot be read.
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
@@ -262,9 +260,9 @@ fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
 /// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie
 /// within a day and the name of the column has it.
 fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
-    let Some((_, scale)) = UNITS.iter().find(|(known, _)| *known == unit) else { return Epoch::None };
+    let per_second = from_symbol(unit).and_then(TimeUnit::per_second).unwrap_or(f64::NAN);
     let is_of_now = |since_1970_s: f64| (631_152_000.0..4_102_444_800.0).contains(&since_1970_s);
-    match times.iter().find(|time| !time.is_nan()).map(|first| first * scale) {
+    match times.iter().find(|time| !time.is_nan()).map(|first| first / per_second) {
         Some(first_s) if unit == "d" && is_of_now(first_s + EXCEL_ZERO_S as f64) => Epoch::Excel,
         Some(first_s) if is_of_now(first_s) => Epoch::Unix,
         Some(first_s) if is_of_day && (0.0..DAY_S).contains(&first_s) => Epoch::Midnight,

@@ -83,7 +83,7 @@ impl<'s> ChannelSampling<'s> {
 
     /// The same with its rows on one clock.
     pub(crate) fn with_clock(mut self) -> Result<Self, Error> {
-        self.line = self.line_of()?;
+        (self.line, _) = self.line_of()?;
         self.every = self.rows_between();
         Ok(self)
     }
@@ -142,21 +142,22 @@ impl<'s> ChannelSampling<'s> {
         Cow::Owned(ClockMapping { rate_hz: self.map.rate_hz.or(shared), ..self.sheet.clock.clone() })
     }
 
-    /// The clock of its rows; that of a sheet's own rows is read once for all its channels.
-    fn line_of(&self) -> Result<TimeBase, Error> {
+    /// The clock of its rows, with their stamps where it is its own. That of a table's own rows is read once for all its
+    /// channels.
+    fn line_of(&self) -> Result<(TimeBase, Option<Timestamps>), Error> {
         let of_sheet = self.time_column.is_none()
             && self.samples.rows.is_empty()
             && matches!(self.clock(), Cow::Borrowed(_))
             && !self.sheet.is_listed(&self.samples.leaf);
-        if !of_sheet {
-            return Ok(self.read_line()?.1);
-        }
-        if let Some(known) = self.sheet.line.get() {
-            return Ok(known.clone());
+        if let Some(known) = self.sheet.line.get().filter(|_| of_sheet) {
+            return Ok((known.clone(), None));
         }
         let (stamps, line) = self.read_line()?;
+        if !of_sheet {
+            return Ok((line, stamps));
+        }
         buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
-        Ok(self.sheet.line.get_or_init(|| line).clone())
+        Ok((self.sheet.line.get_or_init(|| line).clone(), None))
     }
 
     fn read_line(&self) -> Result<(Option<Timestamps>, TimeBase), Error> {
@@ -181,10 +182,12 @@ impl<'s> ChannelSampling<'s> {
         }
     }
 
-    /// The stamps of the rows that count, and their instants, shifted to when the channel was true.
-    fn instants(&self) -> Result<(Timestamps, Vec<f64>), Error> {
-        let (stamps, line) = self.read_line()?;
-        let stamps = stamps.unwrap_or_else(|| Timestamps::uniform(line.rows, line.step_s.recip()));
+    /// The stamps of the rows that count, which are read where they are not `known`, and their instants, shifted to when the
+    /// channel was true.
+    fn instants(&self, known: Option<Timestamps>) -> Result<(Timestamps, Vec<f64>), Error> {
+        let stamps = if known.is_some() { known } else { self.read_line()?.0 };
+        let even = || Timestamps::uniform(self.line.rows, self.line.step_s.recip());
+        let stamps = stamps.unwrap_or_else(even);
         let mut instants = self.line.keep(stamps.seconds);
         instants.iter_mut().for_each(|t| *t += self.map.shift_s());
         Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
@@ -263,7 +266,7 @@ impl<'s> ChannelSampling<'s> {
             return self.readings(geometry, wanted);
         }
         let read = self.readings(geometry, None)?;
-        let (_, instants) = self.instants()?;
+        let (_, instants) = self.instants(None)?;
         let values = self.placed(&instants, &read.values, &instants, Interpolation::Line);
         Ok(Channel { values, seen: None, ..read })
     }
@@ -287,7 +290,12 @@ pub(crate) fn follow(
     wanted: RowSelection<'_>,
 ) -> Result<Channel, Error> {
     let shared = own.shares_rows(master);
-    own.line = if shared { master.line.clone() } else { own.line_of()? };
+    let mut stamps = None;
+    if shared {
+        own.line = master.line.clone();
+    } else {
+        (own.line, stamps) = own.line_of()?;
+    }
     own.every = own.rows_between();
     let is_slow_load = role == Role::Load && own.every > 1;
     // A nanosecond is no shift.
@@ -297,13 +305,13 @@ pub(crate) fn follow(
     let Channel { values, turn_m, .. } = match read {
         Ok(read) if is_direct => return Ok(read),
         Err(error) if shared && own.has_own_list(master, &error)? => {
-            own.line = own.line_of()?;
+            (own.line, stamps) = own.line_of()?;
             own.readings(geometry, None)?
         }
         read => read?,
     };
-    let (stamps, own_s) = own.instants()?;
-    let (lead, mut at_s) = master.instants()?;
+    let (stamps, own_s) = own.instants(stamps)?;
+    let (lead, mut at_s) = master.instants(None)?;
     let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
         own.sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
     })?;

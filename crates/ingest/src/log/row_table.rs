@@ -20,16 +20,12 @@ pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
-use crate::mapping::units::TimeUnit;
-use crate::mapping::{ChannelMapping, ClockMapping, Epoch, Layout};
+use crate::mapping::{ChannelMapping, ClockMapping, Layout};
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::parquet::row_selection::RowSelection;
-use crate::time::clock::{DAY_S, TimeBase, Timestamps};
-use crate::time::timestamps::{TickEpoch, TickFormat, TimestampParser};
-
-/// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
-pub(crate) const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
+use crate::time::clock::{TimeBase, Timestamps};
+use crate::time::timestamps::{TickFormat, TimestampParser};
 
 /// The files of one kind that belong to one flight.
 #[derive(Debug, Default)]
@@ -341,43 +337,12 @@ impl RowTable {
 
     /// What the numbers of a time column are.
     fn ticks(&self, column: &str) -> Result<TickFormat, Error> {
-        let kind = self.files[0].leaf(column)?.kind.clone();
-        let unit = match (&kind, self.clock.unit) {
-            (DataType::Timestamp(unit, zone), _) => {
-                return Ok(TickFormat::of_timestamp(*unit, zone.is_none()));
-            }
-            (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, unit)
-                if unit.is_none() || !self.files[0].holds_numbers(column) =>
-            {
-                return Ok(TickFormat::text(self.clock.epoch == Epoch::Midnight));
-            }
-            (DataType::Time32(unit) | DataType::Time64(unit), _) => return Ok(TickFormat::of_day(*unit)),
-            (DataType::Int64, _) if let Some(unit) = self.files[0].duration_unit(column) => {
-                return Ok(TickFormat::of_duration(unit));
-            }
-            (kind, None) => {
-                let (column, found) = (column.to_owned(), kind.to_string());
-                return Err(self.error(ErrorKind::TimeUnit { column, found }));
-            }
-            (_, Some(unit)) => unit,
-        };
-        let per_second = match unit {
-            TimeUnit::Count => self.clock.rate_hz.ok_or_else(|| {
-                let found = "a counter, and no `clock.rate_hz`".to_owned();
-                self.error(ErrorKind::TimeUnit { column: column.to_owned(), found })
-            })?,
-            other => other.per_second().unwrap_or(1.0),
-        };
-        let is_whole = kind.is_integer();
-        let (origin, zero_s) = match self.clock.epoch {
-            Epoch::None => (TickEpoch::Own, 0),
-            Epoch::Unix => (TickEpoch::Utc, 0),
-            Epoch::Midnight => (TickEpoch::Midnight, 0),
-            Epoch::Excel => (TickEpoch::Local, EXCEL_ZERO_S),
-        };
-        let day = (origin == TickEpoch::Midnight).then_some(DAY_S * per_second);
-        let wraps_at = self.clock.wraps_at.or(day);
-        Ok(TickFormat { per_second, is_whole, is_text: false, origin, zero_s, wraps_at })
+        let (file, clock) = (&self.files[0], &self.clock);
+        let kind = &file.leaf(column)?.kind;
+        let is_text = *kind == DataType::Utf8 && (clock.unit.is_none() || !file.holds_numbers(column));
+        let duration = if *kind == DataType::Int64 { file.duration_unit(column) } else { None };
+        TickFormat::of(kind, is_text, duration, clock)
+            .map_err(|found| self.error(ErrorKind::TimeUnit { column: column.to_owned(), found }))
     }
 
     /// The known name nearest to a channel that is not here.

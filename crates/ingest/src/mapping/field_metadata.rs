@@ -4,7 +4,7 @@ use arrow::datatypes::Field;
 
 use crate::error::ErrorKind;
 use crate::mapping::ChannelMapping;
-use crate::mapping::units::Unit;
+use crate::mapping::units::{Unit, from_symbol};
 
 /// What a field notes of its column: `unit = raw · scale + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +29,7 @@ impl FieldMetadata {
         Self {
             scale: number(["scale", "scale_factor"]).filter(|scale| *scale != 0.0).unwrap_or(1.0),
             offset: number(["offset", "add_offset"]).unwrap_or(0.0),
-            unit: text(["unit", "units"]).and_then(Unit::from_symbol),
+            unit: text(["unit", "units"]).and_then(from_symbol),
         }
     }
 

@@ -6,8 +6,8 @@
 use std::f64::consts::{PI, TAU};
 
 use schemars::JsonSchema;
-use serde::de::IntoDeserializer;
 use serde::de::value::{Error, StrDeserializer};
+use serde::de::{DeserializeOwned, IntoDeserializer};
 use serde::{Deserialize, Serialize};
 
 /// One pound-force, N.
@@ -38,15 +38,20 @@ impl Dimension {
     }
 }
 
-/// The units: what each is, its name in the configuration, other spellings, what it measures, and factor and offset of
-/// `SI = value · factor + offset`.
+/// The units: what each is, its name in the configuration and other spellings there, words for it that only names of
+/// columns use, what it measures, and factor and offset of `SI = value · factor + offset`.
 macro_rules! units {
-    ($($doc:literal $unit:ident = $name:literal [$($other:literal)*] $dimension:ident, $factor:expr, $offset:expr;)*) => {
+    ($($doc:literal $unit:ident = $name:literal [$($other:literal)*] [$($word:literal)*]
+       $dimension:ident, $factor:expr, $offset:expr;)*) => {
         /// The unit of a logged channel.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         pub enum Unit {
             $(#[doc = $doc] #[serde(rename = $name $(, alias = $other)*)] $unit,)*
         }
+
+        /// Every unit by each of its spellings and words.
+        pub(crate) const SPELLINGS: &[(&str, Unit)] =
+            &[$(($name, Unit::$unit), $(($other, Unit::$unit),)* $(($word, Unit::$unit),)*)*];
 
         impl Unit {
             const fn entry(self) -> (&'static str, Dimension, f64, f64) {
@@ -59,37 +64,41 @@ macro_rules! units {
 }
 
 units! {
-    "Metre." Metre = "m" [] Length, 1.0, 0.0;
-    "Millimetre." Millimetre = "mm" [] Length, 1e-3, 0.0;
-    "Micrometre." Micrometre = "um" ["µm" "μm"] Length, 1e-6, 0.0;
-    "Centimetre." Centimetre = "cm" [] Length, 1e-2, 0.0;
-    "Inch." Inch = "in" ["inch" "inches"] Length, INCH_M, 0.0;
-    "Thousandth of an inch." Mil = "mil" ["mils" "thou"] Length, INCH_M / 1e3, 0.0;
-    "Degree of arc." Degree = "deg" ["°" "degree" "degrees"] Angle, PI / 180.0, 0.0;
-    "Radian." Radian = "rad" ["radian" "radians"] Angle, 1.0, 0.0;
-    "Milliradian." Milliradian = "mrad" [] Angle, 1e-3, 0.0;
-    "Turn." Revolution = "rev" ["turn" "turns"] Angle, TAU, 0.0;
-    "Newton." Newton = "N" ["newton"] Force, 1.0, 0.0;
-    "Kilonewton." Kilonewton = "kN" [] Force, 1e3, 0.0;
-    "Decanewton." Decanewton = "daN" [] Force, 10.0, 0.0;
-    "Pound-force." PoundForce = "lbf" ["lb" "lbs"] Force, LBF_N, 0.0;
-    "Thousand pounds-force." KilopoundForce = "klbf" ["kip"] Force, 1e3 * LBF_N, 0.0;
-    "Newton metre." NewtonMetre = "N.m" ["N·m" "Nm" "N m"] Torque, 1.0, 0.0;
-    "Kilonewton metre." KilonewtonMetre = "kN.m" ["kN·m" "kNm"] Torque, 1e3, 0.0;
-    "Pound-force inch." PoundForceInch = "lbf.in" ["lbf·in" "in.lbf" "lbf in"] Torque, LBF_N * INCH_M, 0.0;
-    "Pound-force foot." PoundForceFoot = "lbf.ft" ["lbf·ft" "ft.lbf" "lbf ft"] Torque, LBF_N * INCH_M * 12.0, 0.0;
-    "Degree Celsius." Celsius = "degC" ["°C" "C"] Temperature, 1.0, 0.0;
-    "Degree Fahrenheit." Fahrenheit = "degF" ["°F" "F"] Temperature, 5.0 / 9.0, -160.0 / 9.0;
-    "Kelvin." Kelvin = "K" [] Temperature, 1.0, -273.15;
+    "Metre." Metre = "m" [] ["meter" "meters" "metre" "metres"] Length, 1.0, 0.0;
+    "Millimetre." Millimetre = "mm" [] ["millimeter" "millimeters" "millimetre" "millimetres"]
+       Length, 1e-3, 0.0;
+    "Micrometre." Micrometre = "um" ["µm" "μm"] [] Length, 1e-6, 0.0;
+    "Centimetre." Centimetre = "cm" [] [] Length, 1e-2, 0.0;
+    "Inch." Inch = "in" ["inch" "inches"] [] Length, INCH_M, 0.0;
+    "Thousandth of an inch." Mil = "mil" ["mils" "thou"] [] Length, INCH_M / 1e3, 0.0;
+    "Degree of arc." Degree = "deg" ["°" "degree" "degrees"] [] Angle, PI / 180.0, 0.0;
+    "Radian." Radian = "rad" ["radian" "radians"] [] Angle, 1.0, 0.0;
+    "Milliradian." Milliradian = "mrad" [] [] Angle, 1e-3, 0.0;
+    "Turn." Revolution = "rev" ["turn" "turns"] ["revs" "revolution" "revolutions" "rotations"]
+       Angle, TAU, 0.0;
+    "Newton." Newton = "N" ["newton"] ["newtons"] Force, 1.0, 0.0;
+    "Kilonewton." Kilonewton = "kN" [] ["kilonewton" "kilonewtons"] Force, 1e3, 0.0;
+    "Decanewton." Decanewton = "daN" [] [] Force, 10.0, 0.0;
+    "Pound-force." PoundForce = "lbf" ["lb" "lbs"] ["pound" "pounds"] Force, LBF_N, 0.0;
+    "Thousand pounds-force." KilopoundForce = "klbf" ["kip"] [] Force, 1e3 * LBF_N, 0.0;
+    "Newton metre." NewtonMetre = "N.m" ["N·m" "Nm" "N m"] ["newtonmeter" "newtonmetre"] Torque, 1.0, 0.0;
+    "Kilonewton metre." KilonewtonMetre = "kN.m" ["kN·m" "kNm"] [] Torque, 1e3, 0.0;
+    "Pound-force inch." PoundForceInch = "lbf.in" ["lbf·in" "in.lbf" "lbf in"] ["lbin" "inlb" "inlbs"]
+       Torque, LBF_N * INCH_M, 0.0;
+    "Pound-force foot." PoundForceFoot = "lbf.ft" ["lbf·ft" "ft.lbf" "lbf ft"] ["lbft" "ftlb" "ftlbs"]
+       Torque, LBF_N * INCH_M * 12.0, 0.0;
+    "Degree Celsius." Celsius = "degC" ["°C" "C"] [] Temperature, 1.0, 0.0;
+    "Degree Fahrenheit." Fahrenheit = "degF" ["°F" "F"] [] Temperature, 5.0 / 9.0, -160.0 / 9.0;
+    "Kelvin." Kelvin = "K" [] [] Temperature, 1.0, -273.15;
+}
+
+/// The unit of a symbol, as configuration spells it.
+pub(crate) fn from_symbol<U: DeserializeOwned>(symbol: &str) -> Option<U> {
+    let symbol: StrDeserializer<'_, Error> = symbol.into_deserializer();
+    U::deserialize(symbol).ok()
 }
 
 impl Unit {
-    /// The unit of a symbol, as configuration spells it.
-    pub(crate) fn from_symbol(symbol: &str) -> Option<Self> {
-        let symbol: StrDeserializer<'_, Error> = symbol.into_deserializer();
-        Self::deserialize(symbol).ok()
-    }
-
     /// What it measures.
     pub fn dimension(self) -> Dimension {
         self.entry().1

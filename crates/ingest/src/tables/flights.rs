@@ -99,7 +99,7 @@ impl Flights {
         let mut errors = flights.contradictions(departure, hours);
         if !errors.is_empty() {
             errors.sort_by_key(|(row, ..)| *row);
-            let error = |(row, column, what)| table.error(row, column, what);
+            let error = |(row, column, what)| table.error(row, Some(column), what);
             return Err(errors.into_iter().map(error).collect());
         }
         let mut hash = blake3::Hasher::new();

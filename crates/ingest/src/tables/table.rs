@@ -1,6 +1,6 @@
 //! Tables read whole, every cell as text.
 
-use std::ops::Range;
+use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use arrow::datatypes::Schema;
 use crate::error::{Error, ErrorKind};
 use crate::tables::column_batches::{ColumnAliases, StringColumn, TableBatch, batches};
 
-/// A table, every cell text; an empty cell is none.
+/// A table in one batch, every cell text; an empty cell is none.
 #[derive(Debug, Clone)]
 pub struct Table {
     whole: TableBatch,
@@ -45,24 +45,6 @@ impl Table {
     pub fn with_aliases(mut self, names: &ColumnAliases) -> Self {
         self.whole.names.clone_from(names);
         self
-    }
-
-    /// Numbers of its rows.
-    pub fn rows(&self) -> Range<usize> {
-        self.whole.rows()
-    }
-
-    /// Where a column stands, if it is there under one of its names.
-    pub fn find(&self, names: &[&str]) -> Option<usize> {
-        self.whole.find(names)
-    }
-
-    /// Where a column stands.
-    ///
-    /// # Errors
-    /// When it is not there, with the nearest name that is.
-    pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
-        self.whole.column(names)
     }
 
     /// Where columns stand; an error for each that is not there.
@@ -99,8 +81,9 @@ impl Table {
         column: usize,
         read: impl Fn(&str) -> Result<T, String>,
     ) -> Result<T, Error> {
-        let text = self.text(row, column).ok_or_else(|| self.error(row, column, "it is empty".into()))?;
-        read(text).map_err(|detail| self.error(row, column, detail))
+        let text =
+            self.text(row, column).ok_or_else(|| self.error(row, Some(column), "it is empty".into()))?;
+        read(text).map_err(|detail| self.error(row, Some(column), detail))
     }
 
     /// A cell of an optional column that may be empty.
@@ -116,11 +99,14 @@ impl Table {
         let Some((column, text)) = column.and_then(|c| Some((c, self.text(row, c)?))) else {
             return Ok(None);
         };
-        read(text).map(Some).map_err(|detail| self.error(row, column, detail))
+        read(text).map(Some).map_err(|detail| self.error(row, Some(column), detail))
     }
+}
 
-    /// The error of a cell.
-    pub(super) fn error(&self, row: usize, column: usize, detail: String) -> Error {
-        self.whole.error(row, Some(column), detail)
+impl Deref for Table {
+    type Target = TableBatch;
+
+    fn deref(&self) -> &TableBatch {
+        &self.whole
     }
 }

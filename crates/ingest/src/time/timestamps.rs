@@ -6,8 +6,13 @@ use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::{Timestamp, civil};
 
 use crate::error::ErrorKind;
+use crate::mapping::units::TimeUnit;
+use crate::mapping::{ClockMapping, Epoch};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::time::clock::{DAY_S, TimeOrigin, Timestamps};
+
+/// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
+pub(crate) const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
 
 /// What zero means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,33 +37,48 @@ pub(crate) struct TickFormat {
 }
 
 impl TickFormat {
-    pub(crate) fn of_timestamp(unit: ArrowTimeUnit, is_local: bool) -> Self {
-        let origin = if is_local { TickEpoch::Local } else { TickEpoch::Utc };
-        Self { origin, ..Self::of_duration(unit) }
-    }
-
-    /// A time of the day, which starts again at midnight.
-    pub(crate) fn of_day(unit: ArrowTimeUnit) -> Self {
-        let ticks = Self::of_duration(unit);
-        Self { origin: TickEpoch::Midnight, wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
-    }
-
-    /// A time since an unknown zero.
-    pub(crate) fn of_duration(unit: ArrowTimeUnit) -> Self {
-        let per_second = match unit {
-            ArrowTimeUnit::Second => 1.0,
-            ArrowTimeUnit::Millisecond => 1e3,
-            ArrowTimeUnit::Microsecond => 1e6,
-            ArrowTimeUnit::Nanosecond => 1e9,
+    /// What the numbers of a column of this type are: by the type, by the unit of a `duration`, or else by the mapped clock.
+    /// A column that is read as text holds ISO 8601; an offset in it is taken, and without one the time is local.
+    ///
+    /// # Errors
+    /// What was found, where neither the type nor the mapping has a unit.
+    pub(crate) fn of(
+        kind: &DataType,
+        is_text: bool,
+        duration: Option<ArrowTimeUnit>,
+        clock: &ClockMapping,
+    ) -> Result<Self, String> {
+        let unit = match kind {
+            DataType::Timestamp(unit, _) | DataType::Time32(unit) | DataType::Time64(unit) => Some(*unit),
+            _ if is_text => Some(ArrowTimeUnit::Nanosecond),
+            _ => duration,
         };
-        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, zero_s: 0, wraps_at: None }
-    }
-
-    /// ISO 8601 text; an offset in it is taken, and without one the time is local. Where `may_be_of_day`, a text may be
-    /// a time of the day alone.
-    pub(crate) fn text(may_be_of_day: bool) -> Self {
-        let ticks = if may_be_of_day { Self::of_day } else { Self::of_duration };
-        Self { is_text: true, origin: TickEpoch::Local, ..ticks(ArrowTimeUnit::Nanosecond) }
+        let (origin, zero_s) = match (kind, clock.epoch) {
+            (DataType::Timestamp(_, Some(_)), _) => (TickEpoch::Utc, 0),
+            (DataType::Timestamp(..), _) => (TickEpoch::Local, 0),
+            (DataType::Time32(_) | DataType::Time64(_), _) => (TickEpoch::Midnight, 0),
+            _ if is_text => (TickEpoch::Local, 0),
+            (_, Epoch::None) => (TickEpoch::Own, 0),
+            _ if unit.is_some() => (TickEpoch::Own, 0),
+            (_, Epoch::Unix) => (TickEpoch::Utc, 0),
+            (_, Epoch::Midnight) => (TickEpoch::Midnight, 0),
+            (_, Epoch::Excel) => (TickEpoch::Local, EXCEL_ZERO_S),
+        };
+        let per_second = match (unit, clock.unit) {
+            (Some(ArrowTimeUnit::Second), _) => 1.0,
+            (Some(ArrowTimeUnit::Millisecond), _) => 1e3,
+            (Some(ArrowTimeUnit::Microsecond), _) => 1e6,
+            (Some(ArrowTimeUnit::Nanosecond), _) => 1e9,
+            (None, Some(TimeUnit::Count)) => clock.rate_hz.ok_or("a counter, and no `clock.rate_hz`")?,
+            (None, Some(unit)) => unit.per_second().unwrap_or(1.0),
+            (None, None) => return Err(kind.to_string()),
+        };
+        // With `clock.epoch` = "midnight", a text may be a time of the day alone.
+        let is_of_day = origin == TickEpoch::Midnight || (is_text && clock.epoch == Epoch::Midnight);
+        let day = is_of_day.then_some(DAY_S * per_second);
+        let wraps_at = if unit.is_none() { clock.wraps_at.or(day) } else { day };
+        let is_whole = unit.is_some() || kind.is_integer();
+        Ok(Self { per_second, is_whole, is_text, origin, zero_s, wraps_at })
     }
 }
 

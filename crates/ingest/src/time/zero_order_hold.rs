@@ -16,9 +16,6 @@ pub(crate) fn zero_order_hold(
     segments: &[Range<usize>],
     step_s: f64,
 ) -> Vec<Range<usize>> {
-    if !load_n.iter().any(|f| f.is_nan()) {
-        return non_empty_segments(segments);
-    }
     let longest = ((HOLD_S / step_s).ceil() as usize).max(HOLD_STEPS * median_sample_interval(load_n));
     let mut loaded = Vec::with_capacity(segments.len());
     for segment in segments {
