@@ -36,17 +36,17 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Describes a channel, by its statistics where they exist already; missing samples are NaN, and `apart` of them were
+    /// Describes a channel, by its statistics where they exist already; missing samples are NaN, and `excluded` of them were
     /// left out by a filter.
     pub(crate) fn of(
         values: &[f64],
         segments: &[Range<usize>],
         seen: Option<ChannelStats>,
         step_s: f64,
-        apart: usize,
+        excluded: usize,
     ) -> Self {
         let seen = &seen.unwrap_or_else(|| ChannelStats::of(values));
-        let (samples, missing) = (values.len() - apart, seen.missing - apart);
+        let (samples, missing) = (values.len() - excluded, seen.missing - excluded);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);
         let longest_run = seen.longest_run.min(samples - missing);
@@ -384,8 +384,8 @@ mod tests {
         }
     }
 
-    fn described(values: &[f64], step_s: f64, apart: usize) -> Quality {
-        Quality::of(values, std::slice::from_ref(&(0..values.len())), None, step_s, apart)
+    fn described(values: &[f64], step_s: f64, excluded: usize) -> Quality {
+        Quality::of(values, std::slice::from_ref(&(0..values.len())), None, step_s, excluded)
     }
 
     fn wave(amplitude: f64) -> Vec<f64> {

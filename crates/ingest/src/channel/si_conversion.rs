@@ -126,22 +126,12 @@ fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
 mod tests {
     use super::*;
 
-    /// By hand: a 5 mm lead turns 0.1 N·m into 0.1·2π/0.005 = 125.66 N, and 90° into 1.25 mm.
     #[test]
-    fn angles_and_torques_come_to_the_screw_by_the_lead() {
-        let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
-        let angle = ChannelMapping { unit: Unit::Degree, ..ChannelMapping::default() };
-        let torque = ChannelMapping { unit: Unit::NewtonMetre, sign: -1, ..ChannelMapping::default() };
-        let in_metres = to_si("a", &angle, geometry).unwrap();
-        assert!((in_metres.apply(90.0) - 0.00125).abs() < 1e-15);
-        assert!([f64::INFINITY, 9.969_21e36, -1e30].iter().all(|fill| in_metres.apply(*fill).is_nan()));
-        assert!((to_si("t", &torque, geometry).unwrap().apply(0.1) + 125.663_706_143_591_7).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_length_on_a_part_that_only_turns_is_refused() {
-        let fault =
-            to_si("x", &ChannelMapping::default(), Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
+    fn a_fill_value_is_missing_and_a_length_on_a_part_that_only_turns_is_refused() {
+        let of = |geometry| to_si("x", &ChannelMapping::default(), geometry);
+        let metres = of(Geometry::Linear { lead_m_per_rev: None }).unwrap();
+        assert!([f64::INFINITY, 9.969_21e36, -1e30].iter().all(|fill| metres.apply(*fill).is_nan()));
+        let fault = of(Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
         assert!(matches!(fault, ErrorKind::UnitForPart { unit: "m", .. }));
     }
 }

@@ -30,11 +30,11 @@ pub(crate) struct RawChannels {
 pub(crate) fn assemble(
     position: Position,
     read: RawChannels,
-    line: &TimeBase,
+    base: &TimeBase,
     temperature_c: Option<f64>,
 ) -> ActuatorChannels {
     let RawChannels { mut motor, mut screw, load, is_relative, output_locked, selection } = read;
-    let SampleSelection { segments, apart } = selection;
+    let SampleSelection { segments, excluded } = selection;
     let channels = Role::NEEDED.iter().zip([&motor, &screw, &load]);
     let alternatives = channels.filter(|(_, channel)| channel.is_alternative);
     let mut flags: Vec<String> =
@@ -44,13 +44,13 @@ pub(crate) fn assemble(
         flags.extend(restored(Role::Screw, &mut screw, &motor, &load, &segments));
     }
     let quality = [&motor, &screw, &load]
-        .map(|read| Quality::of(&read.values, &segments, read.seen, line.step_s, apart));
+        .map(|read| Quality::of(&read.values, &segments, read.seen, base.step_s, excluded));
     let columns = [motor.column, screw.column, load.column];
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
-    flags.extend(quality::quality_flags(&quality, line.step_s));
+    flags.extend(quality::quality_flags(&quality, base.step_s));
     if !is_relative && !output_locked {
         let longest = quality[0].longest_run.max(quality[1].longest_run);
-        flags.extend(quality::drop_frozen_samples(&mut motor_m, &mut dx_m, longest, line.step_s));
+        flags.extend(quality::drop_frozen_samples(&mut motor_m, &mut dx_m, longest, base.step_s));
     }
     if !is_relative {
         join_samples(&mut dx_m, &segments);
@@ -58,30 +58,30 @@ pub(crate) fn assemble(
     join_samples(&mut motor_m, &segments);
     let (travel_m, missing) = relative(&motor_m, &mut dx_m, is_relative);
     flags.extend(quality::coarse_resolution(&quality, travel_m));
-    flags.extend(quality::load_frozen(&load_n, &motor_m, quality[2].longest_run, line.step_s));
+    flags.extend(quality::load_frozen(&load_n, &motor_m, quality[2].longest_run, base.step_s));
     let is_whole = quality[2].missing_share == 0.0;
     let segments = if is_whole {
         non_empty_segments(&segments)
     } else {
-        zero_order_hold(&mut load_n, &segments, line.step_s)
+        zero_order_hold(&mut load_n, &segments, base.step_s)
     };
     join_samples(&mut load_n, &segments);
     ActuatorChannels {
         position,
-        step_s: line.step_s,
-        missing_share: (missing - apart) as f64 / (dx_m.len() - apart).max(1) as f64,
-        apart,
+        step_s: base.step_s,
+        missing_share: (missing - excluded) as f64 / (dx_m.len() - excluded).max(1) as f64,
+        excluded,
         output_locked,
         motor_m,
         dx_m,
         load_n,
         segments,
-        breaks: line.breaks.clone(),
+        breaks: base.breaks.clone(),
         temperature_c,
         columns,
         quality,
         flags,
-        repairs: line.repairs,
+        repairs: base.repairs,
     }
 }
 

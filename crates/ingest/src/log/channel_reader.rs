@@ -33,13 +33,13 @@ pub(crate) struct Channel {
     /// Whether the column is not the first of redundant ones.
     pub(crate) is_alternative: bool,
     /// Samples that no condition leaves: NaN.
-    pub(crate) apart: usize,
+    pub(crate) excluded: usize,
 }
 
 impl Channel {
     /// Whether the channel can serve: at least half of the samples that conditions leave are there, and it moves.
     pub(crate) fn is_alive(&self) -> bool {
-        let needed = (ALIVE_SHARE * (self.values.len() - self.apart) as f64).ceil() as usize;
+        let needed = (ALIVE_SHARE * (self.values.len() - self.excluded) as f64).ceil() as usize;
         let present = || self.values.iter().copied().filter(|v| v.is_finite());
         let first = present().next();
         present().take(needed).count() == needed && present().any(|v| Some(v) != first)
@@ -48,14 +48,14 @@ impl Channel {
 
 impl From<Vec<f64>> for Channel {
     fn from(values: Vec<f64>) -> Self {
-        Self { values, seen: None, turn_m: None, column: None, is_alternative: false, apart: 0 }
+        Self { values, seen: None, turn_m: None, column: None, is_alternative: false, excluded: 0 }
     }
 }
 
 /// How the samples of a channel lie in time.
 #[derive(Debug)]
 pub(crate) struct ChannelSampling<'s> {
-    pub(crate) sheet: &'s RowTable,
+    pub(crate) table: &'s RowTable,
     pub(crate) map: &'s ChannelMapping,
     pub(crate) samples: SampleSelector,
     pub(crate) time_column: Option<String>,
@@ -63,27 +63,27 @@ pub(crate) struct ChannelSampling<'s> {
     /// Rows between samples where the channel is slower than its rows; else 1.
     every: usize,
     /// Its rows on one clock.
-    pub(crate) line: TimeBase,
+    pub(crate) base: TimeBase,
 }
 
 impl<'s> ChannelSampling<'s> {
     /// A channel of a position, whose clock is not read yet.
-    pub(crate) fn new(sheet: &'s RowTable, map: &'s ChannelMapping, name: &str, position: &str) -> Self {
+    pub(crate) fn new(table: &'s RowTable, map: &'s ChannelMapping, name: &str, position: &str) -> Self {
         let named = |column: &String| ColumnPattern::new(column).column_for(position);
         Self {
-            sheet,
+            table,
             map,
-            samples: sheet.samples(name, position),
+            samples: table.samples(name, position),
             time_column: map.time_column.as_ref().map(named),
-            valid: map.valid_column.as_ref().map(|column| sheet.samples(&named(column), position)),
+            valid: map.valid_column.as_ref().map(|column| table.samples(&named(column), position)),
             every: 1,
-            line: clock::uniform(0, 1.0),
+            base: clock::uniform(0, 1.0),
         }
     }
 
     /// The same with its rows on one clock.
     pub(crate) fn with_clock(mut self) -> Result<Self, Error> {
-        (self.line, _) = self.line_of()?;
+        (self.base, _) = self.base_of()?;
         self.every = self.rows_between();
         Ok(self)
     }
@@ -91,7 +91,7 @@ impl<'s> ChannelSampling<'s> {
     /// All that the instants of its samples depend on: channels of one log that agree in it share them.
     pub(crate) fn clock_key(&self) -> String {
         let SampleSelector { leaf, rows } = &self.samples;
-        let listed_leaf = self.sheet.is_listed(leaf).then_some(leaf);
+        let listed_leaf = self.table.is_listed(leaf).then_some(leaf);
         let ChannelMapping { group, rate_hz, .. } = self.map;
         format!("{:?}", (group, listed_leaf, rows, &self.time_column, self.map.shift_s(), rate_hz))
     }
@@ -99,7 +99,7 @@ impl<'s> ChannelSampling<'s> {
     /// Whether the pages of its column hold the rows that are declared, where a row is a sample.
     pub(crate) fn check_rows(&self) -> Result<(), Error> {
         let SampleSelector { leaf, rows } = &self.samples;
-        let mut files = self.sheet.files.iter().filter(|_| rows.is_empty());
+        let mut files = self.table.files.iter().filter(|_| rows.is_empty());
         files.try_for_each(|file| file.check_pages(leaf))
     }
 
@@ -110,7 +110,7 @@ impl<'s> ChannelSampling<'s> {
 
     /// Whether its rows are those of another channel.
     fn shares_rows(&self, other: &Self) -> bool {
-        std::ptr::eq(self.sheet, other.sheet)
+        std::ptr::eq(self.table, other.table)
             && self.samples.rows == other.samples.rows
             && self.time_column == other.time_column
     }
@@ -119,64 +119,64 @@ impl<'s> ChannelSampling<'s> {
     /// instants of their own, which begin with the stamp of the row.
     fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
         let own = &self.samples.leaf;
-        if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.sheet.is_listed(own) {
+        if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.table.is_listed(own) {
             return Ok(false);
         }
-        if self.time_column.is_some() || self.sheet.clock.column.is_some() {
+        if self.time_column.is_some() || self.table.clock.column.is_some() {
             return Ok(true);
         }
         let (column, other) = (own.clone(), other.samples.leaf.clone());
-        Err(self.sheet.error(ErrorKind::ListLengths { column, other }))
+        Err(self.table.error(ErrorKind::ListLengths { column, other }))
     }
 
     fn is_apart(&self) -> bool {
-        self.time_column.is_some() || self.sheet.layout.name_column.is_some()
+        self.time_column.is_some() || self.table.layout.name_column.is_some()
     }
 
     /// A channel with rows of its own has a rate of its own.
     fn clock(&self) -> Cow<'s, ClockMapping> {
-        if !self.is_apart() || self.sheet.clock.rate_hz == self.map.rate_hz {
-            return Cow::Borrowed(&self.sheet.clock);
+        if !self.is_apart() || self.table.clock.rate_hz == self.map.rate_hz {
+            return Cow::Borrowed(&self.table.clock);
         }
-        let shared = if self.time_column.is_some() { None } else { self.sheet.clock.rate_hz };
-        Cow::Owned(ClockMapping { rate_hz: self.map.rate_hz.or(shared), ..self.sheet.clock.clone() })
+        let shared = if self.time_column.is_some() { None } else { self.table.clock.rate_hz };
+        Cow::Owned(ClockMapping { rate_hz: self.map.rate_hz.or(shared), ..self.table.clock.clone() })
     }
 
     /// The clock of its rows, with their stamps where it is its own. That of a table's own rows is read once for all its
     /// channels.
-    fn line_of(&self) -> Result<(TimeBase, Option<Timestamps>), Error> {
-        let of_sheet = self.time_column.is_none()
+    fn base_of(&self) -> Result<(TimeBase, Option<Timestamps>), Error> {
+        let of_table = self.time_column.is_none()
             && self.samples.rows.is_empty()
             && matches!(self.clock(), Cow::Borrowed(_))
-            && !self.sheet.is_listed(&self.samples.leaf);
-        if let Some(known) = self.sheet.line.get().filter(|_| of_sheet) {
+            && !self.table.is_listed(&self.samples.leaf);
+        if let Some(known) = self.table.base.get().filter(|_| of_table) {
             return Ok((known.clone(), None));
         }
-        let (stamps, line) = self.read_line()?;
-        if !of_sheet {
-            return Ok((line, stamps));
+        let (stamps, base) = self.read_base()?;
+        if !of_table {
+            return Ok((base, stamps));
         }
         buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
-        Ok((self.sheet.line.get_or_init(|| line).clone(), None))
+        Ok((self.table.base.get_or_init(|| base).clone(), None))
     }
 
-    fn read_line(&self) -> Result<(Option<Timestamps>, TimeBase), Error> {
+    fn read_base(&self) -> Result<(Option<Timestamps>, TimeBase), Error> {
         let clock = self.clock();
         if let (None, None, Some(rate_hz), true) =
             (&clock.column, &self.time_column, clock.rate_hz, self.samples.rows.is_empty())
         {
-            let rows = self.sheet.count(&self.samples)?;
+            let rows = self.table.count(&self.samples)?;
             return Ok((None, clock::uniform(rows, rate_hz)));
         }
-        let mut stamps = self.sheet.stamps(&self.samples, self.time_column.as_deref())?;
-        let line = clock::build_time_base(&mut stamps, &clock).map_err(|f| self.sheet.error(f))?;
-        Ok((Some(stamps), line))
+        let mut stamps = self.table.stamps(&self.samples, self.time_column.as_deref())?;
+        let base = clock::build_time_base(&mut stamps, &clock).map_err(|f| self.table.error(f))?;
+        Ok((Some(stamps), base))
     }
 
     fn rows_between(&self) -> usize {
         match self.map.rate_hz {
             Some(rate_hz) if !self.is_apart() => {
-                ((self.line.step_s * rate_hz).recip().round() as usize).max(1)
+                ((self.base.step_s * rate_hz).recip().round() as usize).max(1)
             }
             _ => 1,
         }
@@ -185,10 +185,10 @@ impl<'s> ChannelSampling<'s> {
     /// The stamps of the rows that count, which are read where they are not `known`, and their instants, shifted to when the
     /// channel was true.
     fn instants(&self, known: Option<Timestamps>) -> Result<(Timestamps, Vec<f64>), Error> {
-        let stamps = if known.is_some() { known } else { self.read_line()?.0 };
-        let even = || Timestamps::uniform(self.line.rows, self.line.step_s.recip());
+        let stamps = if known.is_some() { known } else { self.read_base()?.0 };
+        let even = || Timestamps::uniform(self.base.rows, self.base.step_s.recip());
         let stamps = stamps.unwrap_or_else(even);
-        let mut instants = self.line.keep(stamps.seconds);
+        let mut instants = self.base.keep(stamps.seconds);
         instants.iter_mut().for_each(|t| *t += self.map.shift_s());
         Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
     }
@@ -196,33 +196,39 @@ impl<'s> ChannelSampling<'s> {
     /// The channel in SI at its own rows; those that are not wanted may be missing.
     fn readings(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
         let map = self.map;
-        let mut si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
-        if !map.ignore_metadata && self.sheet.layout.name_column.is_none() {
-            let (scale, offset) = self.sheet.scale_and_offset(&self.samples.leaf, map)?;
+        let mut si = to_si(self.column(), map, geometry).map_err(|f| self.table.error(f))?;
+        if !map.ignore_metadata && self.table.layout.name_column.is_none() {
+            let (scale, offset) = self.table.scale_and_offset(&self.samples.leaf, map)?;
             si = si.with_line(scale, offset);
         }
         let is_text = !map.texts.is_empty();
         let is_mended = is_text || !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
             // Rows that were put in order are not those of the file.
-            let wanted = if self.line.kept.is_none() { wanted } else { None };
-            let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
+            let wanted = if self.base.kept.is_none() { wanted } else { None };
+            let (values, seen) = self.table.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
-            let seen = seen.filter(|_| self.line.kept.is_none());
-            return Ok(Channel { seen, ..self.line.keep(values).into() });
+            let seen = seen.filter(|_| self.base.kept.is_none());
+            return Ok(Channel { seen, ..self.base.keep(values).into() });
         }
-        let read =
-            if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
+        let read = if is_text {
+            self.table.matches(&self.samples, &map.texts)?
+        } else {
+            self.table.numbers(&self.samples, None, None)?.0
+        };
         self.same_count(read.len(), self.column())?;
-        let mut values = self.line.keep(read);
+        let mut values = self.base.keep(read);
         if !map.missing.is_empty() {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let marks = self.valid_marks(valid)?;
+            let marks = match map.status_bits() {
+                Some((set, clear)) => self.table.bit_marks(valid, set, clear)?,
+                None => self.table.matches(valid, &map.valid_values)?,
+            };
             self.same_count(marks.len(), &valid.leaf)?;
             let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
-            let marked = values.iter_mut().zip(self.line.keep(marks));
+            let marked = values.iter_mut().zip(self.base.keep(marks));
             marked.filter(|(_, mark)| is_bad(*mark)).for_each(|(value, _)| *value = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {
@@ -232,32 +238,12 @@ impl<'s> ChannelSampling<'s> {
         Ok(Channel { turn_m: map.wraps_at.map(|turn| si.length(turn)), ..values.into() })
     }
 
-    /// 1 where a sample is valid, any other number or NaN where it is not.
-    fn valid_marks(&self, valid: &SampleSelector) -> Result<Vec<f64>, Error> {
-        let map = self.map;
-        if let Some((set, clear)) = map.status_bits() {
-            return self.sheet.bit_marks(valid, set, clear);
-        }
-        let texts = RawValue::texts(&map.valid_values);
-        if !texts.is_empty() {
-            return self.sheet.matches(valid, &texts);
-        }
-        let mut marks = self.raw(valid)?;
-        let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
-        marks.iter_mut().for_each(|mark| *mark = f64::from(u8::from(is_valid(*mark))));
-        Ok(marks)
-    }
-
-    fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {
-        self.sheet.numbers(samples, None, None).map(|(values, _)| values)
-    }
-
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
-        if found == self.line.rows {
+        if found == self.base.rows {
             return Ok(());
         }
-        let (column, found, declared) = (column.to_owned(), found as u64, self.line.rows as u64);
-        Err(self.sheet.error(ErrorKind::RowCount { column, found, declared }))
+        let (column, found, declared) = (column.to_owned(), found as u64, self.base.rows as u64);
+        Err(self.table.error(ErrorKind::RowCount { column, found, declared }))
     }
 
     /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
@@ -275,7 +261,7 @@ impl<'s> ChannelSampling<'s> {
     fn placed(&self, own_s: &[f64], values: &[f64], at_s: &[f64], between: Interpolation) -> Vec<f64> {
         let rows = decimated_rows(values, self.every).into_iter();
         let (own_s, values): (Vec<_>, Vec<_>) = rows.map(|i| (own_s[i as usize], values[i as usize])).unzip();
-        let step_s = self.line.step_s * self.every as f64;
+        let step_s = self.base.step_s * self.every as f64;
         interpolate_at(TimeSeries { at_s: &own_s, values: &values, step_s }, at_s, between)
     }
 }
@@ -292,9 +278,9 @@ pub(crate) fn follow(
     let shared = own.shares_rows(master);
     let mut stamps = None;
     if shared {
-        own.line = master.line.clone();
+        own.base = master.base.clone();
     } else {
-        (own.line, stamps) = own.line_of()?;
+        (own.base, stamps) = own.base_of()?;
     }
     own.every = own.rows_between();
     let is_slow_load = role == Role::Load && own.every > 1;
@@ -305,7 +291,7 @@ pub(crate) fn follow(
     let Channel { values, turn_m, .. } = match read {
         Ok(read) if is_direct => return Ok(read),
         Err(error) if shared && own.has_own_list(master, &error)? => {
-            (own.line, stamps) = own.line_of()?;
+            (own.base, stamps) = own.base_of()?;
             own.readings(geometry, None)?
         }
         read => read?,
@@ -313,10 +299,10 @@ pub(crate) fn follow(
     let (stamps, own_s) = own.instants(stamps)?;
     let (lead, mut at_s) = master.instants(None)?;
     let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
-        own.sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
+        own.table.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
     })?;
     at_s.iter_mut().for_each(|t| *t += apart_s);
-    let is_slow = own.line.step_s * own.every as f64 > BREAK_STEPS * master.line.step_s;
+    let is_slow = own.base.step_s * own.every as f64 > BREAK_STEPS * master.base.step_s;
     let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
     let values = own.placed(&own_s, &values, &at_s, between);
     Ok(Channel { turn_m, ..values.into() })

@@ -85,14 +85,14 @@ impl Log {
 
     /// Pieces of a flight follow each other in time, whatever their files are called.
     fn order_pieces(&mut self) -> Result<(), Error> {
-        for sheet in self.tables.values_mut() {
-            let Some(column) = sheet.clock.column.clone() else { continue };
-            if sheet.files.len() < 2 {
+        for table in self.tables.values_mut() {
+            let Some(column) = table.clock.column.clone() else { continue };
+            if table.files.len() < 2 {
                 continue;
             }
-            let mut starts = Vec::with_capacity(sheet.files.len());
-            for file in std::mem::take(&mut sheet.files) {
-                let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
+            let mut starts = Vec::with_capacity(table.files.len());
+            for file in std::mem::take(&mut table.files) {
+                let (clock, layout) = (table.clock.clone(), table.layout.clone());
                 let alone = RowTable::new(vec![file], clock, layout);
                 let stamps = alone.stamps(&SampleSelector::every_row(&column), None)?;
                 starts.push((stamps.origin, alone.files));
@@ -100,7 +100,7 @@ impl Log {
             let first = starts[0].0;
             let since = |origin: &TimeOrigin| origin.since(first).unwrap_or(0.0);
             starts.sort_by(|a, b| since(&a.0).total_cmp(&since(&b.0)));
-            sheet.files = starts.into_iter().flat_map(|(_, files)| files).collect();
+            table.files = starts.into_iter().flat_map(|(_, files)| files).collect();
         }
         Ok(())
     }
@@ -121,8 +121,8 @@ impl Log {
     /// # Errors
     /// When a page header cannot be read.
     pub fn has_page_checksums(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<bool, Error> {
-        for (sheet, leaves) in self.leaves(used) {
-            for file in &sheet.files {
+        for (table, leaves) in self.leaves(used) {
+            for file in &table.files {
                 let names: Vec<&str> = leaves.iter().map(String::as_str).filter(|l| file.has(l)).collect();
                 if !file.has_page_checksums(&names)? {
                     return Ok(false);
@@ -200,14 +200,14 @@ impl Log {
         Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 
-    /// The sheet that holds a channel.
-    fn sheet(&self, map: &ChannelMapping) -> Option<&RowTable> {
+    /// The table that holds a channel.
+    fn table(&self, map: &ChannelMapping) -> Option<&RowTable> {
         self.tables.get(&map.group)
     }
 
-    /// What channels may be called in the sheet of one.
+    /// What channels may be called in the table of one.
     fn names_for(&self, map: &ChannelMapping) -> Result<Arc<BTreeSet<String>>, Error> {
-        self.sheet(map).map_or_else(|| Ok(Arc::default()), RowTable::names)
+        self.table(map).map_or_else(|| Ok(Arc::default()), RowTable::names)
     }
 
     /// The actuators whose columns are here, in order of their names.
@@ -300,7 +300,7 @@ impl Log {
             let name = column_at(&map.column, &position);
             if first.is_none() && role != Role::Temperature {
                 // A group without a file is no lack of this actuator, and neither is a struct in a number's place.
-                self.sheet_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
+                self.table_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
                 lacking.push(name.clone());
             }
             *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));
@@ -324,12 +324,12 @@ impl Log {
         Ok(found)
     }
 
-    /// The leaves that these actuators need, sheet by sheet.
+    /// The leaves that these actuators need, table by table.
     fn leaves(&self, used: &[(&Channels, &ActuatorColumns)]) -> Vec<(&RowTable, BTreeSet<String>)> {
-        let mut found: Vec<_> = self.tables.values().map(|sheet| (sheet, BTreeSet::new())).collect();
-        self.each_use(used, |sheet, _, samples| {
-            let of_sheet = found.iter_mut().find(|(other, _)| std::ptr::eq(*other, sheet));
-            of_sheet.into_iter().for_each(|(_, leaves)| leaves.extend(sheet.leaves_of(samples)));
+        let mut found: Vec<_> = self.tables.values().map(|table| (table, BTreeSet::new())).collect();
+        self.each_use(used, |table, _, samples| {
+            let of_table = found.iter_mut().find(|(other, _)| std::ptr::eq(*other, table));
+            of_table.into_iter().for_each(|(_, leaves)| leaves.extend(table.leaves_of(samples)));
         });
         found
     }
@@ -337,7 +337,7 @@ impl Log {
     /// Announces the samples of actuators that will be read. Where rows belong to actuators or channels, one pass
     /// over the files then gathers the rows of all of them.
     pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) {
-        self.each_use(used, |sheet, position, samples| sheet.announce(samples, position));
+        self.each_use(used, |table, position, samples| table.announce(samples, position));
     }
 
     /// Hands over the samples that these actuators need, with their table and their position.
@@ -352,15 +352,15 @@ impl Log {
             let conditions: Vec<ChannelMapping> = channels.when.iter().map(ChannelMapping::from).collect();
             let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
             for map in maps.flat_map(ChannelMapping::choices).chain(&conditions) {
-                let Some(sheet) = self.sheet(map) else { continue };
-                let samples = sheet.samples(&named(&map.column), position);
-                take(sheet, position, &samples);
+                let Some(table) = self.table(map) else { continue };
+                let samples = table.samples(&named(&map.column), position);
+                take(table, position, &samples);
                 if let Some(valid) = &map.valid_column {
-                    take(sheet, position, &sheet.samples(&named(valid), position));
+                    take(table, position, &table.samples(&named(valid), position));
                 }
                 // The channel's own stamps lie in the rows of the channel.
                 if let Some(time) = &map.time_column {
-                    take(sheet, position, &SampleSelector { leaf: named(time), ..samples });
+                    take(table, position, &SampleSelector { leaf: named(time), ..samples });
                 }
             }
         }
@@ -373,13 +373,13 @@ impl Log {
     /// When a file cannot be read.
     pub fn digest(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<String, Error> {
         let mut digest = Digest::new();
-        for (sheet, mut leaves) in self.leaves(used) {
+        for (table, mut leaves) in self.leaves(used) {
             leaves.extend(self.mapping.identity.columns.values().cloned());
             if self.normalized.is_some() {
                 leaves.extend(normalized::COLUMNS.map(str::to_owned));
             }
             let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
-            for file in &sheet.files {
+            for file in &table.files {
                 file.feed(&names, &mut digest)?;
             }
         }
@@ -401,12 +401,12 @@ impl Log {
             return normalized::read_actuator(&self.main().files[0], at.position.clone(), geometry);
         }
         let read = ActuatorReader { log: self, at, channels, geometry }.read();
-        self.tables.values().for_each(|sheet| sheet.partition.release(at.position.as_str()));
+        self.tables.values().for_each(|table| table.partition.release(at.position.as_str()));
         read
     }
 
-    fn sheet_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
-        self.sheet(map).ok_or_else(|| {
+    fn table_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
+        self.table(map).ok_or_else(|| {
             self.main().error(ErrorKind::GroupMissing { group: map.group.clone().unwrap_or_default() })
         })
     }
@@ -432,13 +432,13 @@ impl<'c> ActuatorReader<'c> {
         };
         let load = self.follower(Role::Load, &master, &selection)?;
         // The mean of the flight, whatever counts of it.
-        let whole = SampleSelection::whole(&master.line);
+        let whole = SampleSelection::whole(&master.base);
         let temperature = self.channels.temperature.as_ref();
         let temperature = temperature.and_then(|_| self.follower(Role::Temperature, &master, &whole).ok());
         let temperature_c = temperature.and_then(|read| mean(&read.values));
         let is_relative = self.channels.is_relative();
         let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
-        Ok(assemble(self.at.position.clone(), read, &master.line, temperature_c))
+        Ok(assemble(self.at.position.clone(), read, &master.base, temperature_c))
     }
 
     /// The motor position, and its sampling and selected samples, which all other channels follow.
@@ -476,7 +476,7 @@ impl<'c> ActuatorReader<'c> {
     where
         'c: 'm,
     {
-        Ok(ChannelSampling::new(self.log.sheet_of(map)?, map, name, self.at.position.as_str()))
+        Ok(ChannelSampling::new(self.log.table_of(map)?, map, name, self.at.position.as_str()))
     }
 
     /// Reads redundant channels until one is alive, and returns it as `read` gave it; the first channel where none is alive.
@@ -501,10 +501,10 @@ impl<'c> ActuatorReader<'c> {
         }
         let Some((channel, rest, name)) = found else {
             let name = column_at(&map.column, &self.at.position);
-            return Err(self.log.sheet(map).unwrap_or(self.log.main()).lacks(&name));
+            return Err(self.log.table(map).unwrap_or(self.log.main()).lacks(&name));
         };
-        let counted = channel.values.len() - channel.apart;
-        if (counted > 0 || channel.apart == 0) && !channel.values.iter().any(|v| v.is_finite()) {
+        let counted = channel.values.len() - channel.excluded;
+        if (counted > 0 || channel.excluded == 0) && !channel.values.iter().any(|v| v.is_finite()) {
             let (column, rows) = (name.clone(), counted as u64);
             return Err(self.log.main().error(ErrorKind::AllMissing { column, rows }));
         }
@@ -513,9 +513,9 @@ impl<'c> ActuatorReader<'c> {
 
     /// The segments of the motor's clock in which every sample filter holds.
     fn selected(self, master: &ChannelSampling<'_>) -> Result<SampleSelection, Error> {
-        let (line, filters) = (&master.line, &self.channels.when);
+        let (base, filters) = (&master.base, &self.channels.when);
         if filters.is_empty() {
-            return Ok(SampleSelection::whole(line));
+            return Ok(SampleSelection::whole(base));
         }
         let maps: Vec<ChannelMapping> = filters.iter().map(ChannelMapping::from).collect();
         let mut conditions = Vec::with_capacity(maps.len());
@@ -523,7 +523,7 @@ impl<'c> ActuatorReader<'c> {
             let name = column_at(&map.column, &self.at.position);
             let own = self.sampling(map, &name)?;
             if !self.log.names_for(map)?.contains(&name) {
-                return Err(own.sheet.lacks(&name));
+                return Err(own.table.lacks(&name));
             }
             conditions.push(own);
         }
@@ -533,15 +533,15 @@ impl<'c> ActuatorReader<'c> {
         if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == key) {
             return Ok(selection.clone());
         }
-        let mut segments = line.segments.clone();
+        let mut segments = base.segments.clone();
         for (filter, own) in filters.iter().zip(conditions) {
             // A state stands until the next one comes, as a slow load does.
             let read = channel_reader::follow(master, own, Role::Load, self.geometry, None)?;
             let mut values = read.values;
-            zero_order_hold(&mut values, &line.segments, line.step_s);
-            segments = filter.within(&values, &segments, line.step_s);
+            zero_order_hold(&mut values, &base.segments, base.step_s);
+            segments = filter.within(&values, &segments, base.step_s);
         }
-        let selection = SampleSelection::of(segments, line);
+        let selection = SampleSelection::of(segments, base);
         *before = Some((key, selection.clone()));
         Ok(selection)
     }
@@ -554,9 +554,9 @@ impl<'c> ActuatorReader<'c> {
         if !identity.by_row && fields.iter().any(|field| identity.columns.contains_key(field)) {
             return Ok(());
         }
-        let (sheet, map) = (master.sheet, master.map);
-        let column = map.time_column.as_ref().or(sheet.clock.column.as_ref()).map_or("", String::as_str);
-        master.line.check_one_flight(&sheet.clock, column).map_err(|fault| sheet.error(fault))
+        let (table, map) = (master.table, master.map);
+        let column = map.time_column.as_ref().or(table.clock.column.as_ref()).map_or("", String::as_str);
+        master.base.check_one_flight(&table.clock, column).map_err(|fault| table.error(fault))
     }
 }
 
@@ -566,16 +566,16 @@ fn column_at(pattern: &str, position: &Position) -> String {
 }
 
 /// Identity fields in the files of a row table.
-fn facts(sheet: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Error> {
-    let first = &sheet.files[0];
+fn facts(table: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Error> {
+    let first = &table.files[0];
     let mut facts: IdentityFields = map.values.clone();
     facts.extend(identity::from_hive_path(first.path(), &map.folders));
     if let Some(expression) = &map.path {
-        facts.extend(identity::from_path(first.path(), expression).map_err(|f| sheet.error(f))?);
+        facts.extend(identity::from_path(first.path(), expression).map_err(|f| table.error(f))?);
     }
     for (fact, column) in &map.columns {
         // A column the log lacks may still be covered by another source; what is missing in all is named later.
-        facts.extend(sheet.constant(column, fact.as_str())?.map(|text| (*fact, text)));
+        facts.extend(table.constant(column, fact.as_str())?.map(|text| (*fact, text)));
     }
     let stated = |(fact, key): (&IdentityField, &String)| Some((*fact, first.metadata_field(key)?));
     facts.extend(map.metadata.iter().filter_map(stated));

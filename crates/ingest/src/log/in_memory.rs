@@ -47,18 +47,18 @@ impl ChannelArrays<'_> {
         let seconds = self.time_s.iter().map(|s| s - first_s).collect();
         let mut stamps =
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
-        let line = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
+        let base = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
         let [motor, screw, load] =
-            named.map(|(_, values)| line.keep(values.iter().copied().map(reading).collect()).into());
+            named.map(|(_, values)| base.keep(values.iter().copied().map(reading).collect()).into());
         let read = RawChannels {
             motor,
             screw,
             load,
             is_relative: false,
             output_locked: false,
-            selection: SampleSelection::whole(&line),
+            selection: SampleSelection::whole(&base),
         };
-        Ok(assemble(position, read, &line, None))
+        Ok(assemble(position, read, &base, None))
     }
 }
 

@@ -61,22 +61,22 @@ pub(crate) fn read_actuator(
     let segments = noted(file, "segments").map_or_else(|| Some(Vec::new()), |text| pairs(text, ".."));
     let segments = segments.ok_or_else(|| fail("its stretches cannot be read".into()))?;
     let segments: Vec<Range<usize>> = segments.into_iter().map(|(start, end)| start..end).collect();
-    let apart = noted(file, "apart").and_then(|text| text.parse().ok()).unwrap_or(0);
+    let excluded = noted(file, "apart").and_then(|text| text.parse().ok()).unwrap_or(0);
     let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
     let read = [motor?, dx?, load?];
-    if read.iter().any(|(_, seen)| seen.missing < apart) {
-        return Err(fail(format!("a channel lacks fewer than the {apart} samples that are left out")));
+    if read.iter().any(|(_, seen)| seen.missing < excluded) {
+        return Err(fail(format!("a channel lacks fewer than the {excluded} samples that are left out")));
     }
     if segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
         return Err(fail("a segment ends after the last row".into()));
     }
     let quality =
-        read.each_ref().map(|(values, seen)| Quality::of(values, &segments, Some(*seen), step_s, apart));
+        read.each_ref().map(|(values, seen)| Quality::of(values, &segments, Some(*seen), step_s, excluded));
     let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
     Ok(ActuatorChannels {
         position,
         step_s,
-        apart,
+        excluded,
         output_locked: noted(file, "output_locked") == Some("true"),
         missing_share: quality[1].missing_share,
         columns: std::array::from_fn(|k| Some(COLUMNS[k].to_owned())),
@@ -157,7 +157,7 @@ fn footer(
         ("breaks", breaks.join(" ")),
         ("metres_per_radian", number(geometry.metres_per_radian())),
         ("temperature_c", number(channels.temperature_c)),
-        ("apart", channels.apart.to_string()),
+        ("apart", channels.excluded.to_string()),
         ("output_locked", channels.output_locked.to_string()),
         ("flags", channels.flags.join(" ")),
         ("units", "time_s: s since the first sample; motor_m, dx_m: m at the screw; load_n: N".to_owned()),

@@ -348,18 +348,4 @@ mod tests {
             assert_eq!(["p4", "q"].map(holding), [if is_sorted { 1 } else { 10 }, 0]);
         }
     }
-
-    /// Two columns mark the rows of a key; the texts of one are codes of a dictionary, of the other plain.
-    #[test]
-    fn rows_are_sorted_by_both_of_their_columns() {
-        let key =
-            |name: &str, place: &str| vec![("name".into(), name.into()), ("place".into(), place.into())];
-        let keys = [key("motor", "left"), key("load", "right"), key("motor", "right")];
-        let names: Codes = ["motor", "load", "flap", "motor", "motor", "load"].into_iter().collect();
-        let places = [Some("right"), Some("right"), Some("left"), Some("left"), None, Some("left")];
-        let places: StringArray = places.into_iter().collect();
-        let rows = NumberedKeys::of(&keys).unwrap();
-        let rows = rows.rows_by_key(&["name", "place"], &[Arc::new(names), Arc::new(places)]).unwrap();
-        assert_eq!(rows, [vec![3], vec![1], vec![0]]);
-    }
 }

@@ -20,7 +20,7 @@ pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
-use crate::mapping::{ChannelMapping, ClockMapping, Layout};
+use crate::mapping::{ChannelMapping, ClockMapping, Layout, RawValue};
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::parquet::row_selection::RowSelection;
@@ -34,7 +34,7 @@ pub(crate) struct RowTable {
     pub(crate) clock: ClockMapping,
     pub(crate) layout: Layout,
     /// The clock of its rows, once it was read.
-    pub(crate) line: OnceLock<TimeBase>,
+    pub(crate) base: OnceLock<TimeBase>,
     /// The names of all leaves, once they were asked for.
     leaf_names: OnceLock<Arc<BTreeSet<String>>>,
     /// The texts of columns that name channels or positions, once they were read.
@@ -52,7 +52,7 @@ impl RowTable {
     /// The same files by another clock and layout.
     pub(crate) fn remap(&mut self, clock: &ClockMapping, layout: &Layout) {
         (self.clock, self.layout) = (clock.clone(), layout.clone());
-        (self.line, self.partition) = (OnceLock::new(), Partition::default());
+        (self.base, self.partition) = (OnceLock::new(), Partition::default());
     }
 
     /// Whether a row holds a list of this leaf's samples in any file.
@@ -121,14 +121,22 @@ impl RowTable {
         Ok(values.finish())
     }
 
-    /// 1 where a sample is one of these texts, 0 where it is another, NaN where it is missing.
-    pub(crate) fn matches(&self, samples: &SampleSelector, texts: &[String]) -> Result<Vec<f64>, Error> {
+    /// 1 where a sample is one of these values, 0 where it is another; NaN or 0 where it is missing.
+    pub(crate) fn matches(&self, samples: &SampleSelector, values: &[RawValue]) -> Result<Vec<f64>, Error> {
+        let mark = |is_one: bool| f64::from(u8::from(is_one));
+        let texts = RawValue::texts(values);
+        if texts.is_empty() {
+            let mut marks = self.numbers(samples, None, None)?.0;
+            marks.iter_mut().for_each(|number| *number = mark(values.iter().any(|one| one.is(*number))));
+            return Ok(marks);
+        }
         let mut marks = Vec::new();
         self.each(samples, &samples.leaf, |array| {
             let text = as_text(&samples.leaf, array)?;
             let is_one = |text: &str| texts.iter().any(|wanted| wanted == text.trim());
-            let mark = |text: Option<&str>| text.map_or(f64::NAN, |text| f64::from(u8::from(is_one(text))));
-            marks.extend(text.as_string::<i32>().iter().map(mark));
+            marks.extend(
+                text.as_string::<i32>().iter().map(|text| text.map_or(f64::NAN, |text| mark(is_one(text)))),
+            );
             Ok(())
         })?;
         Ok(marks)
@@ -171,19 +179,9 @@ impl RowTable {
         noted.unwrap_or(FieldMetadata::NONE).line(leaf, map).map_err(|fault| self.error(fault))
     }
 
-    /// Whether a channel's name is here, as a leaf or in the column of names.
-    fn holds(&self, samples: &SampleSelector) -> bool {
-        let named = samples.rows.first().filter(|_| self.layout.name_column.is_some());
-        match named {
-            Some((column, name)) => self.texts(column).is_ok_and(|texts| texts.contains(name)),
-            None => self.files.iter().any(|file| file.has(&samples.leaf)),
-        }
-    }
-
-    /// Announces samples that will be read for a position, as far as they are here, so that one pass over the files gathers
-    /// them all.
+    /// Announces samples that will be read for a position, so that one pass over the files gathers them all.
     pub(crate) fn announce(&self, samples: &SampleSelector, position: &str) {
-        if !samples.rows.is_empty() && self.holds(samples) {
+        if !samples.rows.is_empty() {
             let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
             self.partition.announce(samples, leaves.cloned(), position);
         }
@@ -271,7 +269,7 @@ impl RowTable {
         Ok(first)
     }
 
-    /// The stamps of those samples, from the sheet's time column or the channel's own.
+    /// The stamps of those samples, from the table's time column or the channel's own.
     pub(crate) fn stamps(&self, samples: &SampleSelector, own: Option<&str>) -> Result<Timestamps, Error> {
         let Some(column) = own.or(self.clock.column.as_deref()) else {
             let rate_hz = self.clock.rate_hz.ok_or_else(|| self.error(ErrorKind::NoClock))?;

@@ -11,28 +11,28 @@ use crate::time::clock::TimeBase;
 pub(crate) struct SampleSelection {
     pub(crate) segments: Vec<Range<usize>>,
     /// Samples that no condition leaves.
-    pub(crate) apart: usize,
+    pub(crate) excluded: usize,
 }
 
 impl SampleSelection {
     /// All that is unbroken.
-    pub(crate) fn whole(line: &TimeBase) -> Self {
-        Self { segments: line.segments.clone(), apart: 0 }
+    pub(crate) fn whole(base: &TimeBase) -> Self {
+        Self { segments: base.segments.clone(), excluded: 0 }
     }
 
-    pub(crate) fn of(segments: Vec<Range<usize>>, line: &TimeBase) -> Self {
-        let samples = line.kept.as_ref().map_or(line.rows, Vec::len);
-        let apart = samples - segments.iter().map(Range::len).sum::<usize>();
-        Self { segments, apart }
+    pub(crate) fn of(segments: Vec<Range<usize>>, base: &TimeBase) -> Self {
+        let samples = base.kept.as_ref().map_or(base.rows, Vec::len);
+        let excluded = samples - segments.iter().map(Range::len).sum::<usize>();
+        Self { segments, excluded }
     }
 
     pub(crate) fn wanted(&self) -> RowSelection<'_> {
-        (self.apart > 0).then_some(&self.segments)
+        (self.excluded > 0).then_some(&self.segments)
     }
 
     /// Removes samples that do not count, so the result does not depend on the page layout.
     pub(crate) fn cut(&self, mut channel: Channel) -> Channel {
-        if self.apart == 0 {
+        if self.excluded == 0 {
             return channel;
         }
         let mut counted = 0;
@@ -41,7 +41,7 @@ impl SampleSelection {
             counted = segment.end;
         }
         channel.values[counted..].fill(f64::NAN);
-        (channel.seen, channel.apart) = (None, self.apart);
+        (channel.seen, channel.excluded) = (None, self.excluded);
         channel
     }
 }

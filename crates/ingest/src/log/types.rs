@@ -65,7 +65,7 @@ pub struct ActuatorChannels {
     /// Mean temperature, °C.
     pub temperature_c: Option<f64>,
     /// Samples that no condition leaves: NaN in every channel.
-    pub apart: usize,
+    pub excluded: usize,
     /// Share of the other samples without δX.
     pub missing_share: f64,
     /// The columns of motor, screw and load that were read: of redundant ones the first that is alive.
@@ -86,7 +86,7 @@ impl ActuatorChannels {
 
     /// What δX looks like.
     pub fn dx_quality(&self) -> Quality {
-        Quality::of(&self.dx_m, &self.segments, None, self.step_s, self.apart)
+        Quality::of(&self.dx_m, &self.segments, None, self.step_s, self.excluded)
     }
 
     /// Leaves the memory of its channels to the next actuator that this thread reads.

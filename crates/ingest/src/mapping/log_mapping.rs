@@ -349,9 +349,9 @@ pub struct ChannelMapping {
     /// Redundant channels, best first, for logs in which this one is not usable.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ChannelMapping>,
-    /// Texts for which the channel is 1, and 0 for every other; of a condition on a column of texts.
+    /// Values for which the channel is 1, and 0 for every other; of a condition on a column of texts.
     #[serde(skip)]
-    pub texts: Vec<String>,
+    pub texts: Vec<RawValue>,
 }
 
 impl ChannelMapping {
@@ -381,7 +381,7 @@ impl From<&SampleFilter> for ChannelMapping {
             group: filter.group.clone(),
             time_column: filter.time_column.clone(),
             rate_hz: filter.rate_hz,
-            texts: RawValue::texts(&filter.equals),
+            texts: if filter.is_on_text() { filter.equals.clone() } else { Vec::new() },
             ignore_metadata: true,
             ..Self::default()
         }

@@ -137,27 +137,10 @@ pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{Float64Array, Int32Array, ListArray, StructArray};
+    use arrow::array::{Float64Array, StructArray};
     use arrow::buffer::NullBuffer;
-    use arrow::datatypes::{Float64Type, Int32Type};
 
     use super::*;
-
-    #[test]
-    fn a_value_beside_lists_is_repeated_for_each_of_their_samples() {
-        let list = ListArray::from_iter_primitive::<Float64Type, _, _>([
-            Some(vec![Some(1.0), Some(2.0)]),
-            None,
-            Some(vec![Some(3.0)]),
-        ]);
-        let flats = vec![
-            flatten(&(Arc::new(Int32Array::from(vec![7, 8, 9])) as ArrayRef)),
-            flatten(&(Arc::new(list) as ArrayRef)),
-        ];
-        let arrays = align_lengths(&["id", "x"], flats).unwrap();
-        assert_eq!(arrays[0].as_primitive::<Int32Type>().values(), &[7, 7, 9]);
-        assert_eq!(arrays[1].as_primitive::<Float64Type>().values(), &[1.0, 2.0, 3.0]);
-    }
 
     #[test]
     fn a_null_struct_has_null_fields() {

@@ -377,11 +377,28 @@ impl LogFile {
         has_dictionary && self.footer.schema().field(leaf.root).data_type() == &DataType::Utf8
     }
 
-    /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
+    /// The pages of some leaves, chunk by chunk, by their headers, which claim what can be.
+    fn all_pages(&self, names: &[&str]) -> Result<impl Iterator<Item = Result<Vec<Page>, Error>>, Error> {
+        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        self.want(&leaves, self.groups())?;
+        let chunks =
+            self.groups().flat_map(move |group| leaves.clone().into_iter().map(move |leaf| (group, leaf)));
+        Ok(chunks.map(|(group, leaf)| self.pages(group, leaf)))
+    }
+
+    /// Checks that the headers of a leaf's pages claim what can be, and the rows that are declared.
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
-        let leaf = self.leaf(name)?;
-        self.want(&[leaf], self.groups())?;
-        self.groups().try_for_each(|group| self.pages(group, leaf).map(drop))
+        self.all_pages(&[name])?.try_for_each(|pages| pages.map(drop))
+    }
+
+    /// Whether every page of these leaves carries a checksum.
+    pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
+        for pages in self.all_pages(names)? {
+            if pages?.iter().any(|page| page.header.crc.is_none()) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Row groups of the file.
@@ -399,20 +416,6 @@ impl LogFile {
         let rows = self.footer.metadata().row_group(group).num_rows();
         page_header::bounded(&self.source.file, self.chunk(group, leaf), rows)
             .map_err(|detail| self.decode(leaf, group, detail))
-    }
-
-    /// Whether every page of these leaves carries a checksum.
-    pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
-        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        self.want(&leaves, self.groups())?;
-        for group in self.groups() {
-            for leaf in &leaves {
-                if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
-                    return Ok(false);
-                }
-            }
-        }
-        Ok(true)
     }
 
     fn chunk(&self, group: usize, leaf: &LeafColumn) -> &ColumnChunkMetaData {

@@ -172,18 +172,6 @@ impl TableBatch {
     }
 }
 
-/// The rows of a table, in order, as [`TableSplits`] knows it.
-///
-/// # Errors
-/// As [`TableSplits::open`].
-pub fn batches(
-    file: &Path,
-    wanted: Option<&[&str]>,
-) -> Result<impl Iterator<Item = Result<TableBatch, Error>> + use<>, Error> {
-    let table = TableSplits::open(file, wanted, &[])?;
-    table.batches(0..table.len())
-}
-
 /// A table in parts that several may read at a time: a `.parquet` file as Parquet in its row groups, anything else
 /// as CSV in one.
 pub struct TableSplits {
@@ -347,6 +335,11 @@ mod tests {
         RecordBatch::try_from_iter(columns).unwrap()
     }
 
+    fn batches(file: &Path, wanted: Option<&[&str]>) -> impl Iterator<Item = Result<TableBatch, Error>> {
+        let table = TableSplits::open(file, wanted, &[]).unwrap();
+        table.batches(0..table.len()).unwrap()
+    }
+
     fn parquet(batch: &RecordBatch) -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("table.parquet");
@@ -377,7 +370,7 @@ mod tests {
     fn only_columns_that_are_wanted_are_read_and_a_missing_one_is_reported() {
         let column = |n: i64| Arc::new(Int64Array::from(vec![n])) as ArrayRef;
         let (_dir, file) = parquet(&batch(vec![("a", column(1)), ("gap_mm", column(2)), ("c", column(3))]));
-        let batch = batches(&file, Some(&["c", "gap_mm"])).unwrap().next().unwrap().unwrap();
+        let batch = batches(&file, Some(&["c", "gap_mm"])).next().unwrap().unwrap();
         assert_eq!((batch.find(&["a"]), batch.find(&["c"])), (None, Some(1)));
         let error = batch.column(&["gap_m"]).unwrap_err();
         assert!(error.diagnostic().hint.unwrap().starts_with("`gap_mm`?"));
@@ -389,7 +382,7 @@ mod tests {
         let file = dir.path().join("table.csv");
         let rows: String = (0..=ROWS + 7).map(|row| if row == ROWS + 4 { "x\n" } else { "1.5\n" }).collect();
         std::fs::write(&file, format!("gap_m\n{rows}")).unwrap();
-        let errors = batches(&file, None).unwrap().filter_map(|batch| batch.unwrap().numbers(Some(0)).err());
+        let errors = batches(&file, None).filter_map(|batch| batch.unwrap().numbers(Some(0)).err());
         let places: Vec<_> = errors.map(|e| e.diagnostic().location().unwrap()).collect();
         assert_eq!(places, [format!("column `gap_m`, row {}", ROWS + 5)]);
     }
@@ -433,7 +426,7 @@ mod tests {
         let (_dir, file) = parquet(&RecordBatch::new_empty(
             batch(vec![("gap_m", Arc::new(Int64Array::from(vec![1])))]).schema(),
         ));
-        let all: Vec<TableBatch> = batches(&file, None).unwrap().collect::<Result<_, _>>().unwrap();
+        let all: Vec<TableBatch> = batches(&file, None).collect::<Result<_, _>>().unwrap();
         assert_eq!((all.len(), all[0].rows(), all[0].find(&["gap_m"])), (1, 0..0, Some(0)));
     }
 
@@ -447,7 +440,7 @@ mod tests {
             let text: String = values.iter().map(|v| v.map_or("\"\"\n".into(), |v| format!("{v:e}\n"))).collect();
             let csv = dir.path().join("table.csv");
             std::fs::write(&csv, format!("v\n{text}")).unwrap();
-            let read = |file: &Path| batches(file, None).unwrap().next().unwrap().unwrap().numbers(Some(0)).unwrap();
+            let read = |file: &Path| batches(file, None).next().unwrap().unwrap().numbers(Some(0)).unwrap();
             prop_assert_eq!(read(&file), Float64Array::from(values));
             prop_assert_eq!(read(&csv), read(&file));
         }

@@ -9,7 +9,7 @@ use arrow::compute::concat_batches;
 use arrow::datatypes::Schema;
 
 use crate::error::{Error, ErrorKind};
-use crate::tables::column_batches::{ColumnAliases, StringColumn, TableBatch, batches};
+use crate::tables::column_batches::{ColumnAliases, StringColumn, TableBatch, TableSplits};
 
 /// A table in one batch, every cell text; an empty cell is none.
 #[derive(Debug, Clone)]
@@ -24,7 +24,8 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        let parts = batches(file, None)?.map(|part| Ok(part?.batch));
+        let table = TableSplits::open(file, None, &[])?;
+        let parts = table.batches(0..table.len())?.map(|part| Ok(part?.batch));
         Self::of_batches(file, &parts.collect::<Result<Vec<_>, Error>>()?)
     }
 

@@ -395,7 +395,7 @@ mod tests {
         Timestamps { column: "t".into(), seconds: seconds.to_vec(), origin: TimeOrigin::Counted(0.0) }
     }
 
-    fn line(seconds: &[f64], clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+    fn base(seconds: &[f64], clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
         build_time_base(&mut stamps(seconds), clock)
     }
 
@@ -405,16 +405,16 @@ mod tests {
 
     #[test]
     fn repeated_missing_and_swapped_stamps_are_mended_and_counted() {
-        let line = line(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
-        assert_eq!(line.kept, Some(vec![0, 2, 1, 5]));
-        assert_eq!(line.repairs, TimestampRepairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
+        let base = base(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
+        assert_eq!(base.kept, Some(vec![0, 2, 1, 5]));
+        assert_eq!(base.repairs, TimestampRepairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
     }
 
     #[test]
     fn a_deep_fall_is_refused_with_its_row_or_splits_the_log() {
         let t = [0.0, 0.1, 5.0, 5.1, 1.0, 1.1, 1.2];
-        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeGoesBack { row: 4, times: 3, .. })));
-        let split = line(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
+        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeGoesBack { row: 4, times: 3, .. })));
+        let split = base(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
         assert_eq!(split.segments, [0..2, 2..4, 4..7]);
         assert_eq!(split.repairs.out_of_order, 0);
     }
@@ -424,7 +424,7 @@ mod tests {
     fn a_clock_that_no_recorder_has_is_refused() {
         for step_s in [1e50, 1e-300, 1e6] {
             let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * step_s).collect();
-            assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeImplausible { .. })), "{step_s}");
+            assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeImplausible { .. })), "{step_s}");
         }
         let mut early = stamps(&[0.0, 0.01, 0.02]);
         early.origin = TimeOrigin::Counted(-1e50);
@@ -439,9 +439,9 @@ mod tests {
         {
             let t: Vec<f64> =
                 (0..500).map(|k| f64::from((step * k + 499 * i32::from(step < 0)).rem_euclid(500))).collect();
-            let line = line(&t, &usual()).unwrap();
-            assert_eq!(line.kept, Some(rows));
-            assert_eq!((line.segments.len(), line.repairs.repeated), (1, 0));
+            let base = base(&t, &usual()).unwrap();
+            assert_eq!(base.kept, Some(rows));
+            assert_eq!((base.segments.len(), base.repairs.repeated), (1, 0));
         }
     }
 
@@ -449,7 +449,7 @@ mod tests {
     #[test]
     fn two_recordings_whose_rows_alternate_are_not_sorted_into_each_other() {
         let t: Vec<f64> = (0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect();
-        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeGoesBack { .. })));
+        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeGoesBack { .. })));
     }
 
     /// From 04:58:00 on, past a full hour.
@@ -460,28 +460,28 @@ mod tests {
             (s / 3600.0).floor() * 1e4 + (s % 3600.0 / 60.0).floor() * 100.0 + s % 60.0
         };
         let t: Vec<f64> = (0..4800).map(packed).collect();
-        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeUnit { .. })));
+        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeUnit { .. })));
     }
 
     /// A recorder that rests for 40 s of each minute.
     #[test]
     fn pauses_of_forty_seconds_are_breaks() {
         let t: Vec<f64> = (0..4000).map(|k| 60.0 * f64::from(k / 400) + 0.05 * f64::from(k % 400)).collect();
-        assert_eq!(line(&t, &usual()).unwrap().segments.len(), 10);
+        assert_eq!(base(&t, &usual()).unwrap().segments.len(), 10);
     }
 
     #[test]
     fn a_clock_that_stands_still_is_refused() {
-        assert!(matches!(line(&[1.0, 1.0], &usual()), Err(ErrorKind::TimeStandsStill { rows: 2, .. })));
+        assert!(matches!(base(&[1.0, 1.0], &usual()), Err(ErrorKind::TimeStandsStill { rows: 2, .. })));
     }
 
     /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.
     #[test]
     fn a_step_between_two_ticks_is_their_mean() {
         let t: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 2.5).floor() * 1e-3).collect();
-        let line = line(&t, &usual()).unwrap();
-        assert!((line.step_s - 2.5e-3).abs() < 1e-6, "{} s", line.step_s);
-        assert_eq!(line.segments.len(), 1);
+        let base = base(&t, &usual()).unwrap();
+        assert!((base.step_s - 2.5e-3).abs() < 1e-6, "{} s", base.step_s);
+        assert_eq!(base.segments.len(), 1);
     }
 
     /// A computer's clock ticks every 15.6 ms while samples come every 2.5 ms.
@@ -491,9 +491,9 @@ mod tests {
         let truth: Vec<f64> =
             (0..8000).map(|k| f64::from(k) * step + if k < 4000 { 0.0 } else { 3.0 }).collect();
         let mut coarse = stamps(&truth.iter().map(|t| (t / tick).floor() * tick).collect::<Vec<_>>());
-        let line = build_time_base(&mut coarse, &ClockMapping { tick_s: Some(tick), ..usual() }).unwrap();
-        assert_eq!((line.kept.is_none(), line.segments.clone()), (true, vec![0..4000, 4000..8000]));
-        assert!((line.step_s / step - 1.0).abs() < 0.01, "{} s", line.step_s);
+        let base = build_time_base(&mut coarse, &ClockMapping { tick_s: Some(tick), ..usual() }).unwrap();
+        assert_eq!((base.kept.is_none(), base.segments.clone()), (true, vec![0..4000, 4000..8000]));
+        assert!((base.step_s / step - 1.0).abs() < 0.01, "{} s", base.step_s);
         let worst = coarse.seconds.iter().zip(&truth).map(|(s, t)| (s - t).abs()).fold(0.0, f64::max);
         assert!(worst < tick, "{worst} s");
     }
@@ -503,11 +503,11 @@ mod tests {
         let nan = f64::NAN;
         let clock = ClockMapping { rate_hz: Some(10.0), ..usual() };
         let mut holed = stamps(&[0.0, nan, nan, 0.3, nan, 9.0, 9.1]);
-        let line = build_time_base(&mut holed, &clock).unwrap();
+        let base = build_time_base(&mut holed, &clock).unwrap();
         assert!((holed.seconds[2] - 0.2).abs() < 1e-12);
-        assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
-        assert_eq!(line.segments, [0..4, 4..6]);
-        assert_eq!(line.breaks, [(4, 9.0)]);
+        assert_eq!((base.repairs.filled, base.repairs.unstamped), (2, 1));
+        assert_eq!(base.segments, [0..4, 4..6]);
+        assert_eq!(base.breaks, [(4, 9.0)]);
     }
 
     proptest! {
@@ -519,11 +519,11 @@ mod tests {
             distinct.sort_unstable();
             distinct.dedup();
             prop_assume!(distinct.len() > 1);
-            let line = line(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
-            let kept = line.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            let base = base(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
+            let kept = base.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
             prop_assert!(kept.windows(2).all(|w| t[w[0] as usize] < t[w[1] as usize]));
             prop_assert_eq!(kept.len(), distinct.len());
-            prop_assert_eq!(line.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), kept.len());
+            prop_assert_eq!(base.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), kept.len());
         }
     }
 }

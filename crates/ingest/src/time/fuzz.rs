@@ -47,17 +47,17 @@ fn stamps_of(bytes: &[u8]) -> (Timestamps, ClockMapping) {
 fn clock_of_any(bytes: &[u8]) {
     let (mut stamps, clock) = stamps_of(bytes);
     let rows = stamps.seconds.len();
-    let Ok(line) = build_time_base(&mut stamps, &clock) else { return };
-    assert!(line.step_s.is_finite() && line.step_s > 0.0, "step {}", line.step_s);
-    let kept = line.kept.as_ref().map_or(rows, Vec::len);
+    let Ok(base) = build_time_base(&mut stamps, &clock) else { return };
+    assert!(base.step_s.is_finite() && base.step_s > 0.0, "step {}", base.step_s);
+    let kept = base.kept.as_ref().map_or(rows, Vec::len);
     assert!(kept <= rows);
-    assert!(line.kept.iter().flatten().all(|row| (*row as usize) < rows), "rows");
+    assert!(base.kept.iter().flatten().all(|row| (*row as usize) < rows), "rows");
     let mut end = 0;
-    for segment in &line.segments {
+    for segment in &base.segments {
         assert!(end <= segment.start && segment.start <= segment.end && segment.end <= kept, "{segment:?}");
         end = segment.end;
     }
-    assert_eq!(line.keep(stamps.seconds).len(), kept);
+    assert_eq!(base.keep(stamps.seconds).len(), kept);
 }
 
 #[test]

@@ -105,21 +105,6 @@ mod tests {
         same(&found, &[nan, 0.0, 2.5, 10.0, nan, 30.0, 35.0, 40.0, nan]);
     }
 
-    #[test]
-    fn a_slow_sample_is_given_once_at_the_first_instant_after_it() {
-        let nan = f64::NAN;
-        let channel = TimeSeries { at_s: &[0.0, 1.0, 5.0], values: &[1.0, 2.0, 3.0], step_s: 1.0 };
-        let found = interpolate_at(channel, &[0.0, 0.4, 0.8, 1.2, 1.6, 5.0, 5.4], Interpolation::First);
-        same(&found, &[1.0, nan, nan, 2.0, nan, 3.0, nan]);
-    }
-
-    #[test]
-    fn a_slow_channel_is_found_whether_repeated_or_left_empty() {
-        let nan = f64::NAN;
-        assert_eq!(decimated_rows(&[nan, 1.0, nan, nan, 2.0, nan], 3), [1, 4]);
-        assert_eq!(decimated_rows(&[1.0, 2.0, 2.0, 2.0, 5.0, 5.0, 5.0, 6.0], 3), [1, 4, 7]);
-    }
-
     proptest! {
         /// On its own instants a channel is itself, to the bit; between them it stays between its neighbours.
         #[test]

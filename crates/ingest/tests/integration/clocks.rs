@@ -105,16 +105,6 @@ fn a_slower_position_is_joined_by_lines_and_a_slower_load_is_held() {
 }
 
 #[test]
-fn a_hole_is_never_bridged() {
-    let mut m = plain();
-    m.channels.screw_position = Some(ChannelMapping { latency_s: 0.005, ..channel("s", Unit::Metre) });
-    let late = holed(|k| (!(300..320).contains(&k)).then(|| screw(k as f64 * STEP_S - 0.005)));
-    let a = only(&m, &with(columns(), "s", late)).unwrap();
-    assert!(a.dx_m[300..318].iter().all(|dx| dx.is_nan()), "{:?}", &a.dx_m[298..322]);
-    assert!(worst(&a).0 < 1e-7);
-}
-
-#[test]
 fn the_redundant_channel_that_lives_is_taken() {
     let dead = [
         ("nan", holed(|_| None)),

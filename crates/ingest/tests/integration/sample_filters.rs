@@ -98,7 +98,7 @@ proptest! {
         }
         prop_assert_eq!(channels(&some), wanted);
         let count = STRETCHES.iter().map(Range::len).sum::<usize>();
-        prop_assert_eq!((some.apart, some.quality[0].samples), (ROWS - count, count));
+        prop_assert_eq!((some.excluded, some.quality[0].samples), (ROWS - count, count));
         prop_assert!((some.missing_share - 5.0 / count as f64).abs() < 1e-15);
         let seen = &some.quality[1];
         prop_assert!(seen.max < 0.1 && seen.spikes == 0 && (seen.rate_hz - 100.0).abs() < 1e-9, "{:?}", seen);
@@ -159,7 +159,7 @@ fn a_condition_that_is_never_met_leaves_nothing() {
     let mut never = conditional(true);
     never.channels.when[0].equals = vec![RawValue::Number(7.0)];
     let read = read(&file, &never).unwrap();
-    assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.apart == ROWS);
+    assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.excluded == ROWS);
     assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
 }
 

@@ -90,9 +90,9 @@ fn clock(a: &ActuatorChannels) -> String {
         if repaired.is_empty() { String::new() } else { format!("; repaired: {}", repaired.join(", ")) };
     let rate_hz = a.step_s.recip();
     let hint = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (unusual: check `clock.unit`)" };
-    let kept = 1.0 - a.apart as f64 / a.dx_m.len().max(1) as f64;
+    let kept = 1.0 - a.excluded as f64 / a.dx_m.len().max(1) as f64;
     let selected =
-        if a.apart > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
+        if a.excluded > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
     format!("{rate_hz:.3} Hz{hint}, {segments}{selected}{repaired}")
 }
 
