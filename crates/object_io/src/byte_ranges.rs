@@ -38,6 +38,7 @@ impl FetchedBlocks {
 }
 
 #[cfg(test)]
+#[expect(clippy::single_range_in_vec_init, reason = "one range is a list of one")]
 mod tests {
     use super::*;
 

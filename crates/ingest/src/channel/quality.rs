@@ -60,7 +60,7 @@ impl Quality {
             frozen_share: share(longest_run),
             rate_hz: (step_s * if missing == 0 { 1 } else { median_sample_interval(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
-            spikes: spikes((values, segments), resolution, seen.max_second_difference, step_s),
+            spikes: spikes(values, segments, resolution, seen.max_second_difference, step_s),
         }
     }
 
@@ -157,7 +157,8 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
 /// standard deviations of the channel's noise, nine times the impacts that recur every few seconds, and twice what its
 /// surroundings show.
 fn spikes(
-    (values, segments): (&[f64], &[Range<usize>]),
+    values: &[f64],
+    segments: &[Range<usize>],
     resolution: Option<f64>,
     max_second_difference: f64,
     step_s: f64,

@@ -13,12 +13,12 @@ use std::sync::Arc;
 
 use arrow::datatypes::DataType;
 
-use crate::channel::column_builder::ColumnBuilder;
+use crate::channel::stats::span;
 use crate::error::Error;
 use crate::infer::column_names::{ParsedName, has_word_of, is_of_day, is_time, place_in, time_unit, unit_of};
 use crate::infer::identity_sources::{fact_of, facts_of, folders, is_instant};
 use crate::log::row_partition::DistinctTexts;
-use crate::log::row_table::RowTable;
+use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::{TimeUnit, Unit, from_symbol};
 use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
@@ -101,7 +101,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let is_fact = |name: &str| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some());
     let stamps = clock_column(&leaves, is_fact, epoch_of_texts);
     let counted = stamps.filter(|leaf| leaf.kind.is_numeric());
-    let times = counted.map_or_else(Vec::new, |leaf| numbers(file, &leaf.name));
+    let times = counted.map_or_else(Vec::new, |leaf| numbers(&table, &leaf.name));
     let unit = counted.and_then(|leaf| time_unit(&leaf.name).or_else(|| unit_of_steps(&times)));
     let epoch = match (stamps, unit) {
         (Some(leaf), Some(unit)) => epoch_of(&times, unit, is_of_day(&leaf.name)),
@@ -138,7 +138,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
         let name = pattern.replace(PLACEHOLDER, first);
         *unit = units.get(&name).copied().flatten().or_else(|| file.field_metadata(&name).unit);
     }
-    found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
+    found.motor_wraps_at = if texts.is_none() { wraps_at(&table, &found) } else { None };
     let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata_field(key));
     let tails = match (tail, columns.get(&IdentityField::TailNumber)) {
         (None, Some(column)) => table.texts(column)?.as_ref().clone(),
@@ -251,10 +251,9 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
 }
 
 /// A column of numbers; none where it cannot be read.
-fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
-    let mut values = ColumnBuilder::with_capacity(0, None);
-    let read = file.append_numbers(name, None, &mut values);
-    read.map_or_else(|_| Vec::new(), |()| values.finish().0)
+fn numbers(table: &RowTable, name: &str) -> Vec<f64> {
+    let read = table.numbers(&SampleSelector::every_row(name), None, None);
+    read.map_or_else(|_| Vec::new(), |(values, _)| values)
 }
 
 /// 1970, or 1899 for days, where times lie between 1990 and 2100 when they count from there; midnight where they lie
@@ -375,7 +374,7 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
 }
 
 /// The value at which the first motor position starts again: it leaps by more than half a turn within one turn.
-fn wraps_at(file: &LogFile, found: &InferredMapping) -> Option<f64> {
+fn wraps_at(table: &RowTable, found: &InferredMapping) -> Option<f64> {
     let (pattern, unit) = found.channels.get(&Role::Motor)?;
     let turn = match unit {
         Some(Unit::Degree) | None => 360.0,
@@ -384,9 +383,8 @@ fn wraps_at(file: &LogFile, found: &InferredMapping) -> Option<f64> {
         _ => return None,
     };
     let name = pattern.replace(PLACEHOLDER, found.positions.iter().next().map_or("", String::as_str));
-    let values = numbers(file, &name);
-    let (least, greatest) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let values = numbers(table, &name);
+    let (least, greatest) = span(&values);
     let leaps = values.windows(2).filter(|w| (w[1] - w[0]).abs() > turn / 2.0).count();
     (leaps > 0 && greatest - least <= turn * 1.001).then_some(turn)
 }
