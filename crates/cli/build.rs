@@ -13,6 +13,11 @@ fn main() {
     let target = env::var("TARGET").unwrap_or_default();
     let profile = env::var("PROFILE").unwrap_or_default();
     println!("cargo:rustc-env=FREEPLAY_BUILD={target}, {profile}");
+    let stores = match env::var_os("CARGO_FEATURE_CLOUD") {
+        Some(_) => "object stores S3, Google Cloud Storage and Azure with rustls; ",
+        None => "",
+    };
+    println!("cargo:rustc-env=FREEPLAY_FEATURES={stores}Parquet snappy, zstd, lz4, brotli, gzip");
 }
 
 fn git(arguments: &[&str]) -> Option<String> {

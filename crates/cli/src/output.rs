@@ -3,13 +3,14 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use clap::ColorChoice;
 use job::Config;
 use records::Diagnostic;
 use records::sanitize::{escape_cell, escape_invisible};
 
 use pipeline::Event;
 
-use crate::args::{Color, Global, LogFormat};
+use crate::args::{Global, LogFormat};
 use crate::exit::{Code, Failure};
 use crate::json_log;
 
@@ -38,9 +39,9 @@ impl Output {
     pub(crate) fn new(global: &Global) -> Self {
         let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && is_attended();
         let color = match global.color {
-            Color::Always => true,
-            Color::Never => false,
-            Color::Auto => auto,
+            ColorChoice::Always => true,
+            ColorChoice::Never => false,
+            ColorChoice::Auto => auto,
         };
         let json = global.log_format == LogFormat::Json;
         Self {

@@ -34,12 +34,11 @@ pub(crate) struct Progress<'t> {
     state: Mutex<State>,
 }
 
+/// What the bar itself does not count.
+#[derive(Default)]
 struct State {
-    total: u64,
-    done: u64,
     refused: usize,
     errors: usize,
-    begun: Instant,
     reported_at: Option<Instant>,
     in_hand: BTreeSet<String>,
 }
@@ -53,23 +52,8 @@ impl<'t> Progress<'t> {
         } else {
             ProgressDrawTarget::hidden()
         };
-        let now = Instant::now();
-        let state = State {
-            total: 0,
-            done: 0,
-            refused: 0,
-            errors: 0,
-            begun: now,
-            reported_at: None,
-            in_hand: BTreeSet::new(),
-        };
-        Self {
-            name,
-            output,
-            bar: ProgressBar::with_draw_target(None, target),
-            terminal,
-            state: Mutex::new(state),
-        }
+        let bar = ProgressBar::with_draw_target(None, target);
+        Self { name, output, bar, terminal, state: Mutex::default() }
     }
 
     /// Shows an event.
@@ -86,10 +70,7 @@ impl<'t> Progress<'t> {
 
     /// Sets the number of items.
     fn total(&self, total: usize) {
-        self.update(|state| {
-            state.total = total as u64;
-            state.begun = Instant::now();
-        });
+        self.bar.reset_elapsed();
         self.bar.set_length(total as u64);
         let template = "{prefix} {bar:24} {pos}/{len}  {rate:>10}  left {eta}  {wide_msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -113,7 +94,6 @@ impl<'t> Progress<'t> {
     fn finished(&self, piece: &str, refused: usize, errors: usize) {
         let message = self.update(|state| {
             state.in_hand.remove(piece);
-            state.done += 1;
             state.refused += refused;
             state.errors += errors;
             let hand = state.in_hand.first().map(|path| path.rsplit('/').next().unwrap_or(path));
@@ -144,27 +124,27 @@ impl<'t> Progress<'t> {
             let due = state.reported_at.is_none_or(|reported_at| reported_at.elapsed() >= SPARSE);
             due.then(|| {
                 state.reported_at = Some(Instant::now());
-                line(self.name, state)
+                self.line(state)
             })
         });
         line.into_iter().for_each(|line| self.output.note(&line));
     }
-}
 
-fn line(name: &str, state: &State) -> String {
-    let elapsed = state.begun.elapsed();
-    let left = elapsed.mul_f64((state.total.saturating_sub(state.done)) as f64 / state.done.max(1) as f64);
-    let percent = 100 * state.done / state.total.max(1);
-    let now = jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ");
-    format!(
-        "{now} {name} {}/{} {percent} % elapsed {} left {} refused {} errors {}",
-        state.done,
-        state.total,
-        span(elapsed),
-        span(left),
-        state.refused,
-        state.errors
-    )
+    fn line(&self, state: &State) -> String {
+        let (total, done) = (self.bar.length().unwrap_or_default(), self.bar.position());
+        let elapsed = self.bar.elapsed();
+        let left = elapsed.mul_f64(total.saturating_sub(done) as f64 / done.max(1) as f64);
+        let percent = 100 * done / total.max(1);
+        let now = jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ");
+        format!(
+            "{now} {} {done}/{total} {percent} % elapsed {} left {} refused {} errors {}",
+            self.name,
+            span(elapsed),
+            span(left),
+            state.refused,
+            state.errors
+        )
+    }
 }
 
 /// Duration as text.

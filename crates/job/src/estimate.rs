@@ -176,7 +176,7 @@ pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
     };
     PartPrior {
         stiffness_n_per_m: part.actuator.stiffness_n_per_m(),
-        reference_load_n: part.reference_load_n,
+        reference_load_n: part.settings.reference_load_n,
         unknown_force_n,
         period_m: match part.geometry {
             Geometry::Linear { lead_m_per_rev } => lead_m_per_rev,

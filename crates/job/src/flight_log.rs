@@ -210,55 +210,8 @@ impl FlightLog {
     }
 }
 
-/// Estimates every actuator of a log without flight identity, as one part.
-///
-/// # Errors
-/// A diagnostic when the log cannot be read or put on one clock.
-pub fn estimate_unidentified(
-    files: &LogFiles,
-    display_name: &str,
-    config: &Config,
-    part: &Part,
-) -> Result<Vec<(Position, GapEstimate)>, Diagnostic> {
-    let mut found = Vec::new();
-    for_each_unidentified(files, display_name, config, part, |channels| {
-        found.push((
-            channels.position.clone(),
-            estimate::estimate(channels, part, &config.document.estimate)?,
-        ));
-        Ok(())
-    })?;
-    Ok(found)
-}
-
-/// Passes on the channels of every actuator of a log without flight identity, as one part.
-pub(crate) fn for_each_unidentified(
-    files: &LogFiles,
-    display_name: &str,
-    config: &Config,
-    part: &Part,
-    mut take: impl FnMut(&ActuatorChannels) -> Result<(), Diagnostic>,
-) -> Result<(), Diagnostic> {
-    let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
-    let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
-    let mut channels = config.base_mapping().channels.clone();
-    if part.output_locked {
-        channels.output = Output::Locked;
-    }
-    // A log of one actuator has no name for it here, but needs one to be asked by.
-    let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
-    let positions = log.actuators(&channels, Some(&own)).map_err(in_log)?;
-    let used: Vec<_> =
-        positions.iter().filter(|at| at.lacking.is_empty()).map(|at| (&channels, at)).collect();
-    log.announce(&used);
-    for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
-        take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
-    }
-    Ok(())
-}
-
-/// Passes on the channels of every actuator of a log with its part: as installed, or all as one part.
+/// Passes on the channels of every actuator of a log with its part: as installed, or all as one part, for which the log needs
+/// no identity.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.
@@ -270,14 +223,30 @@ pub fn for_each_actuator(
     part: Option<&PartNumber>,
     mut take: impl FnMut(&ActuatorChannels, &Part) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
-    if let Some(number) = part {
-        let part = part_of(config, number)?;
-        return for_each_unidentified(files, display_name, config, part, |channels| take(channels, part));
+    let Some(number) = part else {
+        let opened = FlightLog::open(files, display_name, config, installations)?;
+        for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
+            let (_, part) = opened.unit(at, config, installations)?;
+            take(&opened.channels(at, part)?, part)?;
+        }
+        return Ok(());
+    };
+    let part = part_of(config, number)?;
+    let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
+    let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
+    let mut channels = config.base_mapping().channels.clone();
+    if part.settings.output.is_locked() {
+        channels.output = Output::Locked;
     }
-    let opened = FlightLog::open(files, display_name, config, installations)?;
-    for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-        let (_, part) = opened.unit(at, config, installations)?;
-        take(&opened.channels(at, part)?, part)?;
+    // A log of one actuator has no name for it here, but needs one to be asked by.
+    let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
+    let mut positions = log.actuators(&channels, Some(&own)).map_err(in_log)?;
+    positions.retain(|at| at.lacking.is_empty());
+    let used: Vec<_> = positions.iter().map(|at| (&channels, at)).collect();
+    log.announce(&used);
+    for at in &positions {
+        let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
+        take(&read, part).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())
 }
@@ -500,18 +469,14 @@ pub fn sample_digest(
     installations: &Installations,
 ) -> Result<String, Diagnostic> {
     catch_panic(display_name, || {
-        let opened = FlightLog::open(files, display_name, config, installations)?;
         let mut hash = blake3::Hasher::new();
-        for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-            let (_, part) = opened.unit(at, config, installations)?;
-            let read = opened.channels(at, part)?;
-            hash.update(at.position.as_str().as_bytes());
-            for values in [&read.motor_m, &read.dx_m, &read.load_n] {
-                for value in values {
-                    hash.update(&value.to_bits().to_le_bytes());
-                }
+        for_each_actuator(files, display_name, config, installations, None, |read, _| {
+            hash.update(read.position.as_str().as_bytes());
+            for value in [&read.motor_m, &read.dx_m, &read.load_n].into_iter().flatten() {
+                hash.update(&value.to_bits().to_le_bytes());
             }
-        }
+            Ok(())
+        })?;
         Ok(hash.finalize().to_hex().to_string())
     })
 }

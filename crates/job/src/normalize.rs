@@ -24,47 +24,41 @@ pub fn normalize(
     log_path: &str,
     config: &Config,
     installations: &Installations,
-    (folder, encoding): (&Path, Encoding),
+    folder: &Path,
+    encoding: Encoding,
     claim: &dyn Fn(&Path, &str) -> Result<(), Diagnostic>,
 ) -> Result<(Vec<PathBuf>, Vec<Diagnostic>), Diagnostic> {
     catch_panic(log_path, || {
         let opened = FlightLog::open(files, log_path, config, installations)?;
         let (mut written, mut diagnostics) = (Vec::new(), Vec::new());
+        let id = &opened.identity;
+        let write = |at: &ActuatorColumns| {
+            let (installation, part) = opened.unit(at, config, installations)?;
+            let channels = opened.channels(at, part)?;
+            let flight = format!("{}_{}", id.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight_id);
+            let names = [id.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
+            let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
+            claim(&file, &opened.digest)?;
+            let config_digest = config.digest(&id.tail_number, &installation.part_number);
+            let provenance = BTreeMap::from([
+                ("source_log".to_owned(), opened.display_name().to_owned()),
+                ("source_digest".to_owned(), opened.digest.clone()),
+                ("config_digest".to_owned(), config_digest.to_string()),
+                ("part_number".to_owned(), installation.part_number.to_string()),
+                ("serial_number".to_owned(), installation.serial_number.to_string()),
+            ]);
+            ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, encoding)
+                .map_err(|e| e.diagnostic())?;
+            Ok(file)
+        };
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-            match one(&opened, at, config, installations, (folder, encoding), claim) {
+            match write(at) {
                 Ok(file) => written.push(file),
-                Err(diagnostic) => diagnostics.push(diagnostic.in_file(log_path)),
+                Err(diagnostic) => diagnostics.push(Diagnostic::in_file(diagnostic, log_path)),
             }
         }
         Ok((written, diagnostics))
     })
-}
-
-fn one(
-    opened: &FlightLog,
-    at: &ActuatorColumns,
-    config: &Config,
-    installations: &Installations,
-    (folder, encoding): (&Path, Encoding),
-    claim: &dyn Fn(&Path, &str) -> Result<(), Diagnostic>,
-) -> Result<PathBuf, Diagnostic> {
-    let (installation, part) = opened.unit(at, config, installations)?;
-    let channels = opened.channels(at, part)?;
-    let id = &opened.identity;
-    let flight = format!("{}_{}", id.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight_id);
-    let names = [id.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
-    let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
-    claim(&file, &opened.digest)?;
-    let provenance = BTreeMap::from([
-        ("source_log".to_owned(), opened.display_name().to_owned()),
-        ("source_digest".to_owned(), opened.digest.clone()),
-        ("config_digest".to_owned(), config.digest(&id.tail_number, &installation.part_number).to_string()),
-        ("part_number".to_owned(), installation.part_number.to_string()),
-        ("serial_number".to_owned(), installation.serial_number.to_string()),
-    ]);
-    ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, encoding)
-        .map_err(|e| e.diagnostic())?;
-    Ok(file)
 }
 
 /// A name as a file may carry it: what is no letter, digit, dot, dash or underscore is written `%2F`.

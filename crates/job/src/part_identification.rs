@@ -11,27 +11,6 @@ use crate::config::part::Part;
 /// Friction below this share of the load is not distinguishable from none.
 const MIN_FRICTION_SHARE: f64 = 0.01;
 
-/// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct IdentifiedParams {
-    /// K that the contact regression fitted, N/m.
-    pub stiffness_n_per_m: Option<f64>,
-    /// White noise of the screw position, rms, m.
-    pub screw_rms_m: Option<f64>,
-    /// Its standard uncertainty, m.
-    pub screw_uncertainty_m: Option<f64>,
-    /// Its smallest step, m.
-    pub screw_resolution_m: Option<f64>,
-    /// White noise of the motor position, rms, m.
-    pub motor_rms_m: Option<f64>,
-    /// Its standard uncertainty, m.
-    pub motor_uncertainty_m: Option<f64>,
-    /// Its smallest step, m.
-    pub motor_resolution_m: Option<f64>,
-    /// Friction of the screw at the rms load, N: the force the model does not know.
-    pub unknown_force_n: Option<f64>,
-}
-
 /// The keys of a linear and of a rotary part, below the part.
 const KEYS: [[&str; 2]; 6] = [
     ["stiffness_n_per_m", "stiffness_nm_per_rad"],
@@ -41,6 +20,19 @@ const KEYS: [[&str; 2]; 6] = [
     ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
     ["noise.unknown_force_n", "noise.unknown_torque_nm"],
 ];
+
+/// A value, and its standard uncertainty where it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Identified {
+    value: f64,
+    uncertainty: Option<f64>,
+}
+
+/// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis, in the order of
+/// `KEYS`: stiffness that the contact regression fitted; white noise and smallest step of the screw and of the motor position;
+/// friction of the screw at the rms load, the force that the model does not know.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct IdentifiedParams([Option<Identified>; KEYS.len()]);
 
 /// A key of `[part."…"]`, its identified value, and its configured value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,43 +51,34 @@ impl IdentifiedParams {
     /// Parameters of one actuator; `None` for those that the flight does not identify.
     pub fn of(channels: &ActuatorChannels, found: Option<&ContactEstimate>) -> Self {
         let [motor, screw, _] = &channels.quality;
-        let motor_noise = white_noise(&channels.motor_m, motor.resolution);
-        let screw_noise = screw_noise(channels, screw.resolution);
-        let mut params = Self {
-            motor_rms_m: motor_noise.map(|noise| noise.rms),
-            motor_uncertainty_m: motor_noise.map(|noise| noise.uncertainty),
-            screw_rms_m: screw_noise.map(|noise| noise.rms),
-            screw_uncertainty_m: screw_noise.map(|noise| noise.uncertainty),
-            motor_resolution_m: motor.resolution,
-            screw_resolution_m: screw.resolution,
-            ..Self::default()
-        };
-        if let Some(found) = found {
-            params.stiffness_n_per_m = Some(found.stiffness_n_per_m);
+        let noise = |noise: WhiteNoise| Identified { value: noise.rms, uncertainty: Some(noise.uncertainty) };
+        let exact = |value: f64| Identified { value, uncertainty: None };
+        let friction_n = found.and_then(|found| {
             let load_n = rms_n(&channels.load_n);
-            let friction_n = found.friction.at_n(load_n);
-            params.unknown_force_n = (friction_n > MIN_FRICTION_SHARE * load_n).then_some(friction_n);
-        }
-        params
+            Some(found.friction.at_n(load_n)).filter(|friction_n| *friction_n > MIN_FRICTION_SHARE * load_n)
+        });
+        Self([
+            found.map(|found| exact(found.stiffness_n_per_m)),
+            screw_noise(channels, screw.resolution).map(noise),
+            screw.resolution.map(exact),
+            white_noise(&channels.motor_m, motor.resolution).map(noise),
+            motor.resolution.map(exact),
+            friction_n.map(exact),
+        ])
     }
 
-    /// The median of each fact, over those that show it.
+    /// The median of each parameter, over those that identify it.
     pub fn medians(all: &[Self]) -> Self {
-        let median = |of: fn(&Self) -> Option<f64>| {
-            let mut values: Vec<f64> = all.iter().filter_map(of).collect();
+        let median = |values: &mut dyn Iterator<Item = f64>| {
+            let mut values: Vec<f64> = values.collect();
             let middle = values.len() / 2;
             (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
         };
-        Self {
-            stiffness_n_per_m: median(|f| f.stiffness_n_per_m),
-            screw_rms_m: median(|f| f.screw_rms_m),
-            screw_uncertainty_m: median(|f| f.screw_uncertainty_m),
-            screw_resolution_m: median(|f| f.screw_resolution_m),
-            motor_rms_m: median(|f| f.motor_rms_m),
-            motor_uncertainty_m: median(|f| f.motor_uncertainty_m),
-            motor_resolution_m: median(|f| f.motor_resolution_m),
-            unknown_force_n: median(|f| f.unknown_force_n),
-        }
+        Self(std::array::from_fn(|at| {
+            let found = || all.iter().filter_map(|params| params.0[at]);
+            let uncertainty = median(&mut found().filter_map(|param| param.uncertainty));
+            Some(Identified { value: median(&mut found().map(|param| param.value))?, uncertainty })
+        }))
     }
 
     /// The facts under the keys and in the units in which a part of this kind is configured.
@@ -111,24 +94,25 @@ impl IdentifiedParams {
             Geometry::Rotary { reference_radius_m: r } => (1, r.recip(), r, r * r),
         };
         let level = |of: fn(&SensorNoise) -> f64| sensors.as_ref().map(of);
-        let values = [
-            (rate, self.stiffness_n_per_m, None, Some(stiffness)),
-            (length, self.screw_rms_m, self.screw_uncertainty_m, level(|s| s.screw_rms_m)),
-            (length, self.screw_resolution_m, None, level(|s| s.screw_resolution_m)),
-            (length, self.motor_rms_m, self.motor_uncertainty_m, level(|s| s.motor_rms_m)),
-            (length, self.motor_resolution_m, None, level(|s| s.motor_resolution_m)),
-            (force, self.unknown_force_n, None, level(|s| s.unknown_force_n)),
+        let settings = [
+            (rate, Some(stiffness)),
+            (length, level(|s| s.screw_rms_m)),
+            (length, level(|s| s.screw_resolution_m)),
+            (length, level(|s| s.motor_rms_m)),
+            (length, level(|s| s.motor_resolution_m)),
+            (force, level(|s| s.unknown_force_n)),
         ];
-        let comparisons =
-            KEYS.iter().zip(values).map(|(keys, (scale, identified, uncertainty, configured))| {
-                Some(ParamComparison {
-                    key: keys[column],
-                    identified: identified? * scale,
-                    uncertainty: uncertainty.map(|v: f64| v * scale),
-                    configured: configured.map(|v| v * scale),
-                })
-            });
-        comparisons.flatten().collect()
+        let all = KEYS.iter().zip(settings).zip(self.0);
+        all.filter_map(|((keys, (scale, configured)), identified)| {
+            let Identified { value, uncertainty } = identified?;
+            Some(ParamComparison {
+                key: keys[column],
+                identified: value * scale,
+                uncertainty: uncertainty.map(|v| v * scale),
+                configured: configured.map(|v| v * scale),
+            })
+        })
+        .collect()
     }
 }
 
@@ -144,4 +128,19 @@ fn screw_noise(channels: &ActuatorChannels, resolution: Option<f64>) -> Option<W
 fn rms_n(load_n: &[f64]) -> f64 {
     let present = || load_n.iter().filter(|f| !f.is_nan());
     (present().map(|f| f * f).sum::<f64>() / present().count().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_pass_over_what_a_flight_did_not_show() {
+        let params = |value: Option<f64>| {
+            let stiffness = value.map(|value| Identified { value, uncertainty: None });
+            IdentifiedParams([stiffness, None, None, None, None, None])
+        };
+        let all = [params(Some(3.0)), params(None), params(Some(1.0)), params(Some(2.0))];
+        assert_eq!(IdentifiedParams::medians(&all), params(Some(2.0)));
+    }
 }

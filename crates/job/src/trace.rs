@@ -37,14 +37,9 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Samples.
-    pub fn len(&self) -> usize {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
         self.log.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.log.is_empty()
     }
 
     /// Puts another trace behind this one.

@@ -41,11 +41,11 @@ impl Config {
         Ok(Self { inner, files: Vec::new(), installations: OnceLock::new() })
     }
 
-    /// That of no_installations's logs: defaults, to judge tables that were made elsewhere.
+    /// A configuration without logs: defaults, to assess tables that other programs made.
     #[staticmethod]
     fn without_logs() -> Self {
         let installations = OnceLock::from(Installations::default());
-        Self { inner: job::Config::without_logs(), files: Vec::new(), installations }
+        Self { inner: job::Config::default(), files: Vec::new(), installations }
     }
 
     /// The files it was read from, absolute; none when it was read from a text.
@@ -113,5 +113,15 @@ impl Config {
         let read = py.detach(|| pipeline::run::scheduler::installations(&self.inner));
         let read = read.map_err(|error| to_run_exception(py, error))?;
         Ok(self.installations.get_or_init(|| read))
+    }
+
+    /// Result of work on the configuration and its installations table, done without Python's lock.
+    pub(crate) fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&job::Config, &Installations) -> Result<T, pipeline::Error> + Send,
+    ) -> PyResult<T> {
+        let installations = self.installations(py)?;
+        py.detach(|| work(&self.inner, installations)).map_err(|error| to_run_exception(py, error))
     }
 }

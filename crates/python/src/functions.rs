@@ -1,25 +1,24 @@
-//! Functions of the module: arguments to a request, result to a table.
+//! Functions on logs and arrays, and the run: arguments to a request, result to a table.
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use ::records::row_schema::to_nullable_batch;
-use ::records::{Diagnostic, Installations, PartNumber};
 use arrow::array::RecordBatch;
 use ingest::log::in_memory::ChannelArrays;
 use ingest::parquet::writer::Encoding;
-use ingest::tables::{Table as Cells, TableBatch};
 use pipeline::Request;
-use pipeline::assess::trends::{self, UnitSelection};
-use pipeline::fleet::external_estimates;
+use pipeline::logs::discover;
 use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
-use store::{Holder, Query};
+use records::row_schema::to_nullable_batch;
+use records::{Diagnostic, Installations, PartNumber};
+use store::Holder;
 
 use crate::VERSION;
-use crate::arrow_capsule::{self, arrow_error};
+use crate::arrow_capsule::arrow_error;
 use crate::config::Config;
 use crate::error::{ExceptionClass, config_error, to_exception, to_run_exception};
 use crate::numpy_input::numbers;
@@ -31,9 +30,17 @@ fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
     Ok(named)
 }
 
-pub(crate) fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestamp>> {
-    let read = text.map(ingest::tables::utc).transpose();
-    read.map_err(|what| config_error(py, Diagnostic::new("bad_time", what)))
+/// The part as which all actuators are taken, or the installations table that names the part of each.
+fn parts<'c>(
+    py: Python<'_>,
+    config: &'c Config,
+    number: Option<&str>,
+) -> PyResult<(Option<PartNumber>, &'c Installations)> {
+    static NONE: LazyLock<Installations> = LazyLock::new(Installations::default);
+    Ok(match number {
+        Some(number) => (Some(part(py, config, number)?), &NONE),
+        None => (None, config.installations(py)?),
+    })
 }
 
 /// Estimates logs: as installed, or all as one part. Errors of logs are in `Table.errors`.
@@ -45,24 +52,15 @@ pub(crate) fn estimate(
     config: &Config,
     part_number: Option<&str>,
 ) -> PyResult<Table> {
-    let no_installations = Installations::default();
-    let number = part_number.map(|number| part(py, config, number)).transpose()?;
-    let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
+    let (number, installations) = parts(py, config, part_number)?;
     let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
+    let mut of_log = |log: &Path| {
+        let (config, number) = (&config.inner, number.as_ref());
+        pipeline::inspect::estimate::estimate(log, config, installations, number, VERSION, &mut diagnostics)
+    };
     for log in &logs {
         py.check_signals()?;
-        let number = number.as_ref();
-        let read = py.detach(|| {
-            pipeline::inspect::estimate::estimate(
-                log,
-                &config.inner,
-                installations,
-                number,
-                VERSION,
-                &mut diagnostics,
-            )
-        });
-        found.extend(read.map_err(|error| to_run_exception(py, error))?);
+        found.extend(py.detach(|| of_log(log)).map_err(|error| to_run_exception(py, error))?);
     }
     let batch = to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?;
     Ok(Table::with_errors(batch, diagnostics))
@@ -87,7 +85,7 @@ pub(crate) fn estimate_arrays(
         pipeline::inspect::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
-    Ok(Table::of(to_nullable_batch(&[found]).map_err(|e| to_run_exception(py, e.into()))?))
+    Table::of_rows(py, &[found])
 }
 
 /// Inputs and outputs of the filter of a log, sample by sample.
@@ -99,91 +97,12 @@ pub(crate) fn trace(
     config: &Config,
     part_number: Option<&str>,
 ) -> PyResult<Table> {
-    let no_installations = Installations::default();
-    let number = part_number.map(|number| part(py, config, number)).transpose()?;
-    let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
-    let files = pipeline::logs::discover::log_containing(&config.inner, &log)
-        .map_err(|error| to_run_exception(py, error))?;
-    let log_path = log.display().to_string();
-    let seen =
-        py.detach(|| job::trace::of_log(&files, &log_path, &config.inner, installations, number.as_ref()));
+    let (number, installations) = parts(py, config, part_number)?;
+    let (config, log_path) = (&config.inner, log.display().to_string());
+    let files = discover::log_containing(config, &log).map_err(|error| to_run_exception(py, error))?;
+    let seen = py.detach(|| job::trace::of_log(&files, &log_path, config, installations, number.as_ref()));
     let columns = seen.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?.columns();
     Ok(Table::of(ingest::parquet::writer::batch(&columns).map_err(|e| arrow_error(&e))?))
-}
-
-/// Trends of the store, or of an external estimates table; one row for each unit, or for each query.
-#[pyfunction]
-#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries))]
-#[expect(clippy::too_many_arguments, reason = "they are Python's keywords")]
-pub(crate) fn trend(
-    py: Python<'_>,
-    estimates: Option<&Bound<'_, PyAny>>,
-    config: &Config,
-    tail: Option<String>,
-    serial: Option<String>,
-    part_number: Option<String>,
-    as_of: Option<&str>,
-    queries: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Table> {
-    let installations = config.installations(py)?;
-    let as_of_utc = instant(py, as_of)?;
-    let ask = UnitSelection { tail_number: tail, serial_number: serial, part_number, as_of_utc };
-    let estimate_batches = estimates.map(arrow_capsule::batches).transpose()?;
-    let queries_table = queries.map(|table| to_table(table, "queries")).transpose()?;
-    let assess = || {
-        let chunks = estimate_batches.map(chunks);
-        let histories = chunks.map(|chunks| external_estimates::from_batches(&chunks)).transpose()?;
-        let queries = queries_table.as_ref().map(external_estimates::queries).transpose()?;
-        trends::assess(&config.inner, installations, histories, queries.as_deref(), &ask)
-    };
-    let found = py.detach(assess);
-    let found = found.map_err(|error| to_run_exception(py, error))?;
-    Ok(Table::of(to_nullable_batch(&found.now).map_err(|e| to_run_exception(py, e.into()))?))
-}
-
-fn to_table(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {
-    let read = Cells::of_batches(name.as_ref(), &arrow_capsule::batches(table)?);
-    read.map_err(|error| config_error(table.py(), error.diagnostic()))
-}
-
-/// The rows of a table from memory, counted through.
-pub(crate) fn chunks(batches: Vec<RecordBatch>) -> Vec<TableBatch> {
-    let mut before = 0;
-    let chunk = |batch: RecordBatch| {
-        let rows = batch.num_rows();
-        before += rows;
-        TableBatch::new("estimates".as_ref(), batch, before - rows)
-    };
-    batches.into_iter().map(chunk).collect()
-}
-
-/// Stored records that fit.
-#[pyfunction]
-#[pyo3(signature = (config, texts, since, until, last))]
-pub(crate) fn records(
-    py: Python<'_>,
-    config: &Config,
-    texts: [Option<String>; 5],
-    since: Option<&str>,
-    until: Option<&str>,
-    last: Option<usize>,
-) -> PyResult<Table> {
-    let [tail_number, serial_number, part_number, flight_id, position] = texts;
-    let (since_utc, until_utc) = (instant(py, since)?, instant(py, until)?);
-    let query = Query {
-        tail_number,
-        serial_number,
-        part_number,
-        flight_id,
-        position,
-        since_utc,
-        until_utc,
-        last,
-        ..Query::default()
-    };
-    let (installations, config) = (config.installations(py)?, &config.inner);
-    let found = py.detach(|| Ok(pipeline::open_store(config, installations)?.scan(&query)?));
-    Ok(Table::of(found.map_err(|error| to_run_exception(py, error))?))
 }
 
 /// Writes normalized logs below a folder.
@@ -197,20 +116,69 @@ pub(crate) fn normalize(
     compatible: bool,
     jobs: Option<usize>,
 ) -> PyResult<(Vec<PathBuf>, Option<Py<PyAny>>)> {
-    let installations = config.installations(py)?;
     let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
-    let done = py.detach(|| {
-        let logs = pipeline::logs::discover::named_logs(&config.inner, &logs)?;
-        let place = (output.as_path(), encoding);
-        pipeline::inspect::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
-    });
-    let done = done.map_err(|error| to_run_exception(py, error))?;
+    let done = config.with(py, |config, installations| {
+        let logs = discover::named_logs(config, &logs)?;
+        pipeline::inspect::normalize::normalize(
+            config,
+            installations,
+            &logs,
+            &output,
+            encoding,
+            jobs,
+            &|_| {},
+        )
+    })?;
     let trouble = (!done.diagnostics.is_empty())
         .then(|| to_exception(py, ExceptionClass::Log, &done.diagnostics).into_value(py).into_any());
     Ok((done.written, trouble))
 }
 
-/// The nightly run on this machine; its account as JSON.
+/// Channels of logs, with errors of logs in `Table.errors`; nothing is estimated or written.
+#[pyfunction]
+pub(crate) fn check(
+    py: Python<'_>,
+    logs: Option<Vec<PathBuf>>,
+    config: &Config,
+    limit: usize,
+) -> PyResult<Table> {
+    let (batch, diagnostics) = config.with(py, |config, installations| {
+        let (logs, faults) = match logs {
+            Some(logs) => (discover::named_logs(config, &logs)?, Vec::new()),
+            None => {
+                let found = discover::discover(config)?;
+                let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
+                let logs = found.logs.into_iter().map(|(name, files)| (files, name)).take(limit);
+                (logs.collect(), faults)
+            }
+        };
+        let (config, installations) = (Arc::new(config.clone()), Arc::new(installations.clone()));
+        let seen = pipeline::inspect::check::check_logs(&config, &installations, logs, faults);
+        let batch: RecordBatch = to_nullable_batch(&seen.channels())?;
+        Ok((batch, seen.diagnostics.into_iter().chain(seen.mapping_faults).collect()))
+    })?;
+    Ok(Table::with_errors(batch, diagnostics))
+}
+
+/// Runs something that stores results, without Python's lock, as this process and with a longest wait for another run.
+/// Returns its summary as JSON.
+pub(crate) fn run_summary(
+    py: Python<'_>,
+    wait_s: Option<f64>,
+    run: impl FnOnce(&Context<'_>) -> Result<pipeline::RunSummary, pipeline::Error> + Send,
+) -> PyResult<String> {
+    let stop = AtomicBool::new(false);
+    let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let summary = py.detach(|| {
+        let holder = Holder::this_process();
+        run(&Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} })
+    });
+    let summary = summary.map_err(|error| to_run_exception(py, error))?;
+    serde_json::to_string(&summary)
+        .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))
+}
+
+/// The nightly run on this machine; its summary as JSON.
 #[pyfunction]
 #[pyo3(signature = (config, jobs, redo, retry, wait_s))]
 pub(crate) fn run(
@@ -222,20 +190,5 @@ pub(crate) fn run(
     wait_s: Option<f64>,
 ) -> PyResult<String> {
     let request = Request { jobs, redo, retry, ..Request::default() };
-    let stop = AtomicBool::new(false);
-    let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let holder = Holder::this_process();
-    let context = Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} };
-    let report = py.detach(|| pipeline::run(&config.inner, &request, &context));
-    run_summary(py, report)
-}
-
-/// What a run did, as JSON.
-pub(crate) fn run_summary(
-    py: Python<'_>,
-    report: Result<pipeline::RunSummary, pipeline::Error>,
-) -> PyResult<String> {
-    let report = report.map_err(|error| to_run_exception(py, error))?;
-    serde_json::to_string(&report)
-        .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))
+    run_summary(py, wait_s, |context| pipeline::run(&config.inner, &request, context))
 }

@@ -1,19 +1,14 @@
 //! Entry points for a cluster engine such as Spark: process one log on a worker, and run with the engine's workers.
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
-
 use pipeline::Request;
 use pipeline::run::distributed::{self, Task};
-use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
 use records::Diagnostic;
-use store::Holder;
 
 use crate::VERSION;
 use crate::config::Config;
-use crate::error::{ExceptionClass, to_exception, to_run_exception};
+use crate::error::{ExceptionClass, to_exception};
 use crate::functions::run_summary;
 
 /// Processes one log of a distributed run; its result, or its error, as JSON.
@@ -21,9 +16,7 @@ use crate::functions::run_summary;
 pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyResult<String> {
     let task: Task = serde_json::from_str(task)
         .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))?;
-    let installations = config.installations(py)?;
-    let result = py.detach(|| distributed::process_task(&config.inner, installations, &task, VERSION));
-    result.map_err(|error| to_run_exception(py, error))
+    config.with(py, |config, installations| distributed::process_task(config, installations, &task, VERSION))
 }
 
 /// Run whose logs are processed by `engine`, which receives batches of tasks and returns their results; the run's
@@ -40,13 +33,9 @@ pub(crate) fn run_distributed(
     wait_s: Option<f64>,
 ) -> PyResult<String> {
     let request = Request { redo, retry, ..Request::default() };
-    let stop = AtomicBool::new(false);
-    let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let holder = Holder::this_process();
-    let context = Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} };
     let mut thrown: Option<PyErr> = None;
     let mut ask = |tasks: &[Task]| {
-        let asked = Python::attach(|py| {
+        let asked: PyResult<Vec<String>> = Python::attach(|py| {
             let json = |task: &Task| serde_json::to_string(task).unwrap_or_default();
             let tasks: Vec<String> = tasks.iter().map(json).collect();
             engine.call1(py, (tasks,))?.extract(py)
@@ -57,10 +46,9 @@ pub(crate) fn run_distributed(
             what
         })
     };
-    let report = py.detach(|| distributed::run(&config.inner, &request, &context, at_a_time, &mut ask));
+    let summary = run_summary(py, wait_s, |context| {
+        distributed::run(&config.inner, &request, context, at_a_time, &mut ask)
+    });
     // The traceback must show the engine's own exception.
-    match thrown {
-        Some(error) => Err(error),
-        None => run_summary(py, report),
-    }
+    thrown.map_or(summary, Err)
 }

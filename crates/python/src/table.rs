@@ -3,14 +3,13 @@
 use std::fmt::Write as _;
 
 use arrow::array::{Array, RecordBatch};
-use arrow::datatypes::SchemaRef;
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 use records::Diagnostic;
-use records::row_schema::to_nullable_batch;
+use records::row_schema::{Row, to_nullable_batch};
 
 use crate::arrow_capsule::{self, arrow_error};
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
@@ -53,8 +52,7 @@ impl LogErrorRow {
 /// Rows with named columns. Hand it to pyarrow, Polars, pandas or DuckDB: none of them copies it.
 #[pyclass(frozen, module = "freeplay_ema")]
 pub(crate) struct Table {
-    schema: SchemaRef,
-    batches: Vec<RecordBatch>,
+    batch: RecordBatch,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -65,7 +63,12 @@ impl Table {
 
     /// A table, and the errors of logs that are not in it.
     pub(crate) fn with_errors(batch: RecordBatch, diagnostics: Vec<Diagnostic>) -> Self {
-        Self { schema: batch.schema(), batches: vec![batch], diagnostics }
+        Self { batch, diagnostics }
+    }
+
+    /// A table of rows.
+    pub(crate) fn of_rows<R: Row>(py: Python<'_>, rows: &[R]) -> PyResult<Self> {
+        Ok(Self::of(to_nullable_batch(rows).map_err(|e| to_run_exception(py, e.into()))?))
     }
 
     fn head(&self) -> String {
@@ -74,13 +77,12 @@ impl Table {
             1 => ", 1 error".to_owned(),
             n => format!(", {n} errors"),
         };
-        format!("{} rows, {} columns{errors}", self.num_rows(), self.schema.fields().len())
+        format!("{} rows, {} columns{errors}", self.num_rows(), self.batch.num_columns())
     }
 
     /// Names and cells of the first rows, of the first columns that have values there.
     fn preview(&self) -> Result<(Vec<String>, Vec<Vec<String>>), ArrowError> {
-        let Some(batch) = self.batches.first() else { return Ok(Default::default()) };
-        let some = batch.slice(0, batch.num_rows().min(SHOWN_ROWS));
+        let some = self.batch.slice(0, self.batch.num_rows().min(SHOWN_ROWS));
         let has_values = |column: &usize| some.column(*column).null_count() < some.num_rows();
         let columns: Vec<usize> = (0..some.num_columns()).filter(has_values).take(SHOWN_COLUMNS).collect();
         let options = FormatOptions::default().with_null("–");
@@ -88,7 +90,7 @@ impl Table {
             .iter()
             .map(|column| ArrayFormatter::try_new(some.column(*column).as_ref(), &options))
             .collect::<Result<Vec<_>, _>>()?;
-        let names = columns.iter().map(|column| self.schema.field(*column).name().clone()).collect();
+        let names = columns.iter().map(|column| some.schema_ref().field(*column).name().clone()).collect();
         let cell = |f: &ArrayFormatter<'_>, row| Ok(shortened(f.value(row).try_to_string()?));
         let line = |row| formatters.iter().map(|f| cell(f, row)).collect::<Result<Vec<_>, ArrowError>>();
         Ok((names, (0..some.num_rows()).map(line).collect::<Result<_, _>>()?))
@@ -111,20 +113,20 @@ impl Table {
     /// Rows.
     #[getter]
     fn num_rows(&self) -> usize {
-        self.batches.iter().map(RecordBatch::num_rows).sum()
+        self.batch.num_rows()
     }
 
     /// Names of the columns, in order.
     #[getter]
     fn column_names(&self) -> Vec<String> {
-        self.schema.fields().iter().map(|field| field.name().clone()).collect()
+        self.batch.schema_ref().fields().iter().map(|field| field.name().clone()).collect()
     }
 
     /// Errors of logs, and of actuators in them, that gave no rows: `log`, `code`, `what`, `hint` and where.
     #[getter]
     fn errors(&self, py: Python<'_>) -> PyResult<Self> {
         let rows: Vec<LogErrorRow> = self.diagnostics.iter().map(LogErrorRow::of).collect();
-        Ok(Self::of(to_nullable_batch(&rows).map_err(|e| to_run_exception(py, e.into()))?))
+        Self::of_rows(py, &rows)
     }
 
     /// Raises `LogError` with all errors, and with this table as its `answer`; returns the table if there is none.
@@ -188,14 +190,14 @@ impl Table {
 
     /// Address of a numeric column's values, to check that nothing was copied.
     fn buffer_address(&self, column: &str) -> PyResult<usize> {
-        let found = self.batches.first().and_then(|batch| batch.column_by_name(column));
+        let found = self.batch.column_by_name(column);
         let data = found.ok_or_else(|| PyKeyError::new_err(column.to_owned()))?.to_data();
         let values = data.buffers().first().ok_or_else(|| PyKeyError::new_err(column.to_owned()))?;
         Ok(values.as_ptr() as usize)
     }
 
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
-        arrow_capsule::schema(py, &self.schema)
+        arrow_capsule::schema(py, &self.batch)
     }
 
     /// Exports the table; a requested schema is optional in the Arrow protocol and ignored.
@@ -206,6 +208,6 @@ impl Table {
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
         drop(requested_schema);
-        arrow_capsule::stream(py, &self.schema, self.batches.clone())
+        arrow_capsule::stream(py, self.batch.clone())
     }
 }

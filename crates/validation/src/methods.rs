@@ -5,6 +5,7 @@ use ingest::log::in_memory::ChannelArrays;
 use ingest::{ActuatorChannels, Geometry};
 use job::Part;
 use job::config::EstimateSettings;
+use job::config::part::PartSettings;
 use job::filter_cache::FilterCache;
 use records::Position;
 use simulator::Sensors;
@@ -103,15 +104,8 @@ fn part(case: &Case) -> Result<Part, estimator::Error> {
         geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
         noise: expected_noise(&case.sensors),
         initial: InitialVariances::default(),
-        reference_load_n: None,
-        limit_m: None,
-        watch_m: None,
-        limit_applies_to: job::config::part::LimitedGap::Mean,
+        settings: PartSettings::default(),
         filters: FilterCache::default(),
-        axis: None,
-        at_limit: job::config::part::AtLimit::default(),
-        quantity_limits: job::config::QuantityLimits::default(),
-        output_locked: false,
     })
 }
 

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
+use ingest::parquet::writer::Encoding;
 
-use super::parse::parse_workers;
+use super::parse::{encoding_parser, parse_workers};
 use super::rows::RowFormatArgs;
 
 /// `init`.
@@ -60,30 +61,12 @@ pub(crate) struct NormalizeArgs {
     /// Write TAIL/DEPARTURE_FLIGHT/POSITION.parquet below this folder.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
-    /// Parquet encoding.
-    #[arg(long, value_enum, default_value_t = LogEncoding::Split)]
-    pub encoding: LogEncoding,
+    /// Parquet encoding: smallest and fastest to read with Freeplay, or for readers without byte stream split, such as Spark.
+    #[arg(long, value_parser = encoding_parser(), default_value = "split")]
+    pub encoding: Encoding,
     /// Use N workers; default: one per core.
     #[arg(long, short, value_name = "N", value_parser = parse_workers, allow_negative_numbers = true)]
     pub jobs: Option<u16>,
-}
-
-/// Parquet encoding of a normalized log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LogEncoding {
-    /// Byte stream split: smallest, and fastest to read with Freeplay.
-    Split,
-    /// Dictionary and plain: for readers without byte stream split, such as Spark 4.2.
-    Compatible,
-}
-
-impl From<LogEncoding> for ingest::parquet::writer::Encoding {
-    fn from(encoding: LogEncoding) -> Self {
-        match encoding {
-            LogEncoding::Split => Self::Split,
-            LogEncoding::Compatible => Self::Compatible,
-        }
-    }
 }
 
 /// `simulate`.

@@ -11,17 +11,17 @@ mod work;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use clap::{ArgAction, Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 pub(crate) use logs::{CheckArgs, EstimateArgs, InitArgs, NormalizeArgs, SimulateArgs};
-pub(crate) use parse::QueryKey;
+pub(crate) use parse::QUERY_KEYS;
 pub(crate) use results::{
     BacktestArgs, DiffArgs, ExplainArgs, ExternalEstimatesArgs, QueryArgs, ReportArgs, TrendArgs,
 };
 pub(crate) use rows::{Format, RowFormatArgs};
-pub(crate) use run::{FailOn, RunArgs};
+pub(crate) use run::RunArgs;
 pub(crate) use selection::{DepartureArgs, UnitFilterArgs};
-pub(crate) use store::{ForgetArgs, StoreArgs, StoreCommand, Table};
+pub(crate) use store::{ForgetArgs, StoreArgs, StoreCommand};
 pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 
 const AFTER: &str = "\
@@ -35,28 +35,16 @@ First steps:
 Exit codes: 0 success, 1 some logs failed, 2 usage or configuration, 3 the run failed,
 4 a unit met --fail-on, 5 an alert was not sent, 130 interrupted.";
 
-/// The text of `--version`, with the features that may be left out.
-macro_rules! long_version {
-    ($optional:literal) => {
-        concat!(
-            env!("CARGO_PKG_VERSION"),
-            "\ncommit: ",
-            env!("FREEPLAY_COMMIT"),
-            "\nbuild: ",
-            env!("FREEPLAY_BUILD"),
-            "\nfeatures: ",
-            $optional,
-            "Parquet snappy, zstd, lz4, brotli, gzip"
-        )
-    };
-}
-
 /// What `--version` prints after the name; `-V` prints the first line only.
-const LONG_VERSION: &str = if cfg!(feature = "cloud") {
-    long_version!("object stores S3, Google Cloud Storage and Azure with rustls; ")
-} else {
-    long_version!("")
-};
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit: ",
+    env!("FREEPLAY_COMMIT"),
+    "\nbuild: ",
+    env!("FREEPLAY_BUILD"),
+    "\nfeatures: ",
+    env!("FREEPLAY_FEATURES")
+);
 
 /// Estimate actuator backlash (free play) from flight logs and forecast when each unit reaches its limit.
 #[derive(Debug, Parser)]
@@ -103,9 +91,9 @@ pub(crate) struct Global {
     /// Log format on stderr: text or JSON lines.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORM")]
     pub log_format: LogFormat,
-    /// When to use colour.
-    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
-    pub color: Color,
+    /// When to use colour; `auto`: on a terminal, unless `NO_COLOR` is set.
+    #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto, value_name = "WHEN")]
+    pub color: ColorChoice,
 }
 
 /// Format of messages on stderr.
@@ -115,17 +103,6 @@ pub(crate) enum LogFormat {
     Text,
     /// One JSON object per line.
     Json,
-}
-
-/// When to use colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Color {
-    /// On a terminal, unless `NO_COLOR` is set.
-    Auto,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
 }
 
 /// The commands.

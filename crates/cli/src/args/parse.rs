@@ -1,7 +1,9 @@
 //! Parsers of option values, and the words that `query` takes.
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use ingest::parquet::writer::Encoding;
 use jiff::Timestamp;
+use pipeline::State;
 
 pub(super) fn parse_utc(text: &str) -> Result<Timestamp, String> {
     ingest::tables::utc(text)
@@ -32,27 +34,16 @@ pub(super) fn parse_span(text: &str) -> Result<std::time::Duration, String> {
     span.try_into().map_err(|_| format!("`{text}` is negative"))
 }
 
-/// Fields by which records can be selected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum QueryKey {
-    /// Tail number.
-    Tail,
-    /// Serial number.
-    Serial,
-    /// Flight.
-    Flight,
-    /// Installed position.
-    Position,
+/// The states that can make a run fail.
+pub(super) fn state_parser() -> impl TypedValueParser<Value = State> {
+    PossibleValuesParser::new(["watch", "unassessed", "plan", "act"]).try_map(|word| word.parse::<State>())
 }
 
-impl QueryKey {
-    /// Its column of the records.
-    pub(crate) fn column(self) -> &'static str {
-        match self {
-            Self::Tail => "tail_number",
-            Self::Serial => "serial_number",
-            Self::Flight => "flight_id",
-            Self::Position => "position",
-        }
-    }
+pub(super) fn encoding_parser() -> impl TypedValueParser<Value = Encoding> {
+    let encoding = |word: String| if word == "compatible" { Encoding::Compatible } else { Encoding::Split };
+    PossibleValuesParser::new(["split", "compatible"]).map(encoding)
 }
+
+/// The words by which `query` selects records, each with its column.
+pub(crate) const QUERY_KEYS: [(&str, &str); 4] =
+    [("tail", "tail_number"), ("serial", "serial_number"), ("flight", "flight_id"), ("position", "position")];

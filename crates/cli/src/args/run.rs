@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
+use pipeline::State;
 
-use super::parse::{parse_count, parse_span, parse_workers};
+use super::parse::{parse_count, parse_span, parse_workers, state_parser};
 use super::selection::DepartureArgs;
 use crate::completion;
 
@@ -45,22 +46,9 @@ pub(crate) struct RunArgs {
     #[arg(long, value_parser = parse_span, value_name = "TIME", help_heading = "Processing")]
     pub wait: Option<std::time::Duration>,
     /// Exit with code 4 if any unit is in this state or worse.
-    #[arg(long, value_enum, value_name = "STATE", help_heading = "Output")]
-    pub fail_on: Option<FailOn>,
+    #[arg(long, value_parser = state_parser(), value_name = "STATE", help_heading = "Output")]
+    pub fail_on: Option<State>,
     /// Print the run summary as JSON on stdout.
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-}
-
-/// States that can make a run fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub(crate) enum FailOn {
-    /// Watch limit.
-    Watch,
-    /// No sound record of late, or no limit.
-    Unassessed,
-    /// Planning horizon.
-    Plan,
-    /// Act limit.
-    Act,
 }

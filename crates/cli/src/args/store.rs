@@ -1,6 +1,6 @@
 //! Arguments of `store`.
 
-use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+use clap::{Args as ClapArgs, Subcommand};
 use jiff::Timestamp;
 
 use super::parse::{parse_count, parse_span, parse_utc};
@@ -56,9 +56,13 @@ pub(crate) enum StoreCommand {
     },
     /// List the current data files of a table, for tools without Delta support
     Files {
-        /// Table to list.
-        #[arg(long, value_enum, default_value_t = Table::Gaps)]
-        table: Table,
+        /// Table to list: records of estimates, logs, runs, alerts, events of work requests, or states of the units.
+        #[arg(
+            long,
+            value_parser = ["gaps", "logs", "runs", "alerts", "work", "states"],
+            default_value = "gaps"
+        )]
+        table: String,
     },
     /// Verify store integrity
     Verify {
@@ -101,21 +105,4 @@ pub(crate) struct ForgetArgs {
     /// Bring forgotten records back instead.
     #[arg(long)]
     pub undo: bool,
-}
-
-/// Tables of the store.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Table {
-    /// One row per actuator and flight.
-    Gaps,
-    /// One row per log.
-    Logs,
-    /// One row per run.
-    Runs,
-    /// Changes of state, and their messages.
-    Alerts,
-    /// Events of work requests.
-    Work,
-    /// State of each unit after the last run.
-    States,
 }

@@ -1,6 +1,6 @@
 //! Arguments of `work`.
 
-use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+use clap::{Args as ClapArgs, Subcommand};
 use jiff::Timestamp;
 
 use super::parse::parse_utc;
@@ -54,8 +54,13 @@ pub(crate) struct WorkListArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
     /// Only requests with this status; default: all that are not closed.
-    #[arg(long, value_enum, value_name = "STATUS", help_heading = "Selection")]
-    pub status: Option<WorkStatus>,
+    #[arg(
+        long,
+        value_parser = ["open", "acknowledged", "deferred", "closed", "all"],
+        value_name = "STATUS",
+        help_heading = "Selection"
+    )]
+    pub status: Option<String>,
     #[command(flatten)]
     pub rows: RowFormatArgs,
 }
@@ -68,19 +73,4 @@ pub(crate) struct WorkDecisionArgs {
     /// Who decides.
     #[arg(long, value_name = "NAME", env = "USER", hide_env_values = true)]
     pub by: String,
-}
-
-/// Status of a work request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum WorkStatus {
-    /// Waits for a decision.
-    Open,
-    /// Seen by a person.
-    Acknowledged,
-    /// Postponed.
-    Deferred,
-    /// Done.
-    Closed,
-    /// Every request.
-    All,
 }

@@ -41,7 +41,7 @@ pub(crate) fn load_trend_context(
         if external.limit_m.is_none() {
             output.note("no pipeline.toml here and no limit, so no states; set one with `--limit-m 150e-6`");
         }
-        (Config::without_logs(), Installations::default())
+        (Config::default(), Installations::default())
     } else {
         load_with_installations(global)?
     };

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use clap::ValueEnum as _;
 use jiff::Timestamp;
 use job::Config;
 use pipeline::findings::work_list::{self, WorkSelection};
@@ -79,10 +78,7 @@ fn decide(
 }
 
 fn list(config: &Config, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
-    let selection = WorkSelection {
-        status: args.status.and_then(|status| Some(status.to_possible_value()?.get_name().to_owned())),
-        units: args.units.selection(None),
-    };
+    let selection = WorkSelection { status: args.status.clone(), units: args.units.selection(None) };
     let (found, units) = work_list::work_list(config, &selection)?;
     if found.is_empty() {
         KnownNames::of(config).check_units(&args.units)?;

@@ -6,9 +6,10 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
+use smart_default::SmartDefault;
 
+use super::faults::Faults;
 use super::keys::with_nearest;
-use super::layers::Source;
 
 /// States of quantities other than the gap: of a unit, of a tail, of a part.
 pub const QUANTITY_STATES: [&str; 11] = [
@@ -33,7 +34,7 @@ const MAX_TIMEOUT_S: f64 = 600.0;
 
 /// `[alerts.NAME]`: a receiver of changes of state; it has one of `command`, `folder` and `url`.
 #[skip_serializing_none]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AlertChannel {
     /// Program and arguments, without a shell; it gets the message as JSON on standard input. Exit code 0 means sent.
@@ -47,34 +48,20 @@ pub struct AlertChannel {
     pub url: Option<String>,
     /// New states that are sent: those of the gap and of other quantities, and `not_assessed` (removed, or
     /// unassessed). Default: all but `normal` and `not_assessed`.
+    #[default(default_states())]
     pub states: Vec<String>,
     /// Only these part numbers, with `*` and `?`.
     pub parts: Vec<String>,
     /// Only these tail numbers, with `*` and `?`.
     pub tails: Vec<String>,
     /// Time limit of one message, s; at most 600. Default 30.
+    #[default = 30.0]
     pub timeout_s: f64,
     /// Whether a message that may have been received is sent again, with the same `id`. Default false.
     pub resend_unconfirmed: bool,
     /// Whether messages are sent. Default true.
+    #[default = true]
     pub enabled: bool,
-}
-
-impl Default for AlertChannel {
-    fn default() -> Self {
-        Self {
-            command: None,
-            pass_environment: Vec::new(),
-            folder: None,
-            url: None,
-            states: default_states(),
-            parts: Vec::new(),
-            tails: Vec::new(),
-            timeout_s: 30.0,
-            resend_unconfirmed: false,
-            enabled: true,
-        }
-    }
 }
 
 /// Every state that a person should know of.
@@ -97,42 +84,41 @@ impl AlertChannel {
         Duration::from_secs_f64(self.timeout_s.clamp(1e-3, MAX_TIMEOUT_S))
     }
 
-    /// Everything about the channel that cannot be meant.
-    pub(super) fn check(&self, name: &str, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+    /// Reports everything about the channel that cannot be meant.
+    pub(super) fn check(&self, name: &str, faults: &mut Faults<'_>) {
+        let mut report = |key: &[&str], what: String, hint: &str| {
+            faults.report(key, Diagnostic::new("alert_channel", what).hint(hint));
+        };
         let targets = [self.command.is_some(), self.folder.is_some(), self.url.is_some()];
         if targets.iter().filter(|given| **given).count() != 1 {
             let what = format!("`alerts.{name}` needs one of `command`, `folder` and `url`");
-            let c = Diagnostic::new("alert_channel", what).hint("folder = \"alerts\"");
-            found.push(source.at(&["alerts", name], c));
+            report(&[], what, "folder = \"alerts\"");
         }
         if self.command.as_ref().is_some_and(|words| words.first().is_none_or(String::is_empty)) {
-            let c = Diagnostic::new("alert_channel", format!("`alerts.{name}.command` names no program"));
-            found.push(
-                source.at(&["alerts", name, "command"], c.hint("command = [\"/usr/local/bin/notify\"]")),
-            );
+            let what = format!("`alerts.{name}.command` names no program");
+            report(&["command"], what, "command = [\"/usr/local/bin/notify\"]");
         }
         if self.folder.as_ref().is_some_and(|folder| folder.is_empty() || object_io::is_address(folder)) {
-            let c = Diagnostic::new("alert_channel", format!("`alerts.{name}.folder` is not a local folder"));
-            found.push(source.at(&["alerts", name, "folder"], c.hint("folder = \"alerts\"")));
+            let what = format!("`alerts.{name}.folder` is not a local folder");
+            report(&["folder"], what, "folder = \"alerts\"");
         }
         if let Some(detail) = self.url.as_ref().and_then(|url| object_io::check_url(url).err()) {
-            // The address may hold a secret: the line of the file is not quoted.
             let what = format!("`alerts.{name}.url` is not an address of HTTP: {detail}");
-            let c = Diagnostic::new("alert_channel", what).hint("write it as https://HOST/PATH");
-            found.push(Diagnostic { text: None, ..source.at(&["alerts", name, "url"], c) });
+            report(&["url"], what, "write it as https://HOST/PATH");
+            // The address may hold a secret: the line of the file is not quoted.
+            if let Some(fault) = faults.found.last_mut() {
+                fault.text = None;
+            }
         }
         for (key, texts) in [("parts", &self.parts), ("tails", &self.tails)] {
-            for (text, e) in texts.iter().filter_map(|text| Some((text, glob::Pattern::new(text).err()?))) {
-                let what = format!("`{text}` is not a valid name pattern: {e}");
-                found.push(source.at(&["alerts", name, key], Diagnostic::new("bad_pattern", what)));
-            }
+            texts.iter().for_each(|text| drop(faults.pattern(&[key], text, "name pattern")));
         }
         let of_gap = trend::State::ALL.map(trend::State::as_str);
         let known: Vec<&str> = of_gap.into_iter().chain([NOT_ASSESSED]).chain(QUANTITY_STATES).collect();
         for state in self.states.iter().filter(|state| !known.contains(&state.as_str())) {
-            let c = Diagnostic::new("unknown_state", format!("`{state}` is not a state of a unit"));
-            let c = with_nearest(c, state, known.iter().copied(), format!("states are {}", known.join(", ")));
-            found.push(source.at(&["alerts", name, "states"], c));
+            let fault = Diagnostic::new("unknown_state", format!("`{state}` is not a state of a unit"));
+            let states = format!("states are {}", known.join(", "));
+            faults.report(&["states"], with_nearest(fault, state, known.iter().copied(), states));
         }
     }
 }

@@ -14,10 +14,11 @@ use records::time::DAY_S;
 use records::{Diagnostic, TailNumber};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use super::alerts::AlertChannel;
+use super::faults::Faults;
 use super::keys::with_nearest;
-use super::layers::Source;
 use super::validate_channels;
 use crate::config::part::{PartSettings, WearAxis};
 use crate::config::quantity_limits::QuantityLimits;
@@ -163,52 +164,38 @@ fn require_nothing(schema: &mut serde_json::Value) {
 }
 
 /// `[store]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StoreSettings {
     /// Folder, or bucket address and prefix, of the results. Default `results`.
+    #[default = "results"]
     pub path: String,
 }
 
-impl Default for StoreSettings {
-    fn default() -> Self {
-        Self { path: "results".into() }
-    }
-}
-
 /// `[run]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
     /// Memory of all actuators in progress, MiB. No limit by default.
     pub memory_mib: Option<u64>,
     /// A log that takes longer, s, ends as an error of that log. Default 600.
+    #[default = 600.0]
     pub log_timeout_s: f64,
     /// A log or table that claims more rows is refused. Default 200,000,000.
+    #[default(ingest::bounds::DEFAULT_MAX_ROWS)]
     pub max_rows: u64,
 }
 
-impl Default for RunSettings {
-    fn default() -> Self {
-        Self { memory_mib: None, log_timeout_s: 600.0, max_rows: ingest::bounds::DEFAULT_MAX_ROWS }
-    }
-}
-
 /// `[objects]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectSettings {
     /// A request without a complete answer is repeated after this time, s. Default 30.
+    #[default(object_io::Settings::DEFAULT.timeout.as_secs_f64())]
     pub timeout_s: f64,
     /// A request is not repeated after this time, s. Default 180.
+    #[default(object_io::Settings::DEFAULT.give_up.as_secs_f64())]
     pub give_up_s: f64,
-}
-
-impl Default for ObjectSettings {
-    fn default() -> Self {
-        let object_io::Settings { timeout, give_up } = object_io::Settings::DEFAULT;
-        Self { timeout_s: timeout.as_secs_f64(), give_up_s: give_up.as_secs_f64() }
-    }
 }
 
 impl ObjectSettings {
@@ -250,16 +237,20 @@ pub struct EstimateSettings {
 }
 
 /// `[trend]`: hours are flight hours.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, SmartDefault, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrendSettings {
     /// A limit that may be reached within these flight hours makes state `plan`. Default 500.
+    #[default(defaults().planning_horizon_hours)]
     pub planning_horizon_hours: f64,
     /// A later crossing of the limit is not reported, flight hours. Default 20 000.
+    #[default(defaults().horizon_hours)]
     pub horizon_hours: f64,
     /// Days without a sound record after which a unit is `unassessed`. Default 30.
+    #[default(defaults().stale_after_days)]
     pub stale_after_days: f64,
     /// Flight hours until the next check, for `check_probability`. Default 300.
+    #[default(defaults().check_interval_hours)]
     pub next_check_hours: f64,
     /// Without effect; accepted so that older files load.
     #[serde(skip_serializing)]
@@ -287,22 +278,9 @@ pub enum AsOf {
     NewestRecord,
 }
 
-impl Default for TrendSettings {
-    fn default() -> Self {
-        // The limit is not used.
-        let defaults = trend::Settings::for_limit(1.0);
-        Self {
-            planning_horizon_hours: defaults.planning_horizon_hours,
-            horizon_hours: defaults.horizon_hours,
-            stale_after_days: defaults.stale_after_days,
-            next_check_hours: defaults.check_interval_hours,
-            inspection_risk: None,
-            as_of: AsOf::Now,
-            axis: None,
-            limit_m: None,
-            quantity_limits: QuantityLimits::default(),
-        }
-    }
+/// Defaults of an assessment; their limit is not used.
+fn defaults() -> trend::Settings {
+    trend::Settings::for_limit(1.0)
 }
 
 /// Groups of `identity.path` that hold the departure in two parts.
@@ -341,51 +319,38 @@ impl Document {
         self.part.values().any(|part| part.output.is_locked())
     }
 
-    /// Everything that reads well but cannot be meant, with the numbers that are not plausible in its place.
-    pub(super) fn check(&self, source: &Source<'_>, implausible: Vec<Diagnostic>) -> Vec<Diagnostic> {
-        let mut found = Vec::new();
+    /// Reports everything that reads well but cannot be meant, with the numbers that are not plausible in its place.
+    pub(super) fn check(&self, implausible: Vec<Diagnostic>, faults: &mut Faults<'_>) {
         if self.logs.files.is_empty() {
-            let c = Diagnostic::new("no_logs", "`logs.files` has no pattern")
-                .hint("files = [\"logs/**/*.parquet\"]");
-            found.push(source.at(&["logs", "files"], c));
+            let fault = Diagnostic::new("no_logs", "`logs.files` has no pattern");
+            faults.report(&["logs", "files"], fault.hint("files = [\"logs/**/*.parquet\"]"));
         }
         if matches!(self.store.path.trim(), "" | ".") {
-            let c = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
-            found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
+            let fault = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
+            faults.report(&["store", "path"], fault.hint("path = \"results\""));
         }
-        let has_locked = self.has_locked_part();
-        validate_channels::check(
-            &self.channel,
-            has_locked,
-            &self.layout,
-            &self.group,
-            &["channel"],
-            source,
-            &mut found,
-        );
-        check_clock(&self.clock, &["clock"], source, &mut found);
-        check_layout(&self.layout, &["layout"], source, &mut found);
-        self.check_groups(source, &mut found);
+        faults.within(&["channel"], |faults| validate_channels::check(&self.channel, self, faults));
+        faults.within(&["clock"], |faults| check_clock(&self.clock, faults));
+        faults.within(&["layout"], |faults| check_layout(&self.layout, faults));
+        self.check_groups(faults);
         for text in self.logs.tails.iter().flat_map(|(pattern, tails)| tails.iter().chain([pattern])) {
-            if let Err(e) = Pattern::new(text) {
-                let what = format!("`{text}` is not a valid pattern: {e}");
-                found.push(source.at(&["logs", "tails"], Diagnostic::new("bad_pattern", what)));
-            }
+            faults.pattern(&["logs", "tails"], text, "pattern");
         }
-        self.check_identity(source, &mut found);
-        found.extend(implausible);
-        self.alerts.iter().for_each(|(name, channel)| channel.check(name, source, &mut found));
-        self.check_parts(source, &mut found);
-        found
+        faults.within(&["identity"], |faults| self.check_identity(faults));
+        faults.found.extend(implausible);
+        for (name, channel) in &self.alerts {
+            faults.within(&["alerts", name], |faults| channel.check(name, faults));
+        }
+        self.check_parts(faults);
     }
 
     /// Settings of parts that would have no effect: a watch limit without a limit, an override for a part that is not there.
-    fn check_parts(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+    fn check_parts(&self, faults: &mut Faults<'_>) {
         for (number, part) in &self.part {
             if part.watch_m.is_some() && part.limit_m.or(self.trend.limit_m).is_none() {
-                let c = Diagnostic::new("key_missing", "`watch_m` has no effect without a `limit_m`")
-                    .hint("add `limit_m = …` to the part, or `[trend] limit_m` for all parts");
-                found.push(source.at(&["part", number, "watch_m"], c));
+                let fault = Diagnostic::new("key_missing", "`watch_m` has no effect without a `limit_m`");
+                let hint = "add `limit_m = …` to the part, or `[trend] limit_m` for all parts";
+                faults.report(&["part", number, "watch_m"], fault.hint(hint));
             }
         }
         let numbers = || self.part.keys().map(String::as_str);
@@ -396,34 +361,30 @@ impl Document {
                 let near = near.map(|near| format!("nearest: `{near}`; ")).unwrap_or_default();
                 let what = format!("this override is for part `{name}`, which is not configured");
                 let hint = format!("{near}compare `parts` with the `[part.\"…\"]` tables");
-                found.push(source.at(&["override"], Diagnostic::new("part_unknown", what).hint(hint)));
+                faults.report(&["override"], Diagnostic::new("part_unknown", what).hint(hint));
             }
         }
     }
 
-    fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+    fn check_identity(&self, faults: &mut Faults<'_>) {
         match self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
             Some(Err(e)) => {
                 // The parser prints the expression over several lines; the last one holds the error.
                 let e = e.to_string();
                 let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
                 let what = format!("`identity.path` is not a valid regular expression: {why}");
-                let c = Diagnostic::new("bad_pattern", what)
-                    .hint("such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'");
-                found.push(source.at(&["identity", "path"], c));
+                let hint = "such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'";
+                faults.report(&["path"], Diagnostic::new("bad_pattern", what).hint(hint));
             }
             Some(Ok(regex)) => {
-                let facts = || IdentityField::ALL.iter().map(|fact| fact.as_str());
-                let is_known =
-                    |group: &&str| facts().any(|fact| fact == *group) || DEPARTURE_PARTS.contains(group);
+                let facts: Vec<&str> = IdentityField::ALL.iter().map(|fact| fact.as_str()).collect();
+                let is_known = |group: &&str| facts.contains(group) || DEPARTURE_PARTS.contains(group);
                 for group in regex.capture_names().flatten().filter(|group| !is_known(group)) {
-                    let c = Diagnostic::new(
-                        "unknown_key",
-                        format!("`{group}` in `identity.path` is no fact of a flight"),
-                    );
-                    let all = format!("its facts are {}", facts().collect::<Vec<_>>().join(", "));
-                    let c = with_nearest(c, group, facts(), all);
-                    found.push(source.at(&["identity", "path"], c));
+                    let what = format!("`{group}` in `identity.path` is no fact of a flight");
+                    let all = format!("its facts are {}", facts.join(", "));
+                    let fault =
+                        with_nearest(Diagnostic::new("unknown_key", what), group, facts.iter().copied(), all);
+                    faults.report(&["path"], fault);
                 }
             }
             None => {}
@@ -431,24 +392,25 @@ impl Document {
         if self.identity.by_row && flight_columns(&self.identity).is_empty() {
             let what = "`identity.by_row` needs the columns in which rows name their flight";
             let hint = "such as columns = { tail_number = \"tail\", flight_id = \"flight\" }";
-            found.push(source.at(&["identity", "by_row"], Diagnostic::new("key_missing", what).hint(hint)));
+            faults.report(&["by_row"], Diagnostic::new("key_missing", what).hint(hint));
         }
         if let Some(name) = self.identity.time_zone.as_deref().filter(|name| zone(name).is_err()) {
-            found.push(source.at(&["identity", "time_zone"], no_zone(name)));
+            faults.report(&["time_zone"], no_zone(name));
         }
     }
 
-    fn check_groups(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+    fn check_groups(&self, faults: &mut Faults<'_>) {
         for (name, group) in &self.group {
-            let path = ["group", name.as_str()];
-            if group.files.is_empty() {
-                let c = Diagnostic::new("no_logs", format!("`group.{name}.files` names no file"));
-                found.push(source.at(&path, c.hint("files = [\"loads/**/*.parquet\"]")));
-            }
-            check_layout(&group.layout, &path, source, found);
-            if let Some(clock) = &group.clock {
-                check_clock(clock, &["group", name.as_str(), "clock"], source, found);
-            }
+            faults.within(&["group", name], |faults| {
+                if group.files.is_empty() {
+                    let fault = Diagnostic::new("no_logs", format!("`group.{name}.files` names no file"));
+                    faults.report(&[], fault.hint("files = [\"loads/**/*.parquet\"]"));
+                }
+                check_layout(&group.layout, faults);
+                if let Some(clock) = &group.clock {
+                    faults.within(&["clock"], |faults| check_clock(clock, faults));
+                }
+            });
         }
     }
 }
@@ -461,33 +423,26 @@ fn no_zone(name: &str) -> Diagnostic {
     with_nearest(diagnostic, name, known.iter().map(String::as_str), otherwise)
 }
 
-fn check_layout(layout: &Layout, path: &[&str], source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+fn check_layout(layout: &Layout, faults: &mut Faults<'_>) {
     if layout.name_column.is_some() != layout.value_column.is_some() {
-        let c = Diagnostic::new("key_missing", "`name_column` and `value_column` go together")
-            .hint("name_column = \"parameter\"\nvalue_column = \"value\"");
-        found.push(source.at(path, c));
+        let fault = Diagnostic::new("key_missing", "`name_column` and `value_column` go together");
+        faults.report(&[], fault.hint("name_column = \"parameter\"\nvalue_column = \"value\""));
     }
 }
 
-/// Everything about a clock that cannot be meant.
-pub(super) fn check_clock(
-    clock: &ClockMapping,
-    path: &[&str],
-    source: &Source<'_>,
-    found: &mut Vec<Diagnostic>,
-) {
+/// Reports everything about a clock that cannot be meant.
+pub(super) fn check_clock(clock: &ClockMapping, faults: &mut Faults<'_>) {
     if clock.column.as_deref() == Some("") {
-        let c = Diagnostic::new("empty_name", "`clock.column` names no column")
-            .hint("name it, or delete the key and give `rate_hz`, the rate of evenly spaced rows");
-        found.push(source.at(&[path, &["column"]].concat(), c));
+        let fault = Diagnostic::new("empty_name", "`clock.column` names no column");
+        let hint = "name it, or delete the key and give `rate_hz`, the rate of evenly spaced rows";
+        faults.report(&["column"], fault.hint(hint));
     }
     if clock.column.is_none() && clock.rate_hz.is_none() {
-        let c = Diagnostic::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
-            .hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\"");
-        found.push(source.at(path, c));
+        let fault = Diagnostic::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given");
+        faults.report(&[], fault.hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\""));
     }
     if clock.unit == Some(TimeUnit::Count) && clock.rate_hz.is_none() {
-        let c = Diagnostic::new("no_clock", "a clock in `count` needs `rate_hz`: how fast does it count?");
-        found.push(source.at(&[path, &["unit"]].concat(), c));
+        let what = "a clock in `count` needs `rate_hz`: how fast does it count?";
+        faults.report(&["unit"], Diagnostic::new("no_clock", what));
     }
 }

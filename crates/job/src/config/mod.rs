@@ -2,6 +2,7 @@
 
 pub mod alerts;
 mod document;
+mod faults;
 mod keys;
 mod layers;
 pub mod limits;
@@ -24,6 +25,7 @@ pub use alerts::AlertChannel;
 pub use document::{
     AsOf, Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
+use faults::Faults;
 use layers::{ConfigLayer, Source};
 use overrides::Overrides;
 pub use quantity_limits::QuantityLimits;
@@ -31,7 +33,7 @@ pub use quantity_limits::QuantityLimits;
 use crate::METHOD_VERSION;
 use crate::config::part::{LimitedGap, Part};
 
-/// A checked configuration.
+/// A checked configuration. Its default has no logs and assesses tables that other programs made.
 #[derive(Debug, Clone, Default)]
 pub struct Config {
     /// The file as it was named by the user; several stand with ` + ` between them.
@@ -59,19 +61,14 @@ impl Config {
 
     /// Removal limit of a part, m: its own, or that of `[trend]`.
     pub fn limit_m(&self, part: Option<&PartNumber>) -> Option<f64> {
-        let own = part.and_then(|part| self.parts.get(part)?.limit_m);
+        let own = part.and_then(|part| self.parts.get(part)?.settings.limit_m);
         own.or(self.document.trend.limit_m)
     }
 
     /// The parts whose limits apply to the largest gap along the stroke.
     pub fn parts_by_largest_gap(&self) -> BTreeSet<String> {
-        let is_largest = |part: &Part| part.limit_applies_to == LimitedGap::Largest;
+        let is_largest = |part: &Part| part.settings.limit_applies_to == Some(LimitedGap::Largest);
         self.parts.iter().filter(|(_, part)| is_largest(part)).map(|(number, _)| number.to_string()).collect()
-    }
-
-    /// A configuration without logs: defaults, to assess tables that other programs made.
-    pub fn without_logs() -> Self {
-        Self::default()
     }
 
     /// Reads the configuration as [`Config::read_settings`], and the flights table that it names.
@@ -144,28 +141,22 @@ impl Config {
         let source = Source::parse(&layers).map_err(|diagnostic| vec![*diagnostic])?;
         let implausible = keys::check(&source, &Document::schema())?;
         let document: Document = source.document().map_err(|diagnostic| vec![diagnostic])?;
-        let mut diagnostics = document.check(&source, implausible);
+        let mut faults = Faults::new(&source);
+        document.check(implausible, &mut faults);
         let mut parts = BTreeMap::new();
         for (number, settings) in &document.part {
-            match (PartNumber::new(number), settings.check()) {
-                (Ok(number), Ok(part)) => drop(parts.insert(number, part)),
-                (Err(e), _) => diagnostics.push(source.at(&["part"], Diagnostic::new("empty_name", e))),
-                (_, Err(found)) => diagnostics.extend(
-                    found
-                        .into_iter()
-                        .map(|(key, diagnostic)| source.at(&[&["part", number], key].concat(), diagnostic)),
-                ),
+            let part = faults.within(&["part", number], |faults| settings.check(faults));
+            match PartNumber::new(number) {
+                Ok(number) => parts.extend(part.map(|part| (number, part))),
+                Err(e) => faults.report(&["part"], Diagnostic::new("empty_name", e)),
             }
         }
-        let overrides = Overrides::check(&document, &source);
-        match overrides {
-            Ok(overrides) if diagnostics.is_empty() => {
-                let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Arc::default());
-                Ok(Self { file, folder, document, parts, flights, overrides, layers: layers.into() })
-            }
-            Ok(_) => Err(diagnostics),
-            Err(found) => Err(diagnostics.into_iter().chain(found).collect()),
+        let overrides = Overrides::check(&document, &mut faults);
+        if !faults.found.is_empty() {
+            return Err(faults.found);
         }
+        let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Arc::default());
+        Ok(Self { file, folder, document, parts, flights, overrides, layers: layers.into() })
     }
 
     /// Adds to a diagnostic the line of the configuration that holds a text.

@@ -8,7 +8,7 @@ use records::{Diagnostic, PartNumber, TailNumber};
 use serde::de::DeserializeOwned;
 
 use super::document::{Document, Override, check_clock};
-use super::layers::Source;
+use super::faults::Faults;
 use super::validate_channels;
 
 /// The checked overrides of a configuration, and the mappings that were derived from them.
@@ -53,24 +53,15 @@ impl ValidatedOverride {
 }
 
 impl Overrides {
-    /// Reads the overrides and tries each alone on the rest of the configuration.
-    pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Diagnostic>> {
+    /// Reads the overrides, and reports the faults of each alone on the rest of the configuration.
+    pub(super) fn check(document: &Document, faults: &mut Faults<'_>) -> Self {
         let base = document.mapping();
-        let (mut overrides, mut found) = (Vec::new(), Vec::new());
-        for (number, settings) in document.overrides.iter().enumerate() {
-            match validate(settings) {
-                Ok(one) => {
-                    found.extend(try_alone(&one, number, document, &base, source));
-                    overrides.push(one);
-                }
-                Err(c) => found.push(source.at(&["override"], c)),
-            }
-        }
-        if !found.is_empty() {
-            return Err(found);
-        }
+        let mut overrides: Vec<_> = faults.within(&["override"], |faults| {
+            let numbered = document.overrides.iter().enumerate();
+            numbered.map(|(number, own)| validate(own, number, document, &base, faults)).collect()
+        });
         overrides.extend(locked_parts(document));
-        Ok(Self { base: Arc::new(base), overrides, ..Self::default() })
+        Self { base: Arc::new(base), overrides, ..Self::default() }
     }
 
     /// How the logs of an aircraft are read, or the channels of a part on it.
@@ -142,60 +133,47 @@ fn locked_parts(document: &Document) -> Option<ValidatedOverride> {
     (!one.exact_parts.is_empty()).then_some(one)
 }
 
-fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
-    let pattern = |text: &String| {
-        glob::Pattern::new(text)
-            .map_err(|e| Diagnostic::new("bad_pattern", format!("`{text}` is not a valid name pattern: {e}")))
-    };
-    let patterns = |texts: &[String]| texts.iter().map(pattern).collect::<Result<Vec<_>, _>>();
-    if settings.clock.is_some() && !settings.parts.is_empty() {
-        let what = "an override for parts gives a `clock`, but a log has one clock for all its actuators";
-        return Err(Diagnostic::new("key_of_other_kind", what).hint("give it under `tails` alone"));
-    }
-    if settings.clock.is_none() && settings.channel.is_none() {
-        let what = "an override changes nothing";
-        return Err(Diagnostic::new("key_missing", what).hint("[override.channel.load]\nsign = -1"));
-    }
-    Ok(ValidatedOverride {
-        tails: patterns(&settings.tails)?,
-        parts: patterns(&settings.parts)?,
-        clock: settings.clock.clone().unwrap_or_default(),
-        channel: settings.channel.clone().unwrap_or_default(),
-        ..ValidatedOverride::default()
-    })
-}
-
-fn try_alone(
-    one: &ValidatedOverride,
+/// Tries an override alone, and reports what it cannot mean.
+fn validate(
+    settings: &Override,
     number: usize,
     document: &Document,
     base: &Mapping,
-    source: &Source<'_>,
-) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    let at = |key: &'static str, e: String| {
+    faults: &mut Faults<'_>,
+) -> ValidatedOverride {
+    let mut patterns = |texts: &[String]| {
+        texts.iter().filter_map(|text| faults.pattern(&[], text, "name pattern")).collect()
+    };
+    let one = ValidatedOverride {
+        tails: patterns(&settings.tails),
+        parts: patterns(&settings.parts),
+        clock: settings.clock.clone().unwrap_or_default(),
+        channel: settings.channel.clone().unwrap_or_default(),
+        ..ValidatedOverride::default()
+    };
+    if settings.clock.is_some() && !settings.parts.is_empty() {
+        let what = "an override for parts gives a `clock`, but a log has one clock for all its actuators";
+        let fault = Diagnostic::new("key_of_other_kind", what);
+        faults.report(&[], fault.hint("give it under `tails` alone"));
+    }
+    if settings.clock.is_none() && settings.channel.is_none() {
+        let fault = Diagnostic::new("key_missing", "an override changes nothing");
+        faults.report(&[], fault.hint("[override.channel.load]\nsign = -1"));
+        return one;
+    }
+    let failed = |key: &str, e: String| {
         let what = format!("`{key}` of override {} cannot override `[{key}]`: {e}", number + 1);
-        source.at(&["override"], Diagnostic::new("bad_toml", what))
+        Diagnostic::new("bad_toml", what)
     };
     match merge_into::<Channels>(&base.channels, &one.channel) {
-        Ok(channels) => {
-            validate_channels::check(
-                &channels,
-                document.has_locked_part(),
-                &document.layout,
-                &document.group,
-                &["override"],
-                source,
-                &mut found,
-            );
-        }
-        Err(e) => found.push(at("channel", e)),
+        Ok(channels) => validate_channels::check(&channels, document, faults),
+        Err(e) => faults.report(&[], failed("channel", e)),
     }
     match merge_into::<ClockMapping>(&base.clock, &one.clock) {
-        Ok(clock) => check_clock(&clock, &["override"], source, &mut found),
-        Err(e) => found.push(at("clock", e)),
+        Ok(clock) => check_clock(&clock, faults),
+        Err(e) => faults.report(&[], failed("clock", e)),
     }
-    found
+    one
 }
 
 /// Given keys replace those below; tables are merged key by key.

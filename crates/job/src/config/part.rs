@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
 
+use crate::config::faults::Faults;
 use crate::config::quantity_limits::QuantityLimits;
 use crate::filter_cache::FilterCache;
 
@@ -172,31 +173,11 @@ pub struct Part {
     pub noise: estimator::NoiseModel,
     /// Variances of the filter's initial state, P₀.
     pub initial: estimator::InitialVariances,
-    /// Whether its output is fixed: the relative position is then minus the motor position.
-    pub output_locked: bool,
-    /// Load, positive and negative, at which lost motion is measured, N.
-    pub reference_load_n: Option<f64>,
-    /// Removal limit, m.
-    pub limit_m: Option<f64>,
-    /// Alert level, m.
-    pub watch_m: Option<f64>,
-    /// The gap that its limits apply to.
-    pub limit_applies_to: LimitedGap,
+    /// The settings that need no conversion: output, reference load and limits.
+    pub settings: PartSettings,
     /// Gain schedules of its logs, as far as they have been found.
     pub filters: FilterCache,
-    /// What wear follows, where that is known.
-    pub axis: Option<WearAxis>,
-    /// What a unit at its limit asks for.
-    pub at_limit: AtLimit,
-    /// Changes of its other followed quantities from which there is a state, as far as they are its own.
-    pub quantity_limits: QuantityLimits,
 }
-
-/// A key below the part's table.
-type Key = &'static [&'static str];
-
-/// A key below the part's table, and what is wrong with it.
-pub(crate) type SettingError = (Key, Diagnostic);
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -213,111 +194,97 @@ impl PartSettings {
         }
     }
 
-    /// Brings the settings to the screw axis.
-    ///
-    /// # Errors
-    /// Every key that is missing, out of place or cannot be.
-    pub(crate) fn check(&self) -> Result<Part, Vec<SettingError>> {
-        let mut keys = SettingsValidator::default();
-        self.check_kind(&mut keys);
+    /// Brings the settings to the screw axis, and reports every key that is missing, out of place or cannot be.
+    pub(crate) fn check(&self, faults: &mut Faults<'_>) -> Option<Part> {
+        self.check_kind(faults);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
-            let c = Diagnostic::new("limit_order", what).hint("set `watch_m` below `limit_m`");
-            keys.report(&["watch_m"], c);
+            let fault = Diagnostic::new("limit_order", what);
+            faults.report(&["watch_m"], fault.hint("set `watch_m` below `limit_m`"));
         }
-        let noise = self.check_noise(&mut keys);
-        let actuator = self.actuator(&mut keys);
-        match (actuator, noise, keys.found.is_empty()) {
-            (Some((actuator, geometry)), Some(noise), true) => Ok(Part {
-                actuator,
-                geometry,
-                noise,
-                initial: self.noise.as_ref().map(NoiseSettings::initial).unwrap_or_default(),
-                output_locked: self.output.is_locked(),
-                reference_load_n: self.reference_load_n,
-                limit_m: self.limit_m,
-                watch_m: self.watch_m,
-                limit_applies_to: self.limit_applies_to.unwrap_or_default(),
-                filters: FilterCache::default(),
-                axis: self.axis,
-                at_limit: self.at_limit.unwrap_or_default(),
-                quantity_limits: self.quantity_limits.unwrap_or_default(),
-            }),
-            _ => Err(keys.found),
-        }
+        let noise = self.check_noise(faults);
+        let (actuator, geometry) = self.actuator(faults)?;
+        Some(Part {
+            actuator,
+            geometry,
+            noise: noise?,
+            initial: self.noise.as_ref().map(NoiseSettings::initial).unwrap_or_default(),
+            settings: self.clone(),
+            filters: FilterCache::default(),
+        })
     }
 
     /// Stiffness, damping, mass or inertia, and lead or reference radius of a kind of part, each with its key.
-    fn keys_of(&self, kind: Kind) -> [(Key, Option<f64>); 4] {
+    fn keys_of(&self, kind: Kind) -> [(&'static str, Option<f64>); 4] {
         match kind {
             Kind::Linear => [
-                (&["stiffness_n_per_m"], self.stiffness_n_per_m),
-                (&["damping_n_s_per_m"], self.damping_n_s_per_m),
-                (&["screw_mass_kg"], self.screw_mass_kg),
-                (&["lead_m_per_rev"], self.lead_m_per_rev),
+                ("stiffness_n_per_m", self.stiffness_n_per_m),
+                ("damping_n_s_per_m", self.damping_n_s_per_m),
+                ("screw_mass_kg", self.screw_mass_kg),
+                ("lead_m_per_rev", self.lead_m_per_rev),
             ],
             Kind::Rotary => [
-                (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
-                (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
-                (&["inertia_kg_m2"], self.inertia_kg_m2),
-                (&["reference_radius_m"], self.reference_radius_m),
+                ("stiffness_nm_per_rad", self.stiffness_nm_per_rad),
+                ("damping_nm_s_per_rad", self.damping_nm_s_per_rad),
+                ("inertia_kg_m2", self.inertia_kg_m2),
+                ("reference_radius_m", self.reference_radius_m),
             ],
         }
     }
 
     /// A key of the other kind is a misunderstanding, not a spare.
-    fn check_kind(&self, keys: &mut SettingsValidator) {
+    fn check_kind(&self, faults: &mut Faults<'_>) {
         let (other, kind) = match self.kind {
             Kind::Linear => (Kind::Rotary, "linear"),
             Kind::Rotary => (Kind::Linear, "rotary"),
         };
         for (key, _) in self.keys_of(other).into_iter().filter(|(_, value)| value.is_some()) {
-            let what = format!("`{}` is not a key of a {kind} part", key[0]);
-            let hint = "`kind` is \"linear\" (default) or \"rotary\"";
-            keys.report(key, Diagnostic::new("key_of_other_kind", what).hint(hint));
+            let fault =
+                Diagnostic::new("key_of_other_kind", format!("`{key}` is not a key of a {kind} part"));
+            faults.report(&[key], fault.hint("`kind` is \"linear\" (default) or \"rotary\""));
         }
     }
 
-    fn actuator(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
+    fn actuator(&self, faults: &mut Faults<'_>) -> Option<(estimator::ActuatorModel, Geometry)> {
         let [stiffness, damping, mass, lead_or_radius] = self.keys_of(self.kind);
-        let [k, f, m] = [stiffness, damping, mass].map(|(key, value)| keys.required(key, value));
+        let [k, f, m] = [stiffness, damping, mass].map(|(key, value)| required(faults, &[key], value));
         let (model, geometry) = match self.kind {
             Kind::Linear => (
                 estimator::ActuatorModel::linear(k?, f?, m?),
                 Geometry::Linear { lead_m_per_rev: lead_or_radius.1 },
             ),
             Kind::Rotary => {
-                let reference_radius_m = keys.required(lead_or_radius.0, lead_or_radius.1)?;
+                let reference_radius_m = required(faults, &[lead_or_radius.0], lead_or_radius.1)?;
                 let model = estimator::ActuatorModel::rotary(k?, f?, m?, reference_radius_m);
                 (model, Geometry::Rotary { reference_radius_m })
             }
         };
-        let model = model.map_err(|e| keys.report(stiffness.0, Diagnostic::new("bad_parameter", e)));
+        let model = model.map_err(|e| faults.report(&[stiffness.0], Diagnostic::new("bad_parameter", e)));
         Some((model.ok()?, geometry))
     }
 
-    fn check_noise(&self, keys: &mut SettingsValidator) -> Option<estimator::NoiseModel> {
+    fn check_noise(&self, faults: &mut Faults<'_>) -> Option<estimator::NoiseModel> {
         let Some(noise) = &self.noise else {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
             let what = "the part has no `noise`, and there are no default levels";
-            keys.report(&[], Diagnostic::new("key_missing", what).hint(hint));
+            faults.report(&[], Diagnostic::new("key_missing", what).hint(hint));
             return None;
         };
+        let mut level = |key, value| required(faults, &["noise", key], value);
         match noise.model {
-            NoiseModel::Sensors => noise.sensors(self, keys).map(estimator::NoiseModel::Sensors),
+            NoiseModel::Sensors => noise.sensors(self, faults).map(estimator::NoiseModel::Sensors),
             NoiseModel::PerStep => {
-                let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
-                let w_d = keys.required(&["noise", "w_d"], noise.w_d)?;
+                let v_d_m2 = level("v_d_m2", noise.v_d_m2);
+                let w_d = required(faults, &["noise", "w_d"], noise.w_d)?;
                 Some(estimator::NoiseModel::PerStep {
                     w_d: nalgebra::Matrix3::from_fn(|i, j| w_d[i][j]),
                     v_d_m2: v_d_m2?,
                 })
             }
             NoiseModel::Continuous => {
-                let force = keys.required(&["noise", "force_psd_n2_s"], noise.force_psd_n2_s);
-                let rate =
-                    keys.required(&["noise", "backlash_rate_psd_m2_per_s"], noise.backlash_rate_psd_m2_per_s);
-                let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
+                let force = level("force_psd_n2_s", noise.force_psd_n2_s);
+                let rate = level("backlash_rate_psd_m2_per_s", noise.backlash_rate_psd_m2_per_s);
+                let v_d_m2 = level("v_d_m2", noise.v_d_m2);
                 Some(estimator::NoiseModel::Continuous {
                     force_psd_n2_s: force?,
                     backlash_rate_psd_m2_per_s: rate?,
@@ -341,34 +308,35 @@ impl NoiseSettings {
     }
 
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
-    fn sensors(&self, part: &PartSettings, keys: &mut SettingsValidator) -> Option<SensorNoise> {
-        let bandwidth_hz = keys.required(&["noise", "bandwidth_hz"], self.bandwidth_hz);
+    fn sensors(&self, part: &PartSettings, faults: &mut Faults<'_>) -> Option<SensorNoise> {
+        let bandwidth_hz = required(faults, &["noise", "bandwidth_hz"], self.bandwidth_hz);
         let none = Some(0.0);
         let (radius, levels) = match part.kind {
             Kind::Linear => (
                 1.0,
                 [
-                    keys.required(&["noise", "screw_rms_m"], self.screw_rms_m),
-                    self.screw_resolution_m.or(none),
-                    keys.required(&["noise", "motor_rms_m"], self.motor_rms_m),
-                    self.motor_resolution_m.or(none),
-                    keys.required(&["noise", "unknown_force_n"], self.unknown_force_n),
+                    ("screw_rms_m", self.screw_rms_m),
+                    ("screw_resolution_m", self.screw_resolution_m.or(none)),
+                    ("motor_rms_m", self.motor_rms_m),
+                    ("motor_resolution_m", self.motor_resolution_m.or(none)),
+                    ("unknown_force_n", self.unknown_force_n),
                 ],
             ),
             Kind::Rotary => (
                 part.reference_radius_m.unwrap_or(1.0),
                 [
-                    keys.required(&["noise", "screw_rms_rad"], self.screw_rms_rad),
-                    self.screw_resolution_rad.or(none),
-                    keys.required(&["noise", "motor_rms_rad"], self.motor_rms_rad),
-                    self.motor_resolution_rad.or(none),
-                    keys.required(&["noise", "unknown_torque_nm"], self.unknown_torque_nm),
+                    ("screw_rms_rad", self.screw_rms_rad),
+                    ("screw_resolution_rad", self.screw_resolution_rad.or(none)),
+                    ("motor_rms_rad", self.motor_rms_rad),
+                    ("motor_resolution_rad", self.motor_resolution_rad.or(none)),
+                    ("unknown_torque_nm", self.unknown_torque_nm),
                 ],
             ),
         };
+        let levels = levels.map(|(key, level)| required(faults, &["noise", key], level));
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");
-            keys.report(&["noise"], Diagnostic::new("bad_parameter", what));
+            faults.report(&["noise"], Diagnostic::new("bad_parameter", what));
         }
         let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
         Some(SensorNoise {
@@ -382,23 +350,12 @@ impl NoiseSettings {
     }
 }
 
-/// Collects diagnostics about keys.
-#[derive(Default)]
-struct SettingsValidator {
-    found: Vec<SettingError>,
-}
-
-impl SettingsValidator {
-    fn report(&mut self, key: Key, diagnostic: Diagnostic) {
-        self.found.push((key, diagnostic));
+/// The value of a key that a part must have; a missing one is reported.
+fn required<T>(faults: &mut Faults<'_>, key: &[&str], value: Option<T>) -> Option<T> {
+    if value.is_none() {
+        let name = key.join(".");
+        let hint = format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)");
+        faults.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")).hint(hint));
     }
-
-    fn required<T>(&mut self, key: Key, value: Option<T>) -> Option<T> {
-        if value.is_none() {
-            let name = key.join(".");
-            let hint = format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)");
-            self.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")).hint(hint));
-        }
-        value
-    }
+    value
 }

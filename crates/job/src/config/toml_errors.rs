@@ -58,20 +58,3 @@ fn other_type(message: &str) -> Option<Diagnostic> {
         None => diagnostic,
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The sentences are the TOML reader's own: were they to change, only the wording would fall back.
-    #[test]
-    fn the_readers_sentences_are_put_in_words_of_the_file() {
-        let unit = diagnostic("unknown variant `degre`, expected one of `m`, `deg`, `rad`");
-        assert_eq!(unit.message, "unknown value or key `degre`");
-        assert_eq!(unit.hint.as_deref(), Some("`deg`? It can be `m`, `deg`, `rad`"));
-        let number = diagnostic("invalid type: string \"8 kg\", expected f64");
-        assert_eq!(number.message, "expected a number, found string \"8 kg\"");
-        assert_eq!(diagnostic("missing field `files`").message, "`files` is missing");
-        assert_eq!(diagnostic("something else").message, "something else");
-    }
-}

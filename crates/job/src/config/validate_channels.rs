@@ -4,60 +4,49 @@ use std::collections::BTreeMap;
 
 use ingest::mapping::column_pattern::PLACEHOLDER;
 use ingest::mapping::units::Dimension;
-use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
+use ingest::{ChannelMapping, Channels, SampleFilter};
 use records::Diagnostic;
 
+use super::document::Document;
+use super::faults::Faults;
 use super::keys::with_nearest;
-use super::layers::Source;
 
-/// Every diagnostic about the channels, each at its key.
-pub(super) fn check(
-    channels: &Channels,
-    has_locked_part: bool,
-    layout: &Layout,
-    groups: &BTreeMap<String, GroupMapping>,
-    path: &[&str],
-    source: &Source<'_>,
-    found: &mut Vec<Diagnostic>,
-) {
-    let mut report = |keys: &[&str], c: Diagnostic| {
-        let whole: Vec<&str> = path.iter().chain(keys).copied().collect();
-        found.push(source.at(&whole, c));
-    };
+/// Reports every fault of the channels, each at its key.
+pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Faults<'_>) {
     let mut columns: BTreeMap<(&str, Option<&str>), &str> = BTreeMap::new();
     for (name, channel, wanted) in named(channels) {
-        for (key, c) in diagnostics(name, channel, wanted, layout, groups) {
-            report(&[name, key], c);
-        }
-        for choice in channel.choices().filter(|choice| !choice.column.is_empty()) {
-            if let Some(other) = columns.insert((&choice.column, choice.group.as_deref()), name) {
-                let what = format!("`{}` is mapped to both {other} and {name}", choice.column);
-                let what = if other == name {
-                    format!("`{}` is mapped to {name} twice", choice.column)
-                } else {
-                    what
-                };
-                let c = Diagnostic::new("column_twice", what).hint("two channels cannot share a column");
-                report(&[name, "column"], c);
+        faults.within(&[name], |faults| {
+            channel.choices().for_each(|choice| check_choice(name, choice, wanted, document, faults));
+            if channel.alternatives.iter().any(|a| !a.alternatives.is_empty()) {
+                let what = format!("an alternative of `channel.{name}` has alternatives of its own");
+                let fault = Diagnostic::new("bad_pattern", what);
+                faults.report(&["alternatives"], fault.hint("list them all in one row, best first"));
             }
-        }
+            for choice in channel.choices().filter(|choice| !choice.column.is_empty()) {
+                let column = &choice.column;
+                let what = match columns.insert((column, choice.group.as_deref()), name) {
+                    None => continue,
+                    Some(other) if other == name => format!("`{column}` is mapped to {name} twice"),
+                    Some(other) => format!("`{column}` is mapped to both {other} and {name}"),
+                };
+                let fault = Diagnostic::new("column_twice", what);
+                faults.report(&["column"], fault.hint("two channels cannot share a column"));
+            }
+        });
     }
-    for condition in &channels.when {
-        for c in conditions(condition, groups) {
-            report(&["when"], c);
-        }
-    }
+    channels.when.iter().for_each(|condition| check_condition(condition, document, faults));
     match (&channels.screw_position, &channels.relative_position) {
-        (None, None) if has_locked_part || channels.output.is_locked() => {}
+        (None, None) if document.has_locked_part() || channels.output.is_locked() => {}
         (None, None) => {
             let what = "neither `screw_position` nor `relative_position` is mapped";
-            report(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\""));
+            let hint =
+                "[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\"";
+            faults.report(&[], Diagnostic::new("key_missing", what).hint(hint));
         }
         (Some(_), Some(_)) => {
             let what = "both `screw_position` and `relative_position` are mapped";
-            let c = Diagnostic::new("key_of_other_kind", what)
-                .hint("the relative position is screw − motor: map one of them");
-            report(&["relative_position"], c);
+            let hint = "the relative position is screw − motor: map one of them";
+            faults.report(&["relative_position"], Diagnostic::new("key_of_other_kind", what).hint(hint));
         }
         _ => {}
     }
@@ -76,66 +65,57 @@ fn named(channels: &Channels) -> impl Iterator<Item = (&'static str, &ChannelMap
     .filter_map(|(name, channel, wanted)| Some((name, channel?, wanted)))
 }
 
-fn diagnostics(
+/// Reports every fault of a channel, or of one of its alternatives.
+fn check_choice(
     name: &str,
     channel: &ChannelMapping,
     wanted: [Dimension; 2],
-    layout: &Layout,
-    groups: &BTreeMap<String, GroupMapping>,
-) -> Vec<(&'static str, Diagnostic)> {
-    let mut found: Vec<_> =
-        channel.choices().flat_map(|choice| one(name, choice, wanted, layout, groups)).collect();
-    if channel.alternatives.iter().any(|a| !a.alternatives.is_empty()) {
-        let what = format!("an alternative of `channel.{name}` has alternatives of its own");
-        found.push((
-            "alternatives",
-            Diagnostic::new("bad_pattern", what).hint("list them all in one row, best first"),
-        ));
+    document: &Document,
+    faults: &mut Faults<'_>,
+) {
+    let column = &channel.column;
+    let dimension = channel.unit.dimension();
+    if !wanted.contains(&dimension) {
+        let [one, other] = wanted.map(Dimension::as_str);
+        let needed = if one == other { one.to_owned() } else { format!("{one} or {other}") };
+        let what =
+            format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
+        let fault = Diagnostic::new("unit_contradicts", what);
+        faults.report(&["unit"], fault.hint(format!("it needs a unit of {needed}")));
     }
-    found
-}
-
-fn one(
-    name: &str,
-    channel: &ChannelMapping,
-    wanted: [Dimension; 2],
-    layout: &Layout,
-    groups: &BTreeMap<String, GroupMapping>,
-) -> Vec<(&'static str, Diagnostic)> {
-    let mut found = Vec::new();
-    found.extend(wrong_unit(name, channel, wanted).map(|c| ("unit", c)));
-    if channel.column.trim().is_empty() {
-        found.push(("column", Diagnostic::new("empty_name", format!("`channel.{name}` names no column"))));
+    let mut report = |key: &str, code: &str, what: String| faults.report(&[key], Diagnostic::new(code, what));
+    if column.trim().is_empty() {
+        report("column", "empty_name", format!("`channel.{name}` names no column"));
     }
-    if channel.column.matches(PLACEHOLDER).count() > 1 {
-        let what = format!("`{}` holds {PLACEHOLDER} more than once", channel.column);
-        found.push(("column", Diagnostic::new("bad_pattern", what)));
+    if column.matches(PLACEHOLDER).count() > 1 {
+        report("column", "bad_pattern", format!("`{column}` holds {PLACEHOLDER} more than once"));
     }
-    if layout.position_column.is_some() && channel.group.is_none() && channel.column.contains(PLACEHOLDER) {
-        let what = format!(
-            "`{}` contains {PLACEHOLDER}, but `layout.position_column` already gives the position",
-            channel.column
-        );
-        found.push(("column", Diagnostic::new("bad_pattern", what)));
+    let has_position_column = document.layout.position_column.is_some() && channel.group.is_none();
+    if has_position_column && column.contains(PLACEHOLDER) {
+        let what = "but `layout.position_column` already gives the position";
+        report("column", "bad_pattern", format!("`{column}` contains {PLACEHOLDER}, {what}"));
     }
     if !matches!(channel.sign, 1 | -1) {
-        let what = format!("`sign` is {}, which must be 1 or -1", channel.sign);
-        found.push(("sign", Diagnostic::new("bad_sign", what)));
+        report("sign", "bad_sign", format!("`sign` is {}, which must be 1 or -1", channel.sign));
     }
     if channel.scale == 0.0 || !channel.scale.is_finite() {
         let what = format!("`scale` is {}, which would make every value the same", channel.scale);
-        found.push(("scale", Diagnostic::new("bad_scale", what)));
+        report("scale", "bad_scale", what);
     }
-    found.extend(status_bits(channel).map(|c| ("valid_bits", c)));
+    if let Some(fault) = status_bits(channel) {
+        faults.report(&["valid_bits"], fault);
+    }
     for (key, value) in
         [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
     {
         if !value.is_finite() {
-            found.push((key, Diagnostic::new("bad_parameter", format!("`{key}` is {value}, not a number"))));
+            let what = format!("`{key}` is {value}, not a number");
+            faults.report(&[key], Diagnostic::new("bad_parameter", what));
         }
     }
-    found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
-    found
+    if let Some(fault) = unknown_group(name, channel.group.as_ref(), document) {
+        faults.report(&["group"], fault);
+    }
 }
 
 /// Bits of a status word that no word can have, or that no column holds.
@@ -158,56 +138,33 @@ fn status_bits(channel: &ChannelMapping) -> Option<Diagnostic> {
     Some(Diagnostic::new("bad_parameter", what).hint(hint))
 }
 
-fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Option<Diagnostic> {
-    let dimension = channel.unit.dimension();
-    if wanted.contains(&dimension) {
-        return None;
-    }
-    let words: Vec<&str> = if wanted[0] == wanted[1] {
-        vec![wanted[0].as_str()]
-    } else {
-        wanted.map(Dimension::as_str).to_vec()
-    };
-    let what = format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
-    Some(Diagnostic::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or "))))
-}
-
-/// What a condition asks and cannot mean.
-fn conditions(condition: &SampleFilter, groups: &BTreeMap<String, GroupMapping>) -> Vec<Diagnostic> {
+/// Reports what a condition asks and cannot mean.
+fn check_condition(condition: &SampleFilter, document: &Document, faults: &mut Faults<'_>) {
     let column = &condition.column;
-    let mut found = Vec::new();
+    let mut report = |fault: Diagnostic| faults.report(&["when"], fault);
     if column.trim().is_empty() {
-        found.push(Diagnostic::new("empty_name", "a condition of `channel.when` names no column"));
+        report(Diagnostic::new("empty_name", "a condition of `channel.when` names no column"));
     }
     if !condition.has_condition() {
         let what = format!("the condition on `{column}` asks nothing of it");
-        found.push(Diagnostic::new("key_missing", what).hint("equals = [1]"));
+        report(Diagnostic::new("key_missing", what).hint("equals = [1]"));
     }
-    if let Some((least, most)) =
-        condition.at_least.zip(condition.at_most).filter(|(least, most)| least > most)
-    {
+    let bounds = condition.at_least.zip(condition.at_most);
+    if let Some((least, most)) = bounds.filter(|(least, most)| least > most) {
         let what = format!("`at_least` {least} is above `at_most` {most}: no value of `{column}` matches");
-        found.push(Diagnostic::new("bad_parameter", what));
+        report(Diagnostic::new("bad_parameter", what));
     }
     if let Some(margin_s) = condition.margin_s.filter(|s| !(s.is_finite() && *s >= 0.0)) {
         let what = format!("`margin_s` of the condition on `{column}` is {margin_s}");
-        found.push(Diagnostic::new("bad_parameter", what).hint("seconds, zero or more"));
+        report(Diagnostic::new("bad_parameter", what).hint("seconds, zero or more"));
     }
-    let map = ChannelMapping { group: condition.group.clone(), ..ChannelMapping::default() };
-    found.extend(unknown_group("when", &map, groups));
-    found
+    unknown_group("when", condition.group.as_ref(), document).into_iter().for_each(report);
 }
 
-fn unknown_group(
-    name: &str,
-    channel: &ChannelMapping,
-    groups: &BTreeMap<String, GroupMapping>,
-) -> Option<Diagnostic> {
-    let group = channel.group.as_ref().filter(|group| !groups.contains_key(*group))?;
-    let c = Diagnostic::new(
-        "unknown_key",
-        format!("`channel.{name}` names group `{group}`, and there is no `[group.{group}]`"),
-    );
+fn unknown_group(name: &str, group: Option<&String>, document: &Document) -> Option<Diagnostic> {
+    let group = group.filter(|group| !document.group.contains_key(*group))?;
+    let what = format!("`channel.{name}` names group `{group}`, and there is no `[group.{group}]`");
     let otherwise = format!("[group.{group}]\nfiles = [\"…\"]");
-    Some(with_nearest(c, group, groups.keys().map(String::as_str), otherwise))
+    let known = document.group.keys().map(String::as_str);
+    Some(with_nearest(Diagnostic::new("unknown_key", what), group, known, otherwise))
 }

@@ -45,7 +45,7 @@ fn the_logs_of_a_locked_output_need_no_screw_position() {
     let config = parse(&without.replace("[part.A]\n", "[part.A]\noutput = \"locked\"\n"));
     let opened = open("A_nominal", &config).unwrap();
     let part = flight_log::part_of(&config, &PartNumber::new("A").unwrap()).unwrap();
-    assert!(part.output_locked);
+    assert!(part.settings.output.is_locked());
     let at = opened.actuators(&installations()).next().unwrap();
     let channels = opened.channels(at, part).unwrap();
     let is_minus_motor = |(dx, motor): (&f64, &f64)| dx.to_bits() == (0.0 - motor).to_bits();

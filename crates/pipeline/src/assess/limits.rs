@@ -43,7 +43,8 @@ impl<'a> Limits<'a> {
 
     /// Configured usage axis of a part's wear; nothing where its histories decide.
     pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
-        let configured = self.part(part).and_then(|p| p.axis).or(self.config.document.trend.axis)?;
+        let configured =
+            self.part(part).and_then(|part| part.settings.axis).or(self.config.document.trend.axis)?;
         Some(match configured {
             WearAxis::Hours => UsageAxis::Hours,
             WearAxis::Flights => UsageAxis::Flights,
@@ -65,13 +66,13 @@ impl<'a> Limits<'a> {
     /// The gap that the limit of a part applies to: `largest` along the stroke, or its `mean`; none without a limit.
     pub(crate) fn applies_to(self, part: Option<&str>) -> Option<&'static str> {
         self.stated_m(part)?;
-        let applies_to = self.part(part).map(|part| part.limit_applies_to).unwrap_or_default();
-        Some(if applies_to == LimitedGap::Largest { "largest" } else { "mean" })
+        let applies_to = self.part(part).and_then(|part| part.settings.limit_applies_to);
+        Some(if applies_to == Some(LimitedGap::Largest) { "largest" } else { "mean" })
     }
 
     /// What a unit of a part whose gap is at its limit asks for: a replacement where the part says nothing.
     pub(crate) fn at_limit(self, part: Option<&str>) -> Action {
-        match self.part(part).map(|part| part.at_limit) {
+        match self.part(part).and_then(|part| part.settings.at_limit) {
             Some(AtLimit::Inspect) => Action::Inspect,
             _ => Action::Replace,
         }
@@ -79,22 +80,21 @@ impl<'a> Limits<'a> {
 
     /// Changes from which other quantities than the gap have a state.
     pub(crate) fn quantities(self, part: Option<&str>) -> QuantityLimits {
-        let of_part = self.part(part).map(|p| p.quantity_limits).unwrap_or_default();
+        let of_part = self.part(part).and_then(|part| part.settings.quantity_limits).unwrap_or_default();
         of_part.or(self.config.document.trend.quantity_limits)
     }
 
     /// Configuration of a part.
     fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
-        number
-            .and_then(|number| PartNumber::new(number).ok())
-            .and_then(|number| self.config.parts.get(&number))
+        let number = PartNumber::new(number?).ok()?;
+        self.config.parts.get(&number)
     }
 
     /// Trend settings of a part's units. Without a limit there is a level and a rate, but no crossing and no state.
     pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
         let of = &self.config.document.trend;
         let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(self.scale_m));
-        let watch_m = self.part(part).and_then(|p| p.watch_m).unwrap_or(base.watch_m);
+        let watch_m = self.part(part).and_then(|part| part.settings.watch_m).unwrap_or(base.watch_m);
         trend::Settings {
             // A part's own may lie above a limit that is everybody's.
             watch_m: watch_m.min(base.limit_m),

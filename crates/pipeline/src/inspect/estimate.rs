@@ -5,7 +5,7 @@ use std::path::Path;
 use ingest::LogFiles;
 use ingest::log::in_memory::ChannelArrays;
 use job::Config;
-use job::flight_log::{FlightLog, catch_panic, estimate_unidentified, part_of};
+use job::flight_log::{FlightLog, catch_panic, for_each_actuator, part_of};
 use records::row_schema::Row;
 use records::{Diagnostic, GapEstimate, GapRecord, Installations, PartNumber, Position};
 
@@ -71,13 +71,18 @@ fn as_part(
     number: &PartNumber,
     program_version: &str,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let found = estimate_unidentified(&LogFiles::one(path), log_path, config, part_of(config, number)?)?;
-    let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
-        position: Some(position.to_string()),
-        log_path: Some(log_path.to_owned()),
-        ..unidentified(estimate, config, number, program_version)
-    };
-    Ok(found.into_iter().map(row).collect())
+    let (files, none) = (LogFiles::one(path), Installations::default());
+    let mut rows = Vec::new();
+    for_each_actuator(&files, log_path, config, &none, Some(number), |channels, part| {
+        let estimate = job::estimate::estimate(channels, part, &config.document.estimate)?;
+        rows.push(EstimateRow {
+            position: Some(channels.position.to_string()),
+            log_path: Some(log_path.to_owned()),
+            ..unidentified(estimate, config, number, program_version)
+        });
+        Ok(())
+    })?;
+    Ok(rows)
 }
 
 fn as_installed(

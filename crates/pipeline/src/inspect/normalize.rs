@@ -30,7 +30,8 @@ pub fn normalize(
     config: &Config,
     installations: &Installations,
     logs: &[(LogFiles, String)],
-    (folder, encoding): (&Path, Encoding),
+    folder: &Path,
+    encoding: Encoding,
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Normalized, Error> {
@@ -38,9 +39,9 @@ pub fn normalize(
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
     let claims: Mutex<BTreeMap<PathBuf, String>> = Mutex::default();
     let one = |(files, log_path): &(LogFiles, String)| {
-        let place = (folder, encoding);
         let claim = |file: &Path, digest: &str| claimed(&claims, file, log_path, digest);
-        let done = job::normalize::normalize(files, log_path, config, installations, place, &claim);
+        let done =
+            job::normalize::normalize(files, log_path, config, installations, folder, encoding, &claim);
         let done = done.unwrap_or_else(|diagnostic| (Vec::new(), vec![diagnostic]));
         let (log, diagnostics) = (log_path.clone(), done.1.clone());
         watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, diagnostics });

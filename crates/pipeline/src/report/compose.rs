@@ -163,7 +163,7 @@ impl ReportComposer<'_> {
                 .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
             forecast: forecast(drawn, &row),
-            watch_m: part.and_then(|part| self.config.parts.get(&part)?.watch_m),
+            watch_m: part.and_then(|part| self.config.parts.get(&part)?.settings.watch_m),
             state_day_before: before
                 .filter(|row| row.gap_m.is_some())
                 .map(|row| row.state.map(str::to_owned)),

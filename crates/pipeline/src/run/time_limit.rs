@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn work_that_never_ends_and_work_that_panics_are_errors_of_their_log() {
-        let mut config = Config::without_logs();
+        let mut config = Config::default();
         assert_eq!(within_time_limit("a", &config, || Ok(7)).unwrap(), 7);
         config.document.run.log_timeout_s = 0.05;
         let endless = within_time_limit::<()>("b", &config, || {

@@ -138,8 +138,8 @@ def estimate_arrays(
 
     ``time_s`` counts from any zero, ``motor_m`` is the motor's position brought to the screw axis in m (angle times
     lead / 2 pi), ``screw_m`` the screw's position, ``load_n`` the load; ``part`` names a part number of
-    the configuration. Each is anything that speaks Arrow's interface, a numpy array, or a sequence of numbers;
-    ``float64`` in one piece is read without copying. NaN and null are missing readings.
+    the configuration. Each is anything that numpy reads: its own arrays, columns of pyarrow, Polars and pandas,
+    sequences of numbers. ``float64`` in one piece is read without copying. NaN and null are missing readings.
 
     >>> import freeplay_ema as fp, numpy as np, pyarrow as pa
     >>> t = np.arange(0, 100, 0.01)
@@ -192,7 +192,7 @@ def trend(
     True
     """
     judging = _judging(estimates, config, limit_m)
-    return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries)
+    return _freeplay.trend(estimates, judging, [tail, serial, part], _text(as_of), queries)
 
 
 def records(
@@ -273,7 +273,7 @@ def quantities(
 
     The rows are those of ``freeplay trend --quantities``.
     """
-    return _freeplay.quantities(load(config), [tail, serial, part], _text(as_of))
+    return _freeplay.followed(load(config), [tail, serial, part], _text(as_of), False)
 
 
 def changes(
@@ -285,7 +285,7 @@ def changes(
     as_of: Instant | None = None,
 ) -> Table:
     """What changed on units, tails and parts, with the evidence: the rows of ``freeplay trend --changes``."""
-    return _freeplay.changes(load(config), [tail, serial, part], _text(as_of))
+    return _freeplay.followed(load(config), [tail, serial, part], _text(as_of), True)
 
 
 def backtest(

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use job::Config;
-use job::part_identification::IdentifiedParams;
+use job::part_identification::{IdentifiedParams, ParamComparison};
 use pipeline::inspect::check::{ChannelCheck, LogCheck, RATIO, check_logs};
 use pipeline::logs::discover::{self, NamedLog};
 use records::uncertainty::NORMAL_95;
@@ -217,24 +217,21 @@ fn drift(logs: &[LogCheck]) -> String {
 
 /// Compares the parameters identified from the logs with the configured ones, by part number.
 fn proposals(facts: &BTreeMap<PartNumber, Vec<IdentifiedParams>>, config: &Config) -> String {
-    let columns = [text("key", 0), number("identified (± 90 %)", 0), number("configured", 0)];
+    let uncertainty =
+        |p: &ParamComparison| p.uncertainty.map(|v| format!(" ± {:.1e}", NORMAL_95 * v)).unwrap_or_default();
+    let columns: &table::Columns<'_, ParamComparison> = &[
+        (text("key", 0), &|p| p.key.to_owned()),
+        (number("identified (± 90 %)", 0), &|p| format!("{:.2e}{}", p.identified, uncertainty(p))),
+        (number("configured", 0), &|p| p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"))),
+    ];
     let mut page = String::new();
     for (number, all) in facts {
         let Some(part) = config.parts.get(number) else { continue };
         let proposals = IdentifiedParams::medians(all).comparisons(part);
-        let rows: Vec<Vec<String>> = proposals
-            .iter()
-            .map(|p| {
-                let stated = p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-                let uncertainty =
-                    p.uncertainty.map_or_else(String::new, |v| format!(" ± {:.1e}", NORMAL_95 * v));
-                vec![p.key.to_owned(), format!("{:.2e}{uncertainty}", p.identified), stated]
-            })
-            .collect();
         let flights = table::count(all.len(), "actuator-flight");
         let number = escape(number.as_str());
         let _ = writeln!(page, "part {number}, identified from {flights} (prefer data-sheet values)");
-        page.push_str(&table::layout(&columns, &rows));
+        page.push_str(&table::of(&proposals, columns));
         page.push('\n');
     }
     page

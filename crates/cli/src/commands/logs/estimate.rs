@@ -3,9 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use ingest::LogFiles;
 use job::Config;
 use job::flight_log::part_of;
+use job::trace::{self, Trace};
 use pipeline::inspect::estimate::{self, EstimateRow};
+use pipeline::inspect::estimate_plots;
+use pipeline::logs::discover;
 use pipeline::run::time_limit::within_time_limit;
 use records::{Diagnostic, Installations, PartNumber};
 
@@ -15,6 +19,7 @@ use crate::output::Output;
 use crate::row_output;
 use crate::table::{self, count, number, or_dash, text, unit_name};
 
+use super::estimate_plot::write_plots;
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
 use crate::commands::results::query::{flags_text, load};
 
@@ -34,7 +39,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
     let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
     let (config, installations) = (Arc::new(config), Arc::new(installations));
     let (mut found, mut diagnostics, mut finished) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &pipeline::logs::discover::flight_paths(&config, &args.logs) {
+    for path in &discover::flight_paths(&config, &args.logs) {
         match estimate_log(path, &config, &installations, part.as_ref()) {
             Ok(estimated) => {
                 let (rows, of_log) = estimated?;
@@ -42,15 +47,29 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
                 diagnostics.extend(of_log);
                 finished.push(path.clone());
             }
-            // Its trace and its plot would take as long again.
+            // Its trace and its plot would take as long again, so it is not among the finished ones.
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
+    let part = part.as_ref();
+    let logs = || -> Result<Vec<(LogFiles, String)>, Failure> {
+        let log = |path: &PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
+        finished.iter().map(log).collect()
+    };
+    // A log that failed is reported already; it has no trace and no plot.
     if let Some(file) = &args.trace {
-        trace(file, &finished, &config, &installations, part.as_ref(), output)?;
+        let logs = logs()?;
+        let trace =
+            |(files, log): &(_, String)| trace::of_log(files, log, &config, &installations, part).ok();
+        write_trace(file, logs.iter().filter_map(trace), output)?;
     }
     if let Some(file) = &args.plot {
-        super::estimate_plot::estimate_plot(file, &finished, &config, &installations, part.as_ref(), output)?;
+        let logs = logs()?;
+        let plots = |(files, log): &(_, String)| {
+            estimate_plots::of_log(files, log, &config, &installations, part).ok()
+        };
+        let plots = logs.iter().filter_map(plots).flatten().map(|(_, plot)| plot);
+        write_plots(file, plots, output)?;
     }
     let batch = || row_output::batch(&found);
     row_output::write_rows(&args.rows, output, batch, || page(&found))?;
@@ -112,35 +131,16 @@ fn page(found: &[EstimateRow]) -> String {
 }
 
 /// Writes per-sample filter output of every actuator of the logs.
-fn trace(
-    file: &Path,
-    logs: &[PathBuf],
-    config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
-    output: &Output,
-) -> Result<(), Failure> {
+fn write_trace(file: &Path, traces: impl Iterator<Item = Trace>, output: &Output) -> Result<(), Failure> {
     if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         let what = format!("{}: a trace is written as Parquet", display_path(file));
         return Err(Failure::usage("unknown_ending", what, "use the extension .parquet"));
     }
-    let mut all = job::trace::Trace::default();
-    for path in logs {
-        // A failed log is reported already; it has no trace.
-        let Ok(opened) = job::trace::of_log(
-            &pipeline::logs::discover::log_containing(config, path)?,
-            &display_path(path),
-            config,
-            installations,
-            part,
-        ) else {
-            continue;
-        };
-        all.extend(opened);
-    }
+    let mut all = Trace::default();
+    traces.for_each(|trace| all.extend(trace));
     let columns = all.columns();
     ingest::parquet::writer::write_parquet(file, &columns, &[])
         .map_err(|e| Failure::failed(e.diagnostic()))?;
-    output.note(&format!("wrote {} samples to {}", all.len(), display_path(file)));
+    output.note(&format!("wrote {} samples to {}", all.samples(), display_path(file)));
     Ok(())
 }

@@ -1,11 +1,8 @@
 //! `estimate --plot`: diagnostic plot of an estimate as SVG or HTML.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use job::Config;
-use pipeline::inspect::estimate_plots;
-use records::{Installations, PartNumber};
-use report::{estimate_plot_html, estimate_plot_svg};
+use report::{EstimatePlot, estimate_plot_html, estimate_plot_svg};
 
 use crate::exit::Failure;
 use crate::output::Output;
@@ -13,27 +10,17 @@ use crate::table;
 
 use crate::commands::context::display_path;
 
-/// Draws every actuator of the logs into one file; the extension selects the format.
+/// Draws the plots of all actuators into one file; the extension selects the format.
 ///
 /// # Errors
 /// If the extension is unknown or the file cannot be written.
-pub(super) fn estimate_plot(
+pub(super) fn write_plots(
     file: &Path,
-    logs: &[PathBuf],
-    config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
+    plots: impl Iterator<Item = EstimatePlot>,
     output: &Output,
 ) -> Result<(), Failure> {
     let draw = renderer(file)?;
-    let mut plots = Vec::new();
-    for path in logs {
-        let name = display_path(path);
-        // A failed log is reported already; it is not drawn.
-        let files = pipeline::logs::discover::log_containing(config, path)?;
-        let found = estimate_plots::of_log(&files, &name, config, installations, part).unwrap_or_default();
-        plots.extend(found.into_iter().map(|(_, plot)| plot));
-    }
+    let plots: Vec<EstimatePlot> = plots.collect();
     if plots.is_empty() {
         output.note(&format!("no actuator to draw; {} was not written", display_path(file)));
         return Ok(());
@@ -47,7 +34,7 @@ pub(super) fn estimate_plot(
     Ok(())
 }
 
-type Renderer = fn(&[report::EstimatePlot]) -> Result<Vec<u8>, report::Error>;
+type Renderer = fn(&[EstimatePlot]) -> Result<Vec<u8>, report::Error>;
 
 fn renderer(file: &Path) -> Result<Renderer, Failure> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();

@@ -24,9 +24,17 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
     } else {
         discover::named_logs(&config, &args.logs)?
     };
-    let (place, jobs) = ((args.output.as_path(), args.encoding.into()), args.jobs.map(usize::from));
+    let (folder, jobs) = (args.output.as_path(), args.jobs.map(usize::from));
     let done = progress::shown("normalize", output, |watch| {
-        pipeline::inspect::normalize::normalize(&config, &installations, &logs, place, jobs, watch)
+        pipeline::inspect::normalize::normalize(
+            &config,
+            &installations,
+            &logs,
+            folder,
+            args.encoding,
+            jobs,
+            watch,
+        )
     })?;
     output.write_result(&format!(
         "{} of {} below {}\n",

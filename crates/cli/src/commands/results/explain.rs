@@ -71,43 +71,24 @@ fn page(found: &Explanation, config: &Config) -> String {
     let mut line = |label: &str, text: &str| {
         let _ = writeln!(page, "  {label:<11} {}", escape(text));
     };
-    line(
-        "gap",
-        &format!(
-            "{} µm, standard error {} µm, 90 % interval {} to {}; mid-range {} µm",
-            table::micrometres(e.gap_m),
-            table::micrometres(e.gap_se_m),
-            table::micrometres(e.gap_p05_m),
-            table::micrometres(e.gap_p95_m),
-            table::micrometres(e.gap_midrange_m)
-        ),
-    );
+    let [gap, se, p05, p95, midrange] =
+        [e.gap_m, e.gap_se_m, e.gap_p05_m, e.gap_p95_m, e.gap_midrange_m].map(table::micrometres);
+    let interval = format!("standard error {se} µm, 90 % interval {p05} to {p95}");
+    line("gap", &format!("{gap} µm, {interval}; mid-range {midrange} µm"));
     let flags = super::query::flags_text(e);
     line("flags", if flags.is_empty() { "none" } else { &flags });
     if let Some(remedy) = remedy(e) {
         line("remedy", remedy);
     }
-    let newtons = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-    line(
-        "fitted",
-        &format!(
-            "stiffness {} ± {} N/m (90 %), skew {} ms, loop {} µm, lost motion {} µm",
-            newtons(e.stiffness_n_per_m),
-            newtons(e.stiffness_se_n_per_m.map(|se| NORMAL_95 * se)),
-            e.skew_s.map_or_else(table::empty_cell, |s| format!("{:.2}", s * 1e3)),
-            table::micrometres(e.loop_width_m),
-            table::micrometres(e.lost_motion_m)
-        ),
-    );
-    line(
-        "data",
-        &format!(
-            "{} samples, {} load reversals, load {} N",
-            e.samples,
-            e.load_reversals,
-            crate::commands::results::query::load(e)
-        ),
-    );
+    let two_digits = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
+    let [k, k_half_width] =
+        [e.stiffness_n_per_m, e.stiffness_se_n_per_m.map(|se| NORMAL_95 * se)].map(two_digits);
+    let skew_ms = e.skew_s.map_or_else(table::empty_cell, |s| format!("{:.2}", s * 1e3));
+    let [loop_um, lost_um] = [e.loop_width_m, e.lost_motion_m].map(table::micrometres);
+    let motion = format!("skew {skew_ms} ms, loop {loop_um} µm, lost motion {lost_um} µm");
+    line("fitted", &format!("stiffness {k} ± {k_half_width} N/m (90 %), {motion}"));
+    let load = crate::commands::results::query::load(e);
+    line("data", &format!("{} samples, {} load reversals, load {load} N", e.samples, e.load_reversals));
     line("log", &format!("{} ({})", p.log_path, short(&p.log_digest)));
     let (file, method) = (config.file.display(), config.document.estimate.method.as_str());
     let settings = if found.has_current_settings() {
@@ -119,15 +100,8 @@ fn page(found: &Explanation, config: &Config) -> String {
         )
     };
     line("settings", &settings);
-    line(
-        "computed by",
-        &format!(
-            "Freeplay {} in run {} on {}",
-            p.program_version,
-            p.run_id,
-            p.processed_utc.strftime("%Y-%m-%d %H:%M UTC")
-        ),
-    );
+    let processed = p.processed_utc.strftime("%Y-%m-%d %H:%M UTC");
+    line("computed by", &format!("Freeplay {} in run {} on {processed}", p.program_version, p.run_id));
     line("replay", &found.verdict.to_string());
     line("reproduce", &format!("freeplay estimate {}", config.path(&p.log_path).display()));
     if let Some(part) = config.document.part.get(record.part_number.as_str()) {

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use arrow::array::{RecordBatch, StringArray};
-use clap::ValueEnum;
 use ingest::mapping::column_pattern::nearest;
 use job::Config;
 use pipeline::assess::trends::{self, UnitSelection};
@@ -12,7 +11,7 @@ use records::row_schema::to_batch;
 use records::{GapEstimate, GapRecord, Installations};
 use store::{Query, Store};
 
-use crate::args::{Format, Global, QueryArgs, QueryKey};
+use crate::args::{Format, Global, QUERY_KEYS, QueryArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
@@ -106,29 +105,32 @@ fn query_of(args: &QueryArgs, known: &KnownNames) -> Result<Query, Failure> {
     };
     let (column, id) = match (args.first.as_deref(), args.second.clone()) {
         (None, _) => return Ok(query),
-        (Some(word), Some(id)) => (QueryKey::from_str(word, false).map_err(|_| unknown_word(word))?, id),
+        (Some(word), Some(id)) => {
+            let key = QUERY_KEYS.iter().find(|(known, _)| *known == word);
+            (key.ok_or_else(|| unknown_word(word))?.1, id)
+        }
         (Some(id), None) => {
-            let keys = QueryKey::value_variants();
-            let columns: Vec<&str> = keys.iter().map(|key| key.column()).collect();
+            let columns = QUERY_KEYS.map(|(_, column)| column);
             known.check(&columns, Some(id))?;
-            let key = keys.iter().find(|key| known.names(key.column()).contains(id));
-            (key.copied().unwrap_or(QueryKey::Position), id.to_owned())
+            let column = columns.into_iter().find(|column| known.names(column).contains(id));
+            (column.unwrap_or("position"), id.to_owned())
         }
     };
-    match column {
-        QueryKey::Tail => query.tail_number = Some(id),
-        QueryKey::Serial => query.serial_number = Some(id),
-        QueryKey::Flight => query.flight_id = Some(id),
-        QueryKey::Position => query.position = Some(id),
-    }
+    let field = match column {
+        "tail_number" => &mut query.tail_number,
+        "serial_number" => &mut query.serial_number,
+        "flight_id" => &mut query.flight_id,
+        _ => &mut query.position,
+    };
+    *field = Some(id);
     Ok(query)
 }
 
 fn unknown_word(word: &str) -> Failure {
-    const WORDS: [&str; 4] = ["tail", "serial", "flight", "position"];
-    let near = nearest(word, WORDS).map(|near| format!("; the nearest is '{near}'")).unwrap_or_default();
+    let words = QUERY_KEYS.map(|(word, _)| word);
+    let near = nearest(word, words).map(|near| format!("; the nearest is '{near}'")).unwrap_or_default();
     let what = format!("records cannot be selected by `{word}`{near}");
-    let hint = format!("possible are {}, e.g. `freeplay query tail N412FP`", WORDS.join(", "));
+    let hint = format!("possible are {}, e.g. `freeplay query tail N412FP`", words.join(", "));
     Failure::usage("unknown_name", what, &hint)
 }
 

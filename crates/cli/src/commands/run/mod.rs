@@ -15,7 +15,7 @@ use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::{SerialNumber, TailNumber};
 use store::Holder;
 
-use crate::args::{FailOn, Global, RunArgs, UnitFilterArgs};
+use crate::args::{Global, RunArgs, UnitFilterArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::Progress;
@@ -179,13 +179,7 @@ fn answer_interrupt(
 }
 
 /// Whether any unit of the store is in a state or worse, updated by this run or not.
-fn is_reached(report: &RunSummary, least: FailOn) -> bool {
-    let least = match least {
-        FailOn::Watch => State::Watch,
-        FailOn::Unassessed => State::Unassessed,
-        FailOn::Plan => State::Plan,
-        FailOn::Act => State::Act,
-    };
+fn is_reached(report: &RunSummary, least: State) -> bool {
     State::ALL.iter().any(|state| *state >= least && report.states.contains_key(state.as_str()))
 }
 

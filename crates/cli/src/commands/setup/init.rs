@@ -117,21 +117,3 @@ fn exists(path: &Path) -> Failure {
         "write to another folder with `freeplay init DIR`; nothing was changed",
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use std::collections::BTreeMap;
-
-    use super::*;
-
-    /// The template must pass the program's own checks.
-    #[test]
-    fn the_template_configuration_is_valid() {
-        let read = job::Config::parse(FILES[0].1, Path::new("pipeline.toml"), Path::new("."));
-        assert!(read.is_ok(), "{:?}", read.err());
-        let dir = tempfile::tempdir().unwrap();
-        let table = dir.path().join("installations.csv");
-        fs::write(&table, FILES[1].1).unwrap();
-        assert!(ingest::tables::installations(&table, &BTreeMap::new()).is_ok());
-    }
-}

@@ -36,24 +36,7 @@ const INSTALLATIONS_HEAD: &str = "\
 tail_number,position,part_number,serial_number,installed_utc,removed_utc
 ";
 
-/// Table of a part before anything is known of it.
-const LINEAR_PART: &str = r#"
-kind = "linear"
-stiffness_n_per_m = 5.0e7
-damping_n_s_per_m = 2000.0
-screw_mass_kg = 8.0
-lead_m_per_rev = 0.005    # travel for one turn of the motor: exact, it converts every angle
-# limit_m and watch_m: removal limit and alert level; without them a unit is not assessed
-
-[part."PART-NUMBER".noise]
-screw_rms_m = 3.0e-6
-screw_resolution_m = 2.3e-6
-motor_rms_m = 1.0e-6      # at the screw: angle × lead/2π
-motor_resolution_m = 0.3e-6
-unknown_force_n = 200.0   # mainly friction; about 2 % of the rated load
-"#;
-
-/// The same of a part that turns.
+/// Values of a part that turns, before anything is known of it; those of a part that pushes are in the template.
 const ROTARY_PART: &str = r#"
 kind = "rotary"           # loads are torques, and both positions are angles
 stiffness_nm_per_rad = 2.0e4
@@ -68,6 +51,8 @@ screw_resolution_rad = 5.0e-5
 motor_rms_rad = 5.0e-5    # at the driven side
 motor_resolution_rad = 5.0e-5
 unknown_torque_nm = 5.0   # mainly friction; about 2 % of the rated torque
+bandwidth_hz = 10.0       # bandwidth of the backlash random walk
+
 "#;
 
 /// Logs that offer the same.
@@ -217,46 +202,43 @@ impl Proposal {
         let kinds = [Kind::Folder, Kind::Name];
         let grouped =
             kinds.iter().filter(|_| !found[0].is_whole()).find_map(|kind| group(folder, &found, *kind));
-        if let Some((main, files, groups)) = grouped {
-            let (overrides, uncovered) = (Vec::new(), Vec::new());
-            return Ok(Self {
-                logs: logs.len(),
-                folders,
-                looked_at,
-                main,
-                files,
-                groups,
-                overrides,
-                uncovered,
-            });
-        }
         let mut rest = found.into_iter();
-        let Some(mut main) = rest.next() else { return Err(Failure::usage("no_log_matched", "no log", "")) };
-        let (mut overrides, mut uncovered): (Vec<Variant>, Vec<Variant>) = (Vec::new(), Vec::new());
-        for variant in rest {
-            let taken = |other: &Variant| !other.offer.tails.is_disjoint(&variant.offer.tails);
-            let is_alike = variant.is_whole() && variant.offer.layout == main.offer.layout;
-            let is_of_tails = !variant.offer.tails.is_empty() && !overrides.iter().chain([&main]).any(taken);
-            if is_alike {
-                unite(&mut main.offer, &variant.offer);
+        let (main, files, groups) = match (grouped, rest.next()) {
+            (Some(grouped), _) => {
+                // Each kind of file is a group, or the main log.
+                rest = Vec::new().into_iter();
+                grouped
             }
-            if is_alike && is_of_tails {
-                overrides.push(variant);
-            } else if is_alike {
-                let channels: Vec<_> =
-                    variant.offer.channels.iter().map(|(role, own)| (*role, own.clone())).collect();
-                for (role, own) in
-                    channels.into_iter().filter(|(role, own)| main.offer.channels.get(role) != Some(own))
-                {
-                    main.offer.alternatives.entry(role).or_default().push(own);
-                }
-                main.add(variant);
-            } else {
-                uncovered.push(variant);
+            (None, Some(main)) => (main, "**/*.parquet".to_owned(), BTreeMap::new()),
+            (None, None) => return Err(Failure::usage("no_log_matched", "no log", "")),
+        };
+        let (overrides, uncovered) = (Vec::new(), Vec::new());
+        let mut proposal =
+            Self { logs: logs.len(), folders, looked_at, main, files, groups, overrides, uncovered };
+        rest.for_each(|variant| proposal.add(variant));
+        Ok(proposal)
+    }
+
+    /// Covers another layout: by an override where it is that of tails of its own, else by alternatives of the channels.
+    fn add(&mut self, variant: Variant) {
+        let (main, tails) = (&mut self.main, &variant.offer.tails);
+        if !variant.is_whole() || variant.offer.layout != main.offer.layout {
+            self.uncovered.push(variant);
+            return;
+        }
+        let is_taken = |other: &Variant| !other.offer.tails.is_disjoint(tails);
+        let has_own_tails = !tails.is_empty() && !is_taken(main) && !self.overrides.iter().any(is_taken);
+        unite(&mut main.offer, &variant.offer);
+        if has_own_tails {
+            self.overrides.push(variant);
+            return;
+        }
+        for (role, own) in &variant.offer.channels {
+            if main.offer.channels.get(role) != Some(own) {
+                main.offer.alternatives.entry(*role).or_default().push(own.clone());
             }
         }
-        let (files, groups) = ("**/*.parquet".to_owned(), BTreeMap::new());
-        Ok(Self { logs: logs.len(), folders, looked_at, main, files, groups, overrides, uncovered })
+        main.add(variant);
     }
 
     /// How many folders and logs the patterns match, and how many of them were looked at.
@@ -301,7 +283,7 @@ impl Proposal {
         let (head, rest) = template.split_once("# Which flight a log is.").unwrap_or((template, ""));
         let (_, rest) = rest.split_once("[estimate]").unwrap_or(("", rest));
         let (estimate, rest) = rest.split_once("# One table per part number").unwrap_or((rest, ""));
-        let (_, trend) = rest.split_once("[trend]").unwrap_or(("", rest));
+        let (part, trend) = rest.split_once("[trend]").unwrap_or(("", rest));
         let folder = relative(folder, dir)?;
         let below = |files: &str| quoted(&format!("{}/{files}", display_path(&folder)));
         let files = format!("# {}.\nfiles = [{}]", self.coverage(), below(&self.files));
@@ -317,20 +299,23 @@ impl Proposal {
             }
         }
         let overrides: String = self.overrides.iter().map(|variant| self.of_tails(variant)).collect();
-        let part = self.part();
+        let part = self.part(part);
         Ok(format!("{head}{}{overrides}[estimate]{estimate}{part}[trend]{trend}", self.mapping()))
     }
 
-    /// Placeholders of a part: a run refuses them.
-    fn part(&self) -> String {
+    /// Placeholders of a part, without limits: a run refuses them.
+    fn part(&self, of_template: &str) -> String {
         let dimension = |role: Role| Some(self.main.offer.channels.get(&role)?.1?.dimension());
         let is_rotary = dimension(Role::Load) == Some(Dimension::Torque)
             && dimension(Role::Screw) == Some(Dimension::Angle);
+        let (_, linear) = of_template.split_once("[part.\"EMA-27-1040\"]").unwrap_or(("", of_template));
+        let linear = linear.replace("EMA-27-1040", PART);
+        let linear = linear.replace("\nlimit_m", "\n# limit_m").replace("\nwatch_m", "\n# watch_m");
         format!(
             "# One table per part number in installations.csv. These values are placeholders, and `freeplay run` refuses them:\n\
              # enter part number and data sheet, then delete the line `placeholder`. `freeplay check` on ten logs or more\n\
-             # prints what it identifies.\n[part.\"{PART}\"]\nplaceholder = true{}bandwidth_hz = 10.0       # bandwidth of the backlash random walk\n\n",
-            if is_rotary { ROTARY_PART } else { LINEAR_PART }
+             # prints what it identifies.\n[part.\"{PART}\"]\nplaceholder = true{}",
+            if is_rotary { ROTARY_PART } else { &linear }
         )
     }
 

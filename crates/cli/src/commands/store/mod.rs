@@ -6,7 +6,6 @@ mod runs;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use clap::ValueEnum;
 use jiff::Timestamp;
 use job::Config;
 use records::Diagnostic;
@@ -14,7 +13,7 @@ use records::row_schema::to_batch;
 use serde_json::json;
 use store::{Holder, Info, Query, RunRecord, Store, Withdrawal};
 
-use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
+use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::span;
@@ -36,7 +35,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
             alerts::drop_unsent(&store, &config, channel, to.as_deref(), output)
         }
         StoreCommand::Alerts { unsent, rows, .. } => alerts::alerts(&store, *unsent, rows, output),
-        StoreCommand::Files { table } => files(&store, *table, output),
+        StoreCommand::Files { table } => files(&store, table, output),
         StoreCommand::Verify { accept_foreign } => verify(&store, *accept_foreign, output),
         StoreCommand::Compact => compact(&store, output),
         StoreCommand::Forget(args) => forget(&store, args, output),
@@ -44,9 +43,8 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
     }
 }
 
-fn files(store: &Store, table: Table, output: &Output) -> Result<Code, Failure> {
-    let name = table.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
-    let files = store.table_files(&name)?;
+fn files(store: &Store, table: &str, output: &Output) -> Result<Code, Failure> {
+    let files = store.table_files(table)?;
     let lines: Vec<String> = files.iter().map(|file| file.display().to_string() + "\n").collect();
     output.write_result(&lines.concat())?;
     Ok(Code::Success)

@@ -158,10 +158,12 @@ pub(super) fn actuator(
         channel.note = Some(format!("{before}would be refused, {code}"));
         channel.remedy = rejection::remedy(code);
     }
-    let params = IdentifiedParams::of(&a, tested.as_deref().ok());
+    let fitted = tested.as_deref().ok();
+    let params = IdentifiedParams::of(&a, fitted);
     let configured = part.actuator.stiffness_n_per_m();
-    let is_unlike = |fitted| rejection::is_stiffness_unlike(fitted, configured);
-    let unlike = params.stiffness_n_per_m.is_some_and(is_unlike).then_some(rejection::STIFFNESS_UNLIKE);
+    let is_unlike =
+        fitted.is_some_and(|fitted| rejection::is_stiffness_unlike(fitted.stiffness_n_per_m, configured));
+    let unlike = is_unlike.then_some(rejection::STIFFNESS_UNLIKE);
     let identified = Some((installation.part_number.clone(), params, rejection.or(unlike)));
     Ok(ActuatorCheck { found, clock: Some(clock(&a)), identified })
 }
