@@ -203,36 +203,25 @@ mod tests {
 
     use super::*;
 
-    /// An NFS server that restarts gives `ESTALE`, a failing disk `EIO`: neither is a reason to remove a table.
+    /// An NFS server that restarts gives `ESTALE`, a failing disk `EIO`: neither is damage, nor a reason to remove a table.
+    /// Delta Lake takes a folder whose `stat` fails for one that does not exist; the parquet crate wraps the error of the
+    /// system, or keeps its text alone.
     #[test]
-    fn a_system_error_below_a_table_never_advises_to_remove_it() {
-        for code in [116, 5] {
-            let source = Box::new(std::io::Error::from_raw_os_error(code));
-            let source = object_store::Error::Generic { store: "LocalFileSystem", source };
-            let source = Box::new(DeltaTableError::from(source));
-            let error = Error::Table { table: "gaps", verb: "read", source };
-            assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"), "{code}");
-        }
-    }
-
-    /// Delta Lake takes a folder whose `stat` fails for one that does not exist.
-    #[test]
-    fn a_folder_that_is_not_found_by_the_library_is_no_damage() {
-        let source = Box::new(DeltaTableError::InvalidTableLocation("Invalid table location: /a".to_owned()));
-        let error = Error::Table { table: "gaps", verb: "read", source };
-        assert_eq!(error.code(), "store_io");
-        assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"));
-    }
-
-    /// The parquet crate wraps the error of the system, or keeps its text alone.
-    #[test]
-    fn a_system_error_below_a_data_file_is_no_damage() {
-        let emfile = || std::io::Error::from_raw_os_error(24);
-        let of_parquet = parquet::errors::ParquetError::External(Box::new(emfile()));
-        let of_arrow = arrow::error::ArrowError::ParquetError(format!("External: {}", emfile()));
-        for error in [Error::Parquet(of_parquet), Error::Arrow(of_arrow)] {
+    fn a_system_error_below_another_error_is_no_damage() {
+        let os = |code| std::io::Error::from_raw_os_error(code);
+        let table = |source| Error::Table { table: "gaps", verb: "read", source: Box::new(source) };
+        let of_store = |code| {
+            let source = Box::new(os(code));
+            table(object_store::Error::Generic { store: "LocalFileSystem", source }.into())
+        };
+        let not_found = DeltaTableError::InvalidTableLocation("Invalid table location: /a".to_owned());
+        let of_parquet = Error::Parquet(parquet::errors::ParquetError::External(Box::new(os(24))));
+        let of_arrow = Error::Arrow(arrow::error::ArrowError::ParquetError(format!("External: {}", os(24))));
+        assert!([&of_parquet, &of_arrow].iter().all(|error| error.remedy().contains("ulimit -n")));
+        for error in [of_store(116), of_store(5), table(not_found), of_parquet, of_arrow] {
             assert_eq!(error.code(), "store_io");
-            assert!(error.remedy().contains("ulimit -n"), "{}", error.remedy());
+            let remedy = error.remedy();
+            assert!(remedy.contains("run again") && !remedy.contains("remove"), "{remedy}");
         }
         let damage = parquet::errors::ParquetError::EOF("eof".to_owned());
         assert_eq!(Error::Parquet(damage).code(), "store_unreadable");
