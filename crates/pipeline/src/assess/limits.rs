@@ -15,7 +15,7 @@ const LIMIT_OVER_NEW_GAP: f64 = 5.0;
 /// Limits, axes and settings of part numbers, as they are configured.
 #[derive(Clone, Copy)]
 pub(crate) struct Limits<'a> {
-    config: &'a Config,
+    pub(crate) config: &'a Config,
     /// Scale of the gaps of parts without a limit, m.
     scale_m: f64,
 }

@@ -6,6 +6,7 @@ use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
 use trend::{Assessment, Reason, Series, State};
 
+use crate::assess::limits::Limits;
 use crate::assess::tail_wide_steps::TailWide;
 use crate::findings::monitoring::mapping_faults::MappingFault;
 use crate::fleet::bookkeeping::inspections::InspectionRow;
@@ -19,112 +20,195 @@ fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
     NoColumn(gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect())
 }
 
-/// The trend row of a unit at a date.
-#[allow(clippy::too_many_arguments, reason = "each is one source of the row, and all are used once")]
-pub(crate) fn row(
-    name: &UnitKey,
-    history: &History,
-    series: Option<&Series>,
-    limit_m: Option<f64>,
-    trend: &Assessment,
-    as_of: Timestamp,
-    wide: &TailWide,
-    (installed, removal): (Option<&Installation>, Option<&Installation>),
-    fault: Option<&MappingFault>,
-) -> TrendRow {
-    // The installations table says where a unit is; of an external table, its last flight does.
-    let place = installed.or(removal).map(TailPosition::of);
-    let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
-    let flights = series.map_or(&[][..], |series| series.flights_until(trend.as_of_us));
-    let gaps_m: Vec<f64> = flights.iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect();
-    // A removed unit wears no more: it has no state, no date and no place among the expected removals.
-    let is_judged = limit_m.is_some() && removal.is_none();
-    let crossing = trend.crossing.filter(|_| is_judged);
-    let use_now = trend.utilization;
-    let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
-    // Usage goes on at the unit's own rate after its last flight; a date that has passed stays what it was.
-    let day = |hours: Option<f64>| days_after(as_of, (hours? - trend.elapsed_hours) / use_now?.hours_per_day);
-    let (state, cause) =
-        if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
-    let utc = |us: i64| Timestamp::from_microsecond(us).ok();
-    let mut caveats = Vec::new();
-    if removal.is_none() {
-        caveats.extend(caveats_of(cause, trend, history, as_of, fault));
-        caveats.extend(row_faults(series, history, as_of));
+/// What the trend row of a unit at a date is made from.
+pub(crate) struct RowSources<'a> {
+    pub(crate) name: &'a UnitKey,
+    pub(crate) history: &'a History,
+    pub(crate) series: Option<&'a Series>,
+    pub(crate) limits: Limits<'a>,
+    pub(crate) trend: &'a Assessment,
+    pub(crate) as_of: Timestamp,
+    pub(crate) wide: &'a TailWide,
+    /// Usage axis of the fleet prior.
+    pub(crate) usage_axis: Option<String>,
+    /// The installation that the unit is in.
+    pub(crate) installed: Option<&'a Installation>,
+    /// The last installation of a unit that is in none.
+    pub(crate) removal: Option<&'a Installation>,
+    /// The wrong mapping of the unit.
+    pub(crate) fault: Option<&'a MappingFault>,
+    /// The latest inspection in its installation.
+    pub(crate) inspection: Option<&'a InspectionRow>,
+    /// States of other quantities than the gap.
+    pub(crate) conditions: Vec<String>,
+}
+
+impl RowSources<'_> {
+    /// The trend row.
+    pub(crate) fn row(self) -> TrendRow {
+        let Self { name, history, trend, as_of, removal, .. } = self;
+        let part = name.0.as_deref();
+        let limit_m = self.limits.stated_m(part);
+        // The installations table says where a unit is; of an external table, its last flight does.
+        let place = self.installed.or(removal).map(TailPosition::of);
+        let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
+        let flights = self.series.map_or(&[][..], |series| series.flights_until(trend.as_of_us));
+        let gaps_m: Vec<f64> = flights.iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect();
+        // A removed unit wears no more: it has no state, no date and no place among the expected removals.
+        let is_judged = limit_m.is_some() && removal.is_none();
+        let crossing = trend.crossing.filter(|_| is_judged);
+        let use_now = trend.utilization;
+        let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
+        // Usage goes on at the unit's own rate after its last flight; a date that has passed stays what it was.
+        let day =
+            |hours: Option<f64>| days_after(as_of, (hours? - trend.elapsed_hours) / use_now?.hours_per_day);
+        let (state, cause) = if limit_m.is_some() {
+            (trend.state, trend.reason)
+        } else {
+            (State::Unassessed, Reason::NoLimit)
+        };
+        let caveats: Vec<String> = if removal.is_none() { self.caveats(cause).collect() } else { Vec::new() };
+        let row = TrendRow {
+            part_number: name.0.clone(),
+            serial_number: name.1.clone(),
+            tail_number: last.as_ref().and_then(|place| place.tail_number.clone()),
+            position: last.and_then(|place| place.position),
+            as_of_utc: as_of,
+            flights: trend.flights as i64,
+            unit_hours: trend.unit_hours,
+            gap_m: trend.level.map(|l| l.gap_m),
+            gap_se_m: trend.level.map(|l| l.se_m),
+            gap_records: trend.level.map(|l| l.records as i64),
+            latest_utc: trend.latest.and_then(|record| Timestamp::from_microsecond(record.departure_us).ok()),
+            latest_gap_m: trend.latest.map(|record| record.gap_m),
+            latest_gap_se_m: trend.latest.map(|record| record.error_m),
+            installation_sd_m: Some(trend.installation_sd_m),
+            estimates: trend.estimates as i64,
+            outliers: trend.outliers_us.len() as i64,
+            noise_factor: trend.noise_factor,
+            rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
+            rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
+            rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
+            trend: trend.wear.into(),
+            growth_probability: trend.growth_probability,
+            wear_law: trend.law.map(|(law, _)| law.to_string()),
+            wear_law_probability: trend.law.map(|(_, share)| share),
+            usage_axis: self.usage_axis.clone(),
+            trend_p_value: None,
+            change_points: trend.changes.iter().filter_map(|change| self.change_point(change)).collect(),
+            limit_m,
+            limit_applies_to: self.limits.applies_to(part),
+            crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
+            crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
+            crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
+            crossing_flights_p05: flights(crossing.and_then(|c| c.p05_hours)),
+            crossing_flights_p50: flights(crossing.and_then(|c| c.p50_hours)),
+            crossing_flights_p95: flights(crossing.and_then(|c| c.p95_hours)),
+            not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
+            likely_utc: day(crossing.and_then(|c| c.p50_hours)),
+            not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
+            forecast_method: trend.method.filter(|_| is_judged).map(Into::into),
+            check_probability: trend.check_probability.filter(|_| is_judged),
+            over_limit_probability: trend.over_limit_probability.filter(|_| is_judged),
+            hours_per_day: use_now.map(|u| u.hours_per_day),
+            hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
+            flights_per_day: use_now.map(|u| u.flights_per_day),
+            hours_per_flight: use_now.map(|u| u.hours_per_flight),
+            usage_source: use_now.and(self.series).map(|series| series.usage.source.to_string()),
+            stale_days: trend.stale_days.filter(|_| removal.is_none()),
+            removed_utc: removal.and_then(|installation| installation.removed_utc),
+            state: removal.is_none().then(|| state.as_str()),
+            reason_code: removal.is_none().then(|| cause.code()),
+            reason: Some(match removal {
+                Some(installation) => removed(installation),
+                None => {
+                    caveats.iter().fold(self.reason_of_state(cause), |all, caveat| format!("{all}; {caveat}"))
+                }
+            }),
+            conditions: self.conditions,
+            action: None,
+            due_utc: None,
+            elapsed_hours: NoColumn(trend.elapsed_hours),
+            caveats: NoColumn(caveats),
+            sketch_m: sketched(&gaps_m),
+        };
+        inspected(row, self.inspection, history.until(as_of)).with_action(self.limits.at_limit(part))
     }
-    TrendRow {
-        part_number: name.0.clone(),
-        serial_number: name.1.clone(),
-        tail_number: last.as_ref().and_then(|place| place.tail_number.clone()),
-        position: last.and_then(|place| place.position),
-        as_of_utc: as_of,
-        flights: trend.flights as i64,
-        unit_hours: trend.unit_hours,
-        gap_m: trend.level.map(|l| l.gap_m),
-        gap_se_m: trend.level.map(|l| l.se_m),
-        gap_records: trend.level.map(|l| l.records as i64),
-        latest_utc: trend.latest.and_then(|record| utc(record.departure_us)),
-        latest_gap_m: trend.latest.map(|record| record.gap_m),
-        latest_gap_se_m: trend.latest.map(|record| record.error_m),
-        installation_sd_m: Some(trend.installation_sd_m),
-        estimates: trend.estimates as i64,
-        outliers: trend.outliers_us.len() as i64,
-        noise_factor: trend.noise_factor,
-        rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
-        rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
-        rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
-        trend: trend.wear.into(),
-        growth_probability: trend.growth_probability,
-        wear_law: trend.law.map(|(law, _)| law.to_string()),
-        wear_law_probability: trend.law.map(|(_, share)| share),
-        usage_axis: None,
-        trend_p_value: None,
-        change_points: trend.changes.iter().filter_map(|c| change_point(c, history, wide)).collect(),
-        limit_m,
-        limit_applies_to: None,
-        crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
-        crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
-        crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
-        crossing_flights_p05: flights(crossing.and_then(|c| c.p05_hours)),
-        crossing_flights_p50: flights(crossing.and_then(|c| c.p50_hours)),
-        crossing_flights_p95: flights(crossing.and_then(|c| c.p95_hours)),
-        not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
-        likely_utc: day(crossing.and_then(|c| c.p50_hours)),
-        not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
-        forecast_method: trend.method.filter(|_| is_judged).map(Into::into),
-        check_probability: trend.check_probability.filter(|_| is_judged),
-        over_limit_probability: trend.over_limit_probability.filter(|_| is_judged),
-        hours_per_day: use_now.map(|u| u.hours_per_day),
-        hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
-        flights_per_day: use_now.map(|u| u.flights_per_day),
-        hours_per_flight: use_now.map(|u| u.hours_per_flight),
-        usage_source: use_now.and(series).map(|series| series.usage.source.to_string()),
-        stale_days: trend.stale_days.filter(|_| removal.is_none()),
-        removed_utc: removal.and_then(|installation| installation.removed_utc),
-        state: removal.is_none().then(|| state.as_str()),
-        reason_code: removal.is_none().then(|| cause.code()),
-        reason: Some(match removal {
-            Some(installation) => removed(installation),
-            None => caveats
-                .iter()
-                .fold(reason_of_state(cause, trend, history, wide), |all, caveat| format!("{all}; {caveat}")),
-        }),
-        conditions: Vec::new(),
-        action: None,
-        due_utc: None,
-        elapsed_hours: NoColumn(trend.elapsed_hours),
-        caveats: NoColumn(caveats),
-        sketch_m: sketched(&gaps_m),
+
+    /// What limits the trust in a state: wrong mappings, other settings, flags, age, and rows that cannot be right.
+    fn caveats(&self, cause: Reason) -> impl Iterator<Item = String> {
+        const LATEST: usize = 12;
+        let Self { history, trend, as_of, .. } = self;
+        let mapping = self.fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
+        let settings = history.other_settings().map(|(others, last, all)| {
+            format!(
+                "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
+                last.strftime("%Y-%m-%d")
+            )
+        });
+        let (disputed, gaps) = history.disputed(*as_of, LATEST);
+        let flagged = (disputed > 0).then(|| {
+            format!(
+                "{disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
+            )
+        });
+        let is_said = matches!(cause, Reason::Stale { .. });
+        let age = trend.stale_days.filter(|_| !is_said);
+        let age = age.map(|days| format!("no sound record for {days:.0} days"));
+        let faults = self.series.map(|series| series.faults).unwrap_or_default();
+        let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
+        // A report of a past date leaves later records out on purpose.
+        let now = Timestamp::now().max(*as_of);
+        [
+            mapping,
+            settings,
+            flagged,
+            age,
+            counted(faults.contradictions, "flights with records that contradict each other"),
+            counted(faults.negative_usage, "rows with negative usage, left out"),
+            counted(faults.meter_readings, "hour-meter readings that contradict the others, left out"),
+            counted(history.flights().len() - history.until(now).len(), "records dated ahead, left out"),
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// Why a state; a change that the tail's other units made as well is named for what it is.
+    fn reason_of_state(&self, cause: Reason) -> String {
+        let Self { history, trend, wide, .. } = self;
+        let unexplained = trend.changes.iter().rev().find(|change| change.kind.is_unexplained());
+        let tail = unexplained.and_then(|change| wide.tail(change, history));
+        match (cause, tail) {
+            (Reason::NoRecord { flagged: 0 }, _) if trend.flights > 0 => {
+                format!("no record of a gap: all of {} flights are without one", trend.flights)
+            }
+            (Reason::Clear { .. } | Reason::Stale { .. } | Reason::NoLimit, _) | (_, None) => {
+                cause.to_string()
+            }
+            (_, Some(tail)) => format!(
+                "{cause}; the actuators of {tail} changed together: its sensor or recorder is the likelier cause"
+            ),
+        }
+    }
+
+    fn change_point(&self, change: &trend::ChangePoint) -> Option<ChangePoint> {
+        let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
+        let flight = self.history.at(departure_utc);
+        Some(ChangePoint {
+            departure_utc,
+            flight_id: flight.and_then(|f| self.history.flight_id(f)).map(str::to_owned),
+            kind: change.kind.into(),
+            step_m: change.step_m,
+            step_se_m: change.se_m,
+            certainty: change.certainty,
+            tail_wide: self.wide.tail(change, self.history).is_some(),
+        })
     }
 }
 
 /// The row of a unit with its latest inspection: one at or above the limit makes the state, and one that contradicts the
 /// records is named.
-pub(crate) fn inspected(
-    row: TrendRow,
-    inspection: Option<&InspectionRow>,
-    records: &[FlightRow],
-) -> TrendRow {
+fn inspected(row: TrendRow, inspection: Option<&InspectionRow>, records: &[FlightRow]) -> TrendRow {
     let Some(inspection) = inspection else { return row };
     let (statement, contradicts) = inspection.statement(records);
     let reason = row.reason.clone().unwrap_or_default();
@@ -143,81 +227,8 @@ pub(crate) fn inspected(
     row
 }
 
-/// Rows of a unit that cannot be right, in words.
-fn row_faults(series: Option<&Series>, history: &History, as_of: Timestamp) -> impl Iterator<Item = String> {
-    let faults = series.map(|series| series.faults).unwrap_or_default();
-    let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    // A report of a past date leaves later records out on purpose.
-    let now = as_of.max(Timestamp::now());
-    [
-        counted(faults.contradictions, "flights with records that contradict each other"),
-        counted(faults.negative_usage, "rows with negative usage, left out"),
-        counted(faults.meter_readings, "hour-meter readings that contradict the others, left out"),
-        counted(history.flights().len() - history.until(now).len(), "records dated ahead, left out"),
-    ]
-    .into_iter()
-    .flatten()
-}
-
 /// Why a removed unit has no state.
 fn removed(last: &Installation) -> String {
     let date = last.removed_utc.map(|at| at.strftime("%Y-%m-%d").to_string()).unwrap_or_default();
     format!("removed from {} of {} on {date}", last.position, last.tail_number)
-}
-
-/// What limits the trust in a state: wrong mappings, other settings, flags, and age.
-fn caveats_of(
-    cause: Reason,
-    trend: &Assessment,
-    history: &History,
-    as_of: Timestamp,
-    fault: Option<&MappingFault>,
-) -> impl Iterator<Item = String> {
-    const LATEST: usize = 12;
-    let mapping = fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
-    let settings = history.other_settings().map(|(others, last, all)| {
-        format!(
-            "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
-            last.strftime("%Y-%m-%d")
-        )
-    });
-    let (disputed, gaps) = history.disputed(as_of, LATEST);
-    let flagged = (disputed > 0).then(|| {
-        format!(
-            "{disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
-        )
-    });
-    let is_said = matches!(cause, Reason::Stale { .. });
-    let age = trend.stale_days.filter(|_| !is_said);
-    let age = age.map(|days| format!("no sound record for {days:.0} days"));
-    [mapping, settings, flagged, age].into_iter().flatten()
-}
-
-/// Why a state; a change that the tail's other units made as well is named for what it is.
-fn reason_of_state(cause: Reason, trend: &Assessment, history: &History, wide: &TailWide) -> String {
-    let unexplained = trend.changes.iter().rev().find(|change| change.kind.is_unexplained());
-    let tail = unexplained.and_then(|change| wide.tail(change, history));
-    match (cause, tail) {
-        (Reason::NoRecord { flagged: 0 }, _) if trend.flights > 0 => {
-            format!("no record of a gap: all of {} flights are without one", trend.flights)
-        }
-        (Reason::Clear { .. } | Reason::Stale { .. } | Reason::NoLimit, _) | (_, None) => cause.to_string(),
-        (_, Some(tail)) => format!(
-            "{cause}; the actuators of {tail} changed together: its sensor or recorder is the likelier cause"
-        ),
-    }
-}
-
-fn change_point(change: &trend::ChangePoint, history: &History, wide: &TailWide) -> Option<ChangePoint> {
-    let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
-    let flight = history.at(departure_utc);
-    Some(ChangePoint {
-        departure_utc,
-        flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
-        kind: change.kind.into(),
-        step_m: change.step_m,
-        step_se_m: change.se_m,
-        certainty: change.certainty,
-        tail_wide: wide.tail(change, history).is_some(),
-    })
 }

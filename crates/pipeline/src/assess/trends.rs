@@ -13,11 +13,11 @@ use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
-use crate::assess::quantities::follow::{FollowedQuantities, UnitFacts, Units, follow, gap_row};
-use crate::assess::quantities::peers;
-use crate::assess::quantities::values;
+use crate::assess::quantities::follow::{FollowedQuantities, follow};
+use crate::assess::quantities::subject::{UnitFacts, Units};
+use crate::assess::quantities::{peers, rows, values};
 use crate::assess::tail_wide_steps::TailWide;
-use crate::assess::trend_row;
+use crate::assess::trend_row::RowSources;
 use crate::error::Error;
 use crate::findings::finding::Finding;
 use crate::findings::monitoring::coverage;
@@ -102,15 +102,27 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
-    // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
-    let mut histories = load_histories(store)?;
+    assess_histories(config, installations, load_histories(store)?, Some(store), ask)
+}
+
+/// Assesses the selected units of some histories, with what their store holds in addition to gaps.
+fn assess_histories(
+    config: &Config,
+    installations: &Installations,
+    mut histories: Histories,
+    store: Option<&Store>,
+    ask: &UnitSelection,
+) -> Result<StoreAssessment, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
-    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
+    // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
+    let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
+    if let Some(store) = store {
+        fleet.add_diagnostics(store, as_of)?;
+    }
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc, config))
+    Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc))
 }
 
 /// Assessments of the units of a run.
@@ -149,15 +161,15 @@ pub(crate) fn assess_run(
 ) -> Result<RunAssessments, Error> {
     let mut histories = load_histories(store)?;
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
-    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
+    let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
+    let recent = fleet.add_diagnostics(store, as_of)?;
     let (mut now, tail_wide) = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
         recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
-        notes: fleet.notes(&now, None, config),
+        notes: fleet.notes(&now, None),
         changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
@@ -215,8 +227,8 @@ pub(crate) fn assess_for_report(
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
-    let fleet = FleetContext::new(config, installations, histories, &days)?;
-    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
+    let mut fleet = FleetContext::new(config, installations, histories, &days)?;
+    fleet.add_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
@@ -236,7 +248,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let fleet = fleet.assessed(now, &tail_wide, ask.as_of_utc, config);
+    let fleet = fleet.assessed(now, &tail_wide, ask.as_of_utc);
     Ok(ReportAssessments { fleet, drawn, before, past, priors })
 }
 
@@ -252,39 +264,23 @@ pub fn assess(
     queries: Option<&[AsOfQuery]>,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
-    let mut histories = match (histories, queries) {
-        (Some(histories), _) => histories,
-        (None, Some(_)) => load_histories(&open_store(config, installations)?)?,
-        (None, None) => {
-            return assess_store(config, installations, &open_store(config, installations)?, ask);
-        }
+    let store = || open_store(config, installations);
+    let Some(queries) = queries else {
+        return match histories {
+            Some(histories) => assess_histories(config, installations, histories, None, ask),
+            None => assess_store(config, installations, &store()?, ask),
+        };
     };
-    if let Some(queries) = queries {
-        let now = assess_queries(config, installations, histories, queries)?;
-        return Ok(StoreAssessment { now, ..StoreAssessment::default() });
-    }
-    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
-        return Ok(StoreAssessment::default());
-    };
-    let fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    let (now, _) = fleet.selected(ask, as_of)?;
-    let newest = now.iter().filter_map(|row| row.latest_utc).max();
-    let notes = coverage::notes(&now, newest, ask.as_of_utc.unwrap_or_else(Timestamp::now), config);
-    Ok(StoreAssessment { now, notes, ..StoreAssessment::default() })
-}
-
-/// One assessment for each query, without data later than its date.
-fn assess_queries(
-    config: &Config,
-    installations: &Installations,
-    mut histories: Histories,
-    queries: &[AsOfQuery],
-) -> Result<Vec<TrendRow>, Error> {
+    let mut histories = histories.map_or_else(|| load_histories(&store()?), Ok)?;
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
     let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
     let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
-    let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
-    queries.par_iter().zip(&selected).map(statement).collect()
+    // One assessment for each query, without data later than its date and without the tail-wide steps.
+    let row = |(query, unit): (&AsOfQuery, &UnitKey)| {
+        Ok(fleet.row(unit, &fleet.trend(unit, query.as_of_utc)?, query.as_of_utc, &TailWide::default()))
+    };
+    let now = queries.par_iter().zip(&selected).map(row).collect::<Result<_, Error>>()?;
+    Ok(StoreAssessment { now, ..StoreAssessment::default() })
 }
 
 /// The unit a query means; one that never flew has a name all the same.
@@ -385,19 +381,18 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings; and the
-    /// diagnostics of the last months, which show them.
-    fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<(Self, RecentDiagnostics), Error> {
+    /// Adds what the store holds in addition to gaps: followed quantities, and wrong mappings. Returns the diagnostics of the
+    /// last months, which show them.
+    fn add_diagnostics(&mut self, store: &Store, as_of: Timestamp) -> Result<RecentDiagnostics, Error> {
         let facts = UnitFacts { units: &self.units, limits: self.limits };
-        let followed = follow(&values::read(store, as_of)?, facts, as_of);
-        let moved = recorder_changes(&followed.changes, as_of);
-        let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
-        for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
-            conditions.entry(row.unit()).or_default().push(state.to_owned());
+        self.followed = follow(&values::read(store, as_of)?, facts, as_of);
+        self.moved = recorder_changes(&self.followed.changes, as_of);
+        for (row, state) in self.followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
+            self.conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
         let recent = recent_diagnostics(store, as_of)?;
-        let mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
-        Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
+        self.mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
+        Ok(recent)
     }
 
     /// Assessments of some units, with what was found about them in addition to gaps.
@@ -406,25 +401,24 @@ impl<'a> FleetContext<'a> {
         now: Vec<TrendRow>,
         tail_wide: &[QuantityChange],
         given: Option<Timestamp>,
-        config: &Config,
     ) -> StoreAssessment {
         let units: BTreeSet<UnitKey> = now.iter().map(TrendRow::unit).collect();
         let faults = self.mapping_faults.iter().filter(|fault| !fault.units.is_disjoint(&units));
         StoreAssessment {
             followed: self.followed_of(&now, &units, tail_wide),
             mapping_faults: faults.cloned().collect(),
-            notes: self.notes(&now, given, config),
+            notes: self.notes(&now, given),
             now,
         }
     }
 
     /// What assessments lack, and what of their units differs from its peers, in words.
     /// The age of the newest log counts from a given date of assessment, else from today.
-    fn notes(&self, rows: &[TrendRow], given: Option<Timestamp>, config: &Config) -> Vec<String> {
+    fn notes(&self, rows: &[TrendRow], given: Option<Timestamp>) -> Vec<String> {
         let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
         let newest_log = rows.iter().filter_map(|row| self.latest_flight(&row.unit(), row.as_of_utc)).max();
         let today = given.unwrap_or_else(Timestamp::now);
-        let mut notes = coverage::notes(rows, newest_log, today, config);
+        let mut notes = coverage::notes(rows, newest_log, today, self.limits.config);
         notes.extend(peers::notes(&self.followed.rows, |row| units.contains(&row.unit())));
         notes
     }
@@ -438,7 +432,7 @@ impl<'a> FleetContext<'a> {
     ) -> FollowedQuantities {
         let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
         let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
-        let mut of_units: Vec<QuantityRow> = rows.iter().map(gap_row).collect();
+        let mut of_units: Vec<QuantityRow> = rows.iter().map(rows::of_gap).collect();
         of_units.extend(self.followed.rows.iter().filter(|row| units.contains(&row.unit())).cloned());
         of_units.sort_by(|a, b| (&a.part_number, &a.serial_number).cmp(&(&b.part_number, &b.serial_number)));
         let concerns = |change: &&QuantityChange| match &change.serial_number {
@@ -500,35 +494,32 @@ impl<'a> FleetContext<'a> {
         Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
-    /// Assessment of one unit, without the tail-wide steps.
-    fn statement(&self, name: &UnitKey, as_of: Timestamp) -> Result<TrendRow, Error> {
-        Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
-    }
-
     fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide) -> TrendRow {
-        let unit = self.units.get(name);
         let nobody = History::default();
-        let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
-        let limit_m = self.limits.stated_m(name.0.as_deref());
+        let unit = self.units.get(name);
+        let series = unit.map(|(_, series)| series);
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
-        let usage_axis = prior.map(|prior| prior.axis.to_string());
         let index = self.installations.as_ref();
         let installed = index.and_then(|index| index.installed(name, as_of));
-        let removal = index.and_then(|index| index.removal(name, as_of));
-        let fault = self.mapping_faults.iter().find(|fault| fault.units.contains(name));
-        let row =
-            trend_row::row(name, history, series, limit_m, trend, as_of, wide, (installed, removal), fault);
-        let conditions = self.conditions.get(name).cloned().unwrap_or_default();
-        let row = TrendRow { usage_axis, conditions, ..row };
-        let renewals =
-            series.map(|series| series.maintenance_until(as_of.as_microsecond())).unwrap_or_default();
-        let renewed = renewals.iter().rev().find(|event| event.renews);
+        let done = series.map_or(&[][..], |series| series.maintenance_until(as_of.as_microsecond()));
+        let renewed = done.iter().rev().find(|event| event.renews);
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
-        let inspection = installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of));
-        let row = trend_row::inspected(row, inspection, history.until(as_of));
-        let part = name.0.as_deref();
-        let row = TrendRow { limit_applies_to: self.limits.applies_to(part), ..row };
-        row.with_action(self.limits.at_limit(part))
+        RowSources {
+            name,
+            history: unit.map_or(&nobody, |(history, _)| history),
+            series,
+            limits: self.limits,
+            trend,
+            as_of,
+            wide,
+            usage_axis: prior.map(|prior| prior.axis.to_string()),
+            installed,
+            removal: index.and_then(|index| index.removal(name, as_of)),
+            fault: self.mapping_faults.iter().find(|fault| fault.units.contains(name)),
+            inspection: installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of)),
+            conditions: self.conditions.get(name).cloned().unwrap_or_default(),
+        }
+        .row()
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

@@ -2,10 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use records::ChangeScope;
+use records::{ChangeScope, Quantity};
 use trend::quantity::QuantityValue;
+use trend::quantity::changes::QuantityStep;
 
 use crate::assess::quantities::subject::Subject;
+use crate::findings::monitoring::median;
 
 /// Steps within these days are one: a tail's flights, or a fleet's first flights under new software.
 const SAME_US: i64 = 3 * 86_400_000_000;
@@ -22,109 +24,98 @@ const SHARP: f64 = 0.6;
 /// A step of one unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Found {
+    /// Index of the unit.
     pub(crate) subject: usize,
-    /// Index among the steps of the subject.
-    pub(crate) step: usize,
-    pub(crate) departure_us: i64,
-    /// Size over the quantity's scale.
-    pub(crate) share: f64,
+    pub(crate) step: QuantityStep,
 }
 
 /// A step that several units made together.
 #[derive(Debug)]
-pub(crate) struct CommonStep {
+pub(crate) struct CommonStep<'a> {
     pub(crate) scope: ChangeScope,
     /// The tail or the part.
-    pub(crate) name: String,
+    pub(crate) name: &'a str,
+    /// Steps of the units, by departure.
     pub(crate) members: Vec<Found>,
+    /// Number of units with flights enough to show it.
     pub(crate) able: usize,
-    /// The first member's first flight after it.
-    pub(crate) departure_us: i64,
 }
 
-/// Common steps of parts, or of tails. Steps below `least`, over the scale, are left to their units; `is_signed` asks
-/// for one direction.
-pub(crate) fn common_steps(
-    subjects: &[Subject<'_>],
+/// Common steps of parts, or of tails. Steps below `least`, over the scale, are left to their units.
+pub(crate) fn common_steps<'a>(
+    subjects: &[Subject<'a>],
     scope: ChangeScope,
     least: f64,
-    is_signed: bool,
-) -> Vec<CommonStep> {
-    let mut found: Vec<Found> = Vec::new();
-    for (subject, of) in subjects.iter().enumerate() {
-        let steps = of.fit.iter().flat_map(|fit| fit.steps.iter().enumerate());
-        found.extend(steps.map(|(step, s)| Found {
-            subject,
-            step,
-            departure_us: s.departure_us,
-            share: s.size / of.scale,
-        }));
-    }
-    found.sort_by_key(|step| step.departure_us);
-    let group = |step: &Found| match scope {
-        ChangeScope::Part => subjects[step.subject].name.0.clone(),
-        _ => subjects[step.subject].tail_at(step.departure_us).map(str::to_owned),
+) -> Vec<CommonStep<'a>> {
+    let steps = |(subject, of): (usize, &Subject<'a>)| {
+        let steps = of.fit.iter().flat_map(|fit| &fit.steps);
+        steps.map(move |step| Found { subject, step: *step }).collect::<Vec<_>>()
     };
-    let mut groups: BTreeMap<(String, bool), Vec<Found>> = BTreeMap::new();
-    for step in found {
-        if let Some(name) = group(&step) {
-            groups.entry((name, is_signed && step.share < 0.0)).or_default().push(step);
-        }
+    let mut found: Vec<Found> = subjects.iter().enumerate().flat_map(steps).collect();
+    found.sort_by_key(|of| of.step.departure_us);
+    let mut groups: BTreeMap<(&str, bool), Vec<Found>> = BTreeMap::new();
+    for of in found {
+        let subject = &subjects[of.subject];
+        let name = match scope {
+            ChangeScope::Part => subject.name.0.as_deref(),
+            _ => subject.tail_at(of.step.departure_us),
+        };
+        // Steps with a common cause have one direction, but for load zeros.
+        let is_fall = subject.quantity != Quantity::LoadZeroN && of.step.size < 0.0;
+        name.into_iter().for_each(|name| groups.entry((name, is_fall)).or_default().push(of));
     }
-    let made =
-        groups.iter().flat_map(|((name, _), steps)| windows(steps).into_iter().map(move |w| (name, w)));
-    made.filter_map(|(name, members)| judged(subjects, scope, name, members, least)).collect()
+    let windows = groups.into_iter().flat_map(|((name, _), steps)| {
+        windows(&steps).into_iter().map(move |members| (name, members)).collect::<Vec<_>>()
+    });
+    windows.filter_map(|(name, members)| judged(subjects, scope, name, members, least)).collect()
 }
 
 /// Steps that lie within the same days, one after the other; each unit once.
 fn windows(steps: &[Found]) -> Vec<Vec<Found>> {
     let mut windows: Vec<Vec<Found>> = Vec::new();
-    for step in steps {
-        match windows.last_mut().filter(|w| step.departure_us - w[0].departure_us <= SAME_US) {
-            Some(window) if window.iter().all(|s| s.subject != step.subject) => window.push(*step),
+    for of in steps {
+        let is_near = |w: &&mut Vec<Found>| of.step.departure_us - w[0].step.departure_us <= SAME_US;
+        match windows.last_mut().filter(is_near) {
+            Some(window) if window.iter().all(|other| other.subject != of.subject) => window.push(*of),
             Some(_) => {}
-            None => windows.push(vec![*step]),
+            None => windows.push(vec![*of]),
         }
     }
     windows
 }
 
-fn judged(
-    subjects: &[Subject<'_>],
+/// The common step of some units on the same days; nothing where too few units make it, or not sharply.
+fn judged<'a>(
+    subjects: &[Subject<'a>],
     scope: ChangeScope,
-    name: &str,
+    name: &'a str,
     members: Vec<Found>,
     least: f64,
-) -> Option<CommonStep> {
-    let enough = if scope == ChangeScope::Part { MIN_UNITS.1 } else { MIN_UNITS.0 };
-    let sizes: Vec<f64> = members.iter().map(|m| m.share.abs()).collect();
-    if members.len() < enough || crate::findings::monitoring::median(sizes) < least {
+) -> Option<CommonStep<'a>> {
+    let is_part = scope == ChangeScope::Part;
+    let over_members = |value: fn(&Subject<'a>, &QuantityStep) -> f64| {
+        median(members.iter().map(|of| value(&subjects[of.subject], &of.step)).collect())
+    };
+    let enough = if is_part { MIN_UNITS.1 } else { MIN_UNITS.0 };
+    if members.len() < enough || over_members(|of, step| (step.size / of.scale).abs()) < least {
         return None;
     }
-    let departure_us = members[0].departure_us;
-    let last_us = members[members.len() - 1].departure_us;
-    let is_able = |subject: &&Subject<'_>| match scope {
-        ChangeScope::Part => {
-            subject.name.0.as_deref() == Some(name) && subject.shows(departure_us, last_us, None)
+    let (first_us, last_us) = (members.first()?.step.departure_us, members.last()?.step.departure_us);
+    let is_able = |of: &&Subject<'_>| {
+        if is_part {
+            of.name.0.as_deref() == Some(name) && of.shows(first_us, last_us, None)
+        } else {
+            of.shows(first_us, last_us, Some(name))
         }
-        _ => subject.shows(departure_us, last_us, Some(name)),
     };
     let able = subjects.iter().filter(is_able).count().max(members.len());
     let tails: BTreeSet<Option<&str>> =
-        members.iter().map(|m| subjects[m.subject].tail_at(m.departure_us)).collect();
-    let is_spread = scope != ChangeScope::Part || tails.len() > 1;
+        members.iter().map(|of| subjects[of.subject].tail_at(of.step.departure_us)).collect();
+    let is_spread = !is_part || tails.len() > 1;
     // A season that is fitted by steps is no step.
-    let sharpness = members
-        .iter()
-        .map(|m| subjects[m.subject].jump(m.departure_us) / (m.share * subjects[m.subject].scale));
-    let is_sharp = crate::findings::monitoring::median(sharpness.collect()) > SHARP;
-    (is_spread && is_sharp && members.len() as f64 >= SHARE * able as f64).then(|| CommonStep {
-        scope,
-        name: name.to_owned(),
-        members,
-        able,
-        departure_us,
-    })
+    let is_sharp = over_members(|of, step| of.jump(step.departure_us) / step.size) > SHARP;
+    let is_common = is_spread && is_sharp && members.len() as f64 >= SHARE * able as f64;
+    is_common.then_some(CommonStep { scope, name, members, able })
 }
 
 impl Subject<'_> {

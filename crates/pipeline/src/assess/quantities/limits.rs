@@ -32,6 +32,11 @@ pub(crate) enum Scale {
 }
 
 impl Treatment {
+    /// Whether it belongs to a sensor or to the recorder, not to the unit.
+    pub(crate) fn is_of_sensor(&self) -> bool {
+        self.is_of_channel || self.is_of_position
+    }
+
     /// Treatment of a quantity under configured limits.
     pub(crate) fn of(quantity: Quantity, limits: &QuantityLimits) -> Self {
         let own = Self {

@@ -6,9 +6,11 @@
 
 use std::collections::BTreeMap;
 
+use job::config::QuantityLimits;
 use records::{Quantity, QuantityRow};
 
-use crate::assess::quantities::follow::short;
+use crate::assess::quantities::limits::Treatment;
+use crate::assess::quantities::rows::short;
 
 /// Quantities that are compared; a gap differs by wear.
 const COMPARED: [Quantity; 6] = [
@@ -19,8 +21,6 @@ const COMPARED: [Quantity; 6] = [
     Quantity::LoadDelayS,
     Quantity::Nis,
 ];
-/// Those of sensors and recorders, which do not depend on the part.
-const OF_SENSORS: [Quantity; 4] = [Quantity::SkewS, Quantity::LoadZeroN, Quantity::LoadDelayS, Quantity::Nis];
 /// Fewest peers.
 const MIN_PEERS: usize = 6;
 /// Number of peers from which some of them are taken, evenly: they tell the median to a tenth of the spread, and a fleet of
@@ -74,8 +74,8 @@ fn deviations(rows: &[QuantityRow], quantity: Quantity) -> Vec<Deviation<'_>> {
         let Some(level) = row.level.filter(|level| level.is_finite()) else { continue };
         parts.entry(row.part_number.as_deref()).or_default().push((row, level));
     }
-    let all: Vec<(&QuantityRow, f64)> =
-        parts.values().flatten().copied().filter(|_| OF_SENSORS.contains(&quantity)).collect();
+    let is_of_sensor = Treatment::of(quantity, &QuantityLimits::default()).is_of_sensor();
+    let all: Vec<(&QuantityRow, f64)> = parts.values().flatten().copied().filter(|_| is_of_sensor).collect();
     let each = parts.values().flat_map(|units| units.iter().map(move |unit| (unit, units)));
     each.filter_map(|(unit, units)| {
         deviation(unit, units, quantity).or_else(|| deviation(unit, &all, quantity))

@@ -1,21 +1,37 @@
 //! One quantity of one unit while its changes are attributed.
 
-use records::ChangeScope;
+use jiff::Timestamp;
+use rayon::prelude::*;
+use records::{ChangeScope, Quantity};
+use trend::Series;
 use trend::quantity::QuantityValue;
-use trend::quantity::changes::{self, QuantityChanges};
-use trend::quantity::common_curve::CommonCurve;
+use trend::quantity::changes::{self, QuantityChanges, QuantityStep};
 
-use crate::assess::quantities::limits::Treatment;
-use crate::assess::quantities::values::UnitValues;
-use crate::fleet::histories::{TailPosition, UnitKey};
+use crate::assess::limits::Limits;
+use crate::assess::quantities::limits::{Scale, Treatment};
+use crate::assess::quantities::values::{FlightValues, READ, UnitValues};
+use crate::findings::monitoring::median;
+use crate::fleet::histories::{History, TailPosition, UnitKey};
+
+/// Units by name: their flights, and the same by usage with their maintenance.
+pub(crate) type Units<'a> = std::collections::BTreeMap<&'a UnitKey, (&'a History, Series)>;
+
+/// What is known of units in addition to the values.
+#[derive(Clone, Copy)]
+pub(crate) struct UnitFacts<'a> {
+    pub(crate) units: &'a Units<'a>,
+    pub(crate) limits: Limits<'a>,
+}
 
 /// One quantity of one unit.
-#[derive(Clone)]
 pub(crate) struct Subject<'a> {
     /// The unit.
     pub(crate) name: &'a UnitKey,
     /// Its values.
-    pub(crate) unit: &'a UnitValues,
+    unit: &'a UnitValues,
+    /// Its history and usage.
+    of_fleet: Option<&'a (&'a History, Series)>,
+    pub(crate) quantity: Quantity,
     /// What limits are a share of, in the quantity's unit.
     pub(crate) scale: f64,
     /// How the quantity is followed, with the limits of the unit's part.
@@ -25,42 +41,100 @@ pub(crate) struct Subject<'a> {
     /// Changes of the values as they are: at the end, those of the unit alone.
     pub(crate) fit: Option<QuantityChanges>,
     /// Steps of tail or part, with their scope.
-    pub(crate) common: Vec<(changes::QuantityStep, ChangeScope)>,
+    pub(crate) common: Vec<(QuantityStep, ChangeScope)>,
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// The series of one quantity, by its index in [`READ`], of one unit; none without a value.
+    pub(crate) fn new(
+        name: &'a UnitKey,
+        unit: &'a UnitValues,
+        facts: UnitFacts<'a>,
+        index: usize,
+    ) -> Option<Self> {
+        let quantity = READ[index].0;
+        let treatment = Treatment::of(quantity, &facts.limits.quantities(name.0.as_deref()));
+        let last = unit.flights.last()?;
+        let of_fleet = facts.units.get(name);
+        // The channels of a position have no hours and no maintenance of their own.
+        let series = of_fleet.map(|(_, series)| series).filter(|_| !treatment.is_of_channel);
+        let maintained_us = series.and_then(|s| Some(s.maintenance_until(last.departure_us).last()?.utc_us));
+        let hours = |us: i64| Some(series?.flights_until(us).last()?.hours);
+        let moved = unit.flights.iter().rposition(|f| f.place != last.place);
+        let begin = moved.filter(|_| treatment.is_of_position).map_or(0, |k| k + 1);
+        let followed =
+            unit.flights[begin..].iter().filter(|f| maintained_us.is_none_or(|us| f.departure_us >= us));
+        let value = |(k, flight): (usize, &FlightValues)| {
+            let (value, se) = value_of(quantity, flight, index, unit.usual_load_n)?;
+            let known = |number: f32| number.is_finite().then_some(f64::from(number));
+            Some(QuantityValue {
+                departure_us: flight.departure_us,
+                usage_hours: hours(flight.departure_us).unwrap_or(k as f64),
+                value,
+                se,
+                temperature_c: known(flight.temperature_c),
+                ln_load: known(flight.load_p95_n).filter(|n| *n > 0.0).map(f64::ln),
+            })
+        };
+        let values: Vec<QuantityValue> = followed.enumerate().filter_map(value).collect();
+        let scale = match treatment.scale {
+            Scale::One => 1.0,
+            Scale::UsualLoad => unit.usual_load_n?,
+            Scale::Median => median(values.iter().map(|v| v.value.abs()).collect()),
+        };
+        let (fit, common) = (None, Vec::new());
+        (!values.is_empty() && scale > 0.0).then_some(Self {
+            name,
+            unit,
+            of_fleet,
+            quantity,
+            scale,
+            treatment,
+            values,
+            fit,
+            common,
+        })
+    }
+
+    /// Fits steps and drift to some values of the subject.
+    pub(crate) fn fitted(&self, values: &[QuantityValue]) -> Option<QuantityChanges> {
+        changes::fit(values, self.treatment.least_scatter * self.scale)
+    }
+
+    /// Change from which the unit has a state, in the quantity's unit.
+    pub(crate) fn limit(&self) -> Option<f64> {
+        Some(self.treatment.limit? * self.scale)
+    }
+
+    /// The unit's usage.
+    pub(crate) fn series(&self) -> Option<&'a Series> {
+        self.of_fleet.map(|(_, series)| series)
+    }
+
+    /// Name of a flight.
+    pub(crate) fn flight_id(&self, departure_us: i64) -> Option<String> {
+        let history = self.of_fleet?.0;
+        history.flight_id(history.at(Timestamp::from_microsecond(departure_us).ok()?)?).map(str::to_owned)
+    }
+
     /// The tail at a departure.
-    pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&str> {
+    pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&'a str> {
         let at = self.unit.flights.partition_point(|f| f.departure_us < departure_us);
         self.unit.place(self.unit.flights.get(at)?).tail_number.as_deref()
     }
 
     /// Where the last flight was flown.
-    pub(crate) fn last_place(&self) -> Option<&TailPosition> {
+    pub(crate) fn last_place(&self) -> Option<&'a TailPosition> {
         Some(self.unit.place(self.unit.flights.last()?))
     }
 
     /// Tail of the last flight.
-    pub(crate) fn tail(&self) -> Option<&str> {
+    pub(crate) fn tail(&self) -> Option<&'a str> {
         self.last_place()?.tail_number.as_deref()
     }
 
-    /// Position of the last flight.
-    pub(crate) fn position(&self) -> Option<&str> {
-        self.last_place()?.position.as_deref()
-    }
-
-    /// The same without the curve of its part.
-    pub(crate) fn without(&self, curve: Option<&CommonCurve>) -> Self {
-        let mut left = self.clone();
-        if let Some(curve) = curve {
-            left.values.iter_mut().for_each(|v| v.value -= curve.at(v.departure_us));
-        }
-        left
-    }
-
     /// Takes a step of tail or part off the values.
-    pub(crate) fn take_off(&mut self, step: changes::QuantityStep, scope: ChangeScope) {
+    pub(crate) fn take_off(&mut self, step: QuantityStep, scope: ChangeScope) {
         if self.common.iter().any(|(known, _)| known.departure_us == step.departure_us) {
             return;
         }
@@ -68,4 +142,32 @@ impl Subject<'_> {
         after.for_each(|v| v.value -= step.size);
         self.common.push((step, scope));
     }
+}
+
+/// Value and standard error of a flight. Friction is taken at the unit's usual load, so that a flight under less load
+/// has not less friction.
+fn value_of(
+    quantity: Quantity,
+    flight: &FlightValues,
+    index: usize,
+    usual_load_n: Option<f64>,
+) -> Option<(f64, f64)> {
+    let of = |quantity: Quantity| {
+        let at = READ.iter().position(|(q, _)| *q == quantity)?;
+        Some(f64::from(flight.values[at].0)).filter(|v| v.is_finite())
+    };
+    let (value, se) = flight.values[index];
+    let se = if se.is_finite() { f64::from(se.max(0.0)) } else { 0.0 };
+    if quantity == Quantity::FrictionN
+        && let (Some(dry_n), Some(share), Some(load_n)) =
+            (of(Quantity::FrictionDryN), of(Quantity::FrictionLoadShare), usual_load_n)
+    {
+        return Some((dry_n + share * load_n, se));
+    }
+    value.is_finite().then_some((f64::from(value), se))
+}
+
+/// Fits steps and drift of all subjects to their present values.
+pub(crate) fn fit_all(subjects: &mut [Subject<'_>]) {
+    subjects.par_iter_mut().for_each(|subject| subject.fit = subject.fitted(&subject.values));
 }
