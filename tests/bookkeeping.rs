@@ -427,5 +427,10 @@ fn any_order_of_commands_ends_where_one_run_does() {
         }
         assert_eq!(fleet.exported(), once.exported(), "seed {seed}");
         assert_eq!(trend(&fleet), trend(&once), "seed {seed}");
+        // Readers join another table before a run writes it.
+        std::fs::write(fleet.path(TABLE), table((version + 1) % 3, &whole)).unwrap();
+        let joined = fleet.exported();
+        fleet.run_ok(&["run", "-q"]);
+        assert_eq!(fleet.exported(), joined, "seed {seed}");
     }
 }

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     } else {
         load_histories(&Store::open(&source)?)?
     };
-    let rows: usize = histories.iter().map(|(_, history)| history.flights().len()).sum();
-    println!("{} units, {rows} flights, {:.3} s", histories.names().count(), begun.elapsed().as_secs_f64());
+    let rows: usize = histories.units.values().map(|history| history.flights().len()).sum();
+    println!("{} units, {rows} flights, {:.3} s", histories.units.len(), begun.elapsed().as_secs_f64());
     Ok(())
 }

@@ -115,8 +115,8 @@ impl KnownNames {
             }
             Self::Estimates(histories) => match column {
                 "tail_number" => histories.tails().map(str::to_owned).collect(),
-                "serial_number" => histories.names().map(|(_, serial)| serial.clone()).collect(),
-                "part_number" => histories.names().filter_map(|(part, _)| part.clone()).collect(),
+                "serial_number" => histories.units.keys().map(|(_, serial)| serial.clone()).collect(),
+                "part_number" => histories.units.keys().filter_map(|(part, _)| part.clone()).collect(),
                 _ => BTreeSet::new(),
             },
         }

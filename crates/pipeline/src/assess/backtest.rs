@@ -68,7 +68,7 @@ pub fn of_histories(
 ) -> Result<Vec<BacktestRow>, Error> {
     let of_unit =
         |(name, history): (&UnitKey, _)| cuts(history).map(|day| (name.clone(), day)).collect::<Vec<_>>();
-    let cuts: Vec<(UnitKey, Timestamp)> = histories.iter().flat_map(of_unit).collect();
+    let cuts: Vec<(UnitKey, Timestamp)> = histories.units.iter().flat_map(of_unit).collect();
     let days: Vec<Timestamp> = cuts.iter().map(|(_, day)| *day).collect();
     let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
     let pasts = cuts.par_iter().map(|(name, day)| past(&fleet, name, *day));

@@ -100,14 +100,15 @@ pub fn changes(config: &Config, before: &[UnitState], now: &[TrendRow], run: Run
         if known.is_some_and(|known| known.is_same(&state)) {
             continue;
         }
-        found.changed.extend(of_unit(config, known, &state, row, run).filter(|_| !is_first));
+        found.changed.extend(of_unit(config, known, &state, Some(row), run).filter(|_| !is_first));
         found.states.push(state);
     }
     let assessed: BTreeSet<UnitKey> = now.iter().map(TrendRow::unit).collect();
     for gone in before.values().filter(|state| state.state.is_some() && !assessed.contains(&state.unit())) {
-        found.changed.push(without_flights(gone, run));
         let (change_points, run_id) = (Vec::new(), run.run_id.to_owned());
-        found.states.push(UnitState { state: None, change_points, run_id, ..(*gone).clone() });
+        let state = UnitState { state: None, change_points, run_id, ..(*gone).clone() };
+        found.changed.extend(of_unit(config, Some(gone), &state, None, run));
+        found.states.push(state);
     }
     found
 }
@@ -117,11 +118,12 @@ fn settings_digest(config: &Config, row: &TrendRow) -> Option<String> {
     Some(config.digest(&TailNumber::new(tail).ok()?, &PartNumber::new(part).ok()?).to_string())
 }
 
+/// The change of a unit against its state before; without a row, of a unit of which no flight is left.
 fn of_unit(
     config: &Config,
     before: Option<&UnitState>,
     state: &UnitState,
-    now: &TrendRow,
+    now: Option<&TrendRow>,
     run: RunFacts<'_>,
 ) -> Option<UnitChange> {
     let is_like = |a: (&str, Timestamp), b: (&str, Timestamp)| {
@@ -130,22 +132,24 @@ fn of_unit(
     let known = || before.into_iter().flat_map(UnitState::events);
     let is_new =
         |event: &&ChangePoint| !known().any(|other| is_like(other, (event.kind, event.departure_utc)));
-    let new_events: Vec<ChangePoint> = now.change_points.iter().filter(is_new).cloned().collect();
-    let is_cleared = |event: &(&str, Timestamp)| !state.events().any(|other| is_like(other, *event));
+    let events = now.iter().flat_map(|row| &row.change_points);
+    let new_events: Vec<ChangePoint> = events.filter(is_new).cloned().collect();
+    let is_cleared =
+        |event: &(&str, Timestamp)| now.is_some() && !state.events().any(|other| is_like(other, *event));
     let cleared = known().filter(is_cleared);
     let cleared_events: Vec<ClearedEvent> =
         cleared.map(|(kind, departure_utc)| ClearedEvent { kind: kind.to_owned(), departure_utc }).collect();
     let from = before.and_then(|before| before.state.clone());
-    let is_news = from.as_deref() != now.state || !new_events.is_empty() || !cleared_events.is_empty();
-    let (cause, because) = cause(config, before, state, run);
+    let is_news = from != state.state || !new_events.is_empty() || !cleared_events.is_empty();
+    let (cause, because) = cause(config, before, state, now.is_some(), run);
     is_news.then(|| UnitChange {
-        part_number: now.part_number.clone(),
-        serial_number: now.serial_number.clone(),
-        tail_number: now.tail_number.clone(),
-        position: now.position.clone(),
+        part_number: state.part_number.clone(),
+        serial_number: state.serial_number.clone(),
+        tail_number: state.tail_number.clone(),
+        position: state.position.clone(),
         from,
-        to: now.state,
-        reason: now.reason.clone(),
+        to: now.and_then(|row| row.state),
+        reason: now.map_or_else(|| Some("no flight is left".to_owned()), |row| row.reason.clone()),
         cause,
         because,
         new_events,
@@ -155,9 +159,16 @@ fn of_unit(
 
 /// Why a unit has another state than after the run before; bookkeeping and settings before records, since a person who made
 /// a correction wants to see what it did.
-fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunFacts<'_>) -> (Cause, String) {
+fn cause(
+    config: &Config,
+    before: Option<&UnitState>,
+    now: &UnitState,
+    has_flights: bool,
+    run: RunFacts<'_>,
+) -> (Cause, String) {
     let unit = now.unit();
-    let moved: Vec<String> = moved_of(&unit, run).collect();
+    let concerns = |moved: &&MovedFlights| moved.former_unit() == unit || moved.present_unit() == unit;
+    let moved: Vec<String> = run.moved.iter().filter(concerns).map(ToString::to_string).collect();
     let differ = |(one, other)| one != other;
     let micrometers =
         |limit_m: Option<f64>| limit_m.map_or("none".to_owned(), |m| format!("{:.0} µm", m * 1e6));
@@ -168,6 +179,7 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
             (Cause::Limit, format!("limit_m changed from {from} to {to} ({place})"))
         }
         _ if !moved.is_empty() => (Cause::Bookkeeping, moved.join("; ")),
+        _ if !has_flights => (Cause::Bookkeeping, "its records were withdrawn".to_owned()),
         Some(before)
             if before.settings_digest.as_ref().zip(now.settings_digest.as_ref()).is_some_and(differ) =>
         {
@@ -186,28 +198,5 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
         }
         _ if run.with_records.contains(&unit) => (Cause::Records, "records of this run".to_owned()),
         _ => (Cause::Date, "no record of its own: the date, or records of other units".to_owned()),
-    }
-}
-
-fn moved_of<'a>(unit: &'a UnitKey, run: RunFacts<'a>) -> impl Iterator<Item = String> + 'a {
-    let concerns = move |moved: &&MovedFlights| moved.former_unit() == *unit || moved.present_unit() == *unit;
-    run.moved.iter().filter(concerns).map(ToString::to_string)
-}
-
-/// The change of a unit of which no flight is left.
-fn without_flights(before: &UnitState, run: RunFacts<'_>) -> UnitChange {
-    let moved: Vec<String> = moved_of(&before.unit(), run).collect();
-    UnitChange {
-        part_number: before.part_number.clone(),
-        serial_number: before.serial_number.clone(),
-        tail_number: before.tail_number.clone(),
-        position: before.position.clone(),
-        from: before.state.clone(),
-        to: None,
-        reason: Some("no flight is left".to_owned()),
-        cause: Cause::Bookkeeping,
-        because: if moved.is_empty() { "its records were withdrawn".to_owned() } else { moved.join("; ") },
-        new_events: Vec::new(),
-        cleared_events: Vec::new(),
     }
 }

@@ -29,9 +29,8 @@ impl<'a> Limits<'a> {
         };
         let mut gaps: Vec<(i64, f64)> = fleet.flat_map(first).collect();
         gaps.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut first_m: Vec<f64> = gaps.into_iter().take(FIRST_GAPS).map(|(_, m)| m).collect();
-        first_m.sort_by(f64::total_cmp);
-        let median_m = first_m.get(first_m.len() / 2).copied().filter(|m| *m > 0.0);
+        let first_m = gaps.into_iter().take(FIRST_GAPS).map(|(_, m)| m).collect();
+        let median_m = trend::quantity::median(first_m).filter(|m| *m > 0.0);
         // Without a gap above zero nothing depends on the scale: any number does.
         Self { config, scale_m: LIMIT_OVER_NEW_GAP * median_m.unwrap_or(1e-5) }
     }

@@ -44,7 +44,7 @@ pub(crate) struct FleetPriors<'a> {
 }
 
 impl<'a> FleetPriors<'a> {
-    /// Priors of the cut-off before each of the dates, without later data.
+    /// Priors of the cut-off before each of the dates, without later data; similar parts share one.
     pub(crate) fn train<'s>(
         units: impl Iterator<Item = (Option<&'a str>, &'s Series)>,
         limits: Limits<'_>,
@@ -54,15 +54,21 @@ impl<'a> FleetPriors<'a> {
         for (part, series) in units {
             classes.entry(part).or_default().push(series);
         }
-        let trainer = PriorTrainer { classes, limits };
-        let cutoffs = trainer.cutoffs(days);
+        let first = classes.values().flatten().filter_map(|series| series.flights().first());
+        let first_us = first.map(|flight| flight.departure_us).min();
+        let last = first_us.zip(days.iter().max());
+        let cutoffs =
+            last.map_or_else(Vec::new, |(first_us, last)| training_cutoffs(first_us, last.as_microsecond()));
         let asked: BTreeSet<i64> = days.iter().filter_map(|day| cutoff_before(&cutoffs, *day)).collect();
-        let trained: Vec<_> = asked.into_par_iter().map(|cutoff| (cutoff, trainer.trained(cutoff))).collect();
+        let trainer = PriorTrainer { classes, limits };
+        let trained = asked.into_par_iter().flat_map(|cutoff_us| {
+            let groups = trainer.pool_similar_parts(cutoff_us).into_par_iter();
+            groups.map(move |parts| (cutoff_us, parts)).collect::<Vec<_>>()
+        });
+        let learned = trained.map(|(cutoff_us, parts)| (cutoff_us, trainer.learn(cutoff_us, &parts), parts));
         let mut priors = BTreeMap::new();
-        for (cutoff, groups) in trained {
-            for (parts, prior) in groups {
-                priors.extend(parts.into_iter().map(|part| ((cutoff, part), prior.clone())));
-            }
+        for (cutoff_us, prior, parts) in learned.collect::<Vec<_>>() {
+            priors.extend(parts.into_iter().map(|part| ((cutoff_us, part), prior.clone())));
         }
         Self { cutoffs, priors }
     }
@@ -81,20 +87,6 @@ struct PriorTrainer<'a, 's> {
 }
 
 impl<'a> PriorTrainer<'a, '_> {
-    /// Training cut-offs up to the last of some dates.
-    fn cutoffs(&self, days: &[Timestamp]) -> Vec<i64> {
-        let first = self.classes.values().flatten().filter_map(|series| series.flights().first());
-        let first_us = first.map(|flight| flight.departure_us).min();
-        let last = first_us.zip(days.iter().max());
-        last.map_or_else(Vec::new, |(first_us, last)| training_cutoffs(first_us, last.as_microsecond()))
-    }
-
-    /// Fleet priors of the parts at a cut-off; similar parts share one.
-    fn trained(&self, cutoff_us: i64) -> Vec<(Parts<'a>, FleetPrior)> {
-        let groups = self.pool_similar_parts(cutoff_us).into_par_iter();
-        groups.map(|parts| (parts.clone(), self.learn(cutoff_us, &parts))).collect()
-    }
-
     /// Groups of parts that share one fleet prior: of one limit, along one axis where that is configured,
     /// with lives within a factor of two.
     ///

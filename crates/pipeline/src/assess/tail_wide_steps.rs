@@ -10,62 +10,64 @@ use crate::findings::monitoring::recorder_change::RecorderChange;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::History;
 
-/// Tail-wide steps by tail, and changes that a recorder change explains, by tail and departure.
+/// Tail-wide steps by tail, and the changes of recorders that explain changes of the gap.
 #[derive(Debug, Default)]
-pub(crate) struct TailWide {
+pub(crate) struct TailWide<'m> {
     steps: BTreeMap<String, Vec<TailWideStep>>,
     /// Levels of the units on these tails, m.
     levels_m: BTreeMap<String, Vec<f64>>,
-    explained: BTreeSet<(String, Timestamp)>,
+    moved: &'m [RecorderChange],
 }
 
-impl TailWide {
+impl<'m> TailWide<'m> {
     /// Searches the units of the tails. Unrecorded changes count: a step of several units at once, and a
     /// step or reset when what is fitted of all of them `moved`.
-    pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &[RecorderChange]) -> Self {
+    pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &'m [RecorderChange]) -> Self {
         let mut on_tails: BTreeMap<&str, Vec<UnitOnTail>> = BTreeMap::new();
-        let mut explained = BTreeSet::new();
         let mut levels_m: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        let of_steps = |(history, trend): &(&History, &Assessment)| {
-            let steps = trend.changes.iter().filter(|change| change.kind == ChangePointKind::Step);
-            steps.filter_map(|change| Some(made_on(change, history)?.1.to_owned())).collect::<Vec<_>>()
-        };
-        let stepped: BTreeSet<String> = judged.iter().flat_map(of_steps).collect();
-        for (history, trend) in judged {
-            let mut of_unit: BTreeMap<&str, UnitOnTail> = BTreeMap::new();
-            for change in trend.changes.iter().filter(|change| is_unrecorded(change)) {
-                let Some((flown, tail)) = made_on(change, history) else { continue };
-                let departure_utc = flown.departure_utc();
-                if moved.iter().any(|moved| moved.explains(tail, departure_utc)) {
-                    explained.insert((tail.to_owned(), departure_utc));
-                }
-                if change.kind == ChangePointKind::Step {
-                    of_unit.entry(tail).or_default().steps.push((change.departure_us, change.step_m));
-                }
+        let steps_of = |(history, trend): &(&'_ History, &Assessment)| {
+            let mut steps: BTreeMap<String, Vec<(i64, f64)>> = BTreeMap::new();
+            for change in trend.changes.iter().filter(|change| change.kind == ChangePointKind::Step) {
+                let Some((_, tail)) = made_on(change, history) else { continue };
+                steps.entry(tail.to_owned()).or_default().push((change.departure_us, change.step_m));
             }
+            steps
+        };
+        let stepped: BTreeSet<String> = judged.iter().flat_map(|unit| steps_of(unit).into_keys()).collect();
+        for unit in judged {
+            let (history, trend) = unit;
             if !history.tails().any(|tail| stepped.contains(tail)) {
                 continue;
             }
+            let mut steps = steps_of(unit);
             for (tail, (first_us, last_us)) in spans(history, trend.as_of_us) {
                 levels_m.entry(tail.to_owned()).or_default().extend(trend.level.map(|level| level.gap_m));
-                let steps = of_unit.remove(tail).unwrap_or_default().steps;
+                let steps = steps.remove(tail).unwrap_or_default();
                 on_tails.entry(tail).or_default().push(UnitOnTail { first_us, last_us, steps });
             }
         }
         let found = on_tails.iter().map(|(tail, units)| ((*tail).to_owned(), tail_wide_steps(units)));
         let steps = found.filter(|(_, steps)| !steps.is_empty()).collect();
-        Self { steps, levels_m, explained }
+        Self { steps, levels_m, moved }
     }
 
     /// The tail whose change it is; none where it is the unit's own.
     pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
         let (flown, tail) = made_on(change, history)?;
         let is_within = |step: &TailWideStep| (step.first_us..=step.last_us).contains(&change.departure_us);
-        let is_step = change.kind == ChangePointKind::Step
-            && self.steps.get(tail).is_some_and(|steps| steps.iter().any(is_within));
-        let is_wide = is_step
-            || (is_unrecorded(change) && self.explained.contains(&(tail.to_owned(), flown.departure_utc())));
+        let is_wide = match change.kind {
+            ChangePointKind::Step => {
+                let steps = self.steps.get(tail).map_or(&[][..], Vec::as_slice);
+                steps.iter().any(is_within) || self.is_explained(flown, tail)
+            }
+            ChangePointKind::Reset => self.is_explained(flown, tail),
+            _ => false,
+        };
         is_wide.then_some(tail)
+    }
+
+    fn is_explained(&self, flown: &FlightRow, tail: &str) -> bool {
+        self.moved.iter().any(|moved| moved.explains(tail, flown.departure_utc()))
     }
 
     /// One change of the gap for each tail-wide step.
@@ -105,10 +107,6 @@ fn of_step(tail: &str, step: &TailWideStep, level_m: f64) -> Option<QuantityChan
         ),
         ..QuantityChange::default()
     })
-}
-
-fn is_unrecorded(change: &ChangePoint) -> bool {
-    matches!(change.kind, ChangePointKind::Step | ChangePointKind::Reset)
 }
 
 /// The first flight after a change, and its tail.

@@ -28,7 +28,7 @@ pub(crate) struct RowSources<'a> {
     pub(crate) limits: Limits<'a>,
     pub(crate) trend: &'a Assessment,
     pub(crate) as_of: Timestamp,
-    pub(crate) wide: &'a TailWide,
+    pub(crate) wide: &'a TailWide<'a>,
     /// Usage axis of the fleet prior.
     pub(crate) usage_axis: Option<String>,
     /// The installation that the unit is in.

@@ -24,11 +24,11 @@ use crate::findings::monitoring::coverage;
 use crate::findings::monitoring::mapping_faults::{self, MappingFault};
 use crate::findings::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
-use crate::fleet::bookkeeping::inspections::InspectionIndex;
+use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::join::open_store;
 use crate::fleet::bookkeeping::usage::UsageSources;
-use crate::fleet::builder::{self, FlightColumns};
+use crate::fleet::builder;
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
@@ -286,10 +286,10 @@ pub fn assess(
 /// The unit a query means; one that never flew has a name all the same.
 fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
     let named = (query.part_number.clone(), query.serial_number.clone());
-    if query.part_number.is_some() || histories.get(&named).is_some() {
+    if query.part_number.is_some() || histories.units.contains_key(&named) {
         return named;
     }
-    histories.names().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
+    histories.units.keys().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
 }
 
 /// Every unit's flights in the store.
@@ -298,10 +298,8 @@ fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
 /// When the store cannot be read.
 pub fn load_histories(store: &Store) -> Result<Histories, Error> {
     let scan = store.scan_columns(&Query::default(), &builder::stored_columns())?;
-    let flights = unit_rows::of_store(&scan, |rows, chunk, batch| {
-        FlightColumns::stored(chunk, batch)?.add_to(rows, |_| ())
-    })?;
-    Ok(builder::histories(flights, true).0)
+    let add = |rows: &mut _, chunk: &_, batch: &_| builder::add_stored(rows, chunk, batch, |_| ());
+    Ok(builder::histories(unit_rows::of_store(&scan, add)?, true).0)
 }
 
 /// All units, and the fleet prior of each part by training cut-off.
@@ -320,7 +318,7 @@ pub(crate) struct FleetContext<'a> {
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
     /// Inspections of the store's own units.
-    inspections: InspectionIndex,
+    inspections: Vec<InspectionRow>,
 }
 
 impl<'a> FleetContext<'a> {
@@ -333,19 +331,19 @@ impl<'a> FleetContext<'a> {
         days: &[Timestamp],
     ) -> Result<Self, Error> {
         let books = UsageSources::read(config, installations)?;
-        let is_booked = histories.is_booked();
+        let is_booked = histories.is_booked;
         let read = |(name, history): (&UnitKey, &mut History)| {
             let series = books.series(name, history, is_booked)?;
             history.drop_secondary();
             Ok(series)
         };
-        let units: Vec<_> = histories.iter_mut().collect();
+        let units: Vec<_> = histories.units.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let histories: &'a Histories = histories;
         let limits = Limits::new(config, series.iter());
-        let parts = histories.names().map(|name| name.0.as_deref()).zip(&series);
+        let parts = histories.units.keys().map(|name| name.0.as_deref()).zip(&series);
         let priors = FleetPriors::train(parts, limits, days);
-        let units = histories.iter().zip(series);
+        let units = histories.units.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
         Ok(Self {
             limits,
@@ -356,7 +354,7 @@ impl<'a> FleetContext<'a> {
             moved: Vec::new(),
             mapping_faults: Vec::new(),
             installations: is_booked.then(|| InstallationIndex::new(installations)),
-            inspections: if is_booked { InspectionIndex::read(config)? } else { InspectionIndex::default() },
+            inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
         })
     }
 
@@ -494,7 +492,7 @@ impl<'a> FleetContext<'a> {
         Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
-    fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide) -> TrendRow {
+    fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide<'_>) -> TrendRow {
         let nobody = History::default();
         let unit = self.units.get(name);
         let series = unit.map(|(_, series)| series);
@@ -516,7 +514,8 @@ impl<'a> FleetContext<'a> {
             installed,
             removal: index.and_then(|index| index.removal(name, as_of)),
             fault: self.mapping_faults.iter().find(|fault| fault.units.contains(name)),
-            inspection: installed.and_then(|stay| self.inspections.latest(name, stay, renewed, as_of)),
+            inspection: installed
+                .and_then(|stay| inspections::latest(&self.inspections, name, stay, renewed, as_of)),
             conditions: self.conditions.get(name).cloned().unwrap_or_default(),
         }
         .row()

@@ -11,7 +11,6 @@ use records::{AlertRecord, AlertStatus};
 
 use crate::findings::alert_message;
 use crate::findings::finding::{Finding, GAP, UNCHANGED};
-use crate::fleet::histories::UnitKey;
 
 /// Channels by name.
 pub type Channels = BTreeMap<String, AlertChannel>;
@@ -24,8 +23,8 @@ const BASELINE: &str = "baseline";
 /// Changes of one tail or part in one quantity within these days are one: later flights can move its date.
 const SAME_CHANGE: SignedDuration = SignedDuration::from_hours(24 * 14);
 
-/// Latest known state of each quantity of each unit, and the number of its change.
-type KnownStates<'a> = BTreeMap<(UnitKey, &'a str), (i64, Option<&'a str>)>;
+/// Rows of changes by part number, serial number and quantity; those of a tail or part have no serial number.
+type KnownChanges<'a> = BTreeMap<(Option<&'a str>, Option<&'a str>, &'a str), Vec<&'a AlertRecord>>;
 
 /// Rows to write for the findings of a run: one for each change, and one for each message that is due.
 ///
@@ -37,23 +36,23 @@ pub fn detect(
     run_id: &str,
     now: Timestamp,
 ) -> Vec<AlertRecord> {
-    let states = known_states(known);
-    if states.is_empty() {
+    let mut changes = KnownChanges::new();
+    for row in known.iter().filter(|row| row.status == AlertStatus::Recorded) {
+        let key = (row.part_number.as_deref(), row.serial_number.as_deref(), row.quantity.as_str());
+        changes.entry(key).or_default().push(row);
+    }
+    if changes.is_empty() {
         return baseline(findings, channels, run_id, now);
     }
     let mut rows = Vec::new();
     for finding in findings {
-        let before = match finding.since_utc {
-            None => state_before(&states, finding),
-            Some(since_utc) => changes_before(known, finding, since_utc),
-        };
-        let Some((number, from)) = before else { continue };
+        let key = (finding.unit.0.as_deref(), finding.serial_number(), finding.quantity);
+        let of_finding = changes.get(&key).map_or(&[][..], Vec::as_slice);
+        let Some((number, from)) = before(of_finding, finding) else { continue };
         let id = change_id(finding, number + 1, from);
         let change = row(&id, CHANGE, number + 1, from, finding, run_id, now);
-        let (part, tail) = (finding.unit.0.as_deref(), finding.tail_number.as_deref());
-        let selects = |channel: &AlertChannel| channel.enabled && channel.selects(finding.state, part, tail);
         let message = alert_message::change(&id, from, finding, run_id);
-        for (name, _) in channels.iter().filter(|(_, channel)| selects(channel)) {
+        for (name, _) in channels.iter().filter(|(_, channel)| selects(channel, finding)) {
             rows.push(pending(&change, name, &message));
         }
         rows.push(change);
@@ -61,65 +60,39 @@ pub fn detect(
     rows
 }
 
-/// Number and state of a unit's last change, if its state is another one now.
-fn state_before<'a>(states: &KnownStates<'a>, finding: &Finding) -> Option<(i64, Option<&'a str>)> {
-    match states.get(&(finding.unit.clone(), finding.quantity)) {
-        Some((number, state)) => (*state != finding.state).then_some((*number, *state)),
-        // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
-        None => finding.is_noteworthy().then_some((0, None)),
-    }
-}
-
-/// Number of the changes that a tail or part is known to have made, unless this one is among them.
-fn changes_before(
-    known: &[AlertRecord],
-    finding: &Finding,
-    since_utc: Timestamp,
-) -> Option<(i64, Option<&'static str>)> {
+/// Number and state of the last of the known changes, unless the finding is known.
+fn before<'a>(known: &[&'a AlertRecord], finding: &Finding) -> Option<(i64, Option<&'a str>)> {
+    let Some(since_utc) = finding.since_utc else {
+        return match known.iter().max_by_key(|row| row.change_number) {
+            Some(last) => {
+                let state = last.to_state.as_deref();
+                (state != finding.state).then_some((last.change_number, state))
+            }
+            // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
+            None => finding.is_noteworthy().then_some((0, None)),
+        };
+    };
+    let of_place = || known.iter().filter(|row| row.tail_number == finding.tail_number);
     let is_same = |at: Timestamp| since_utc.duration_since(at).abs() <= SAME_CHANGE;
-    let mut number = 0;
-    for row in
-        known.iter().filter(|row| row.status == AlertStatus::Recorded && row.quantity == finding.quantity)
-    {
-        let is_of = row.part_number == finding.unit.0 && row.tail_number == finding.tail_number;
-        let Some(at) = row.since_utc.filter(|_| is_of) else { continue };
-        if is_same(at) {
-            return None;
-        }
-        number = number.max(row.change_number);
-    }
-    Some((number, Some(UNCHANGED)))
+    let is_known = of_place().any(|row| row.since_utc.is_some_and(is_same));
+    let number = of_place().map(|row| row.change_number).max().unwrap_or(0);
+    (!is_known).then_some((number, Some(UNCHANGED)))
 }
 
-fn known_states(known: &[AlertRecord]) -> KnownStates<'_> {
-    let mut states = KnownStates::new();
-    for row in known.iter().filter(|row| row.status == AlertStatus::Recorded) {
-        let Some(serial) = row.serial_number.clone() else { continue };
-        let key = ((row.part_number.clone(), serial), row.quantity.as_str());
-        let latest = states.entry(key).or_insert((row.change_number, row.to_state.as_deref()));
-        if latest.0 <= row.change_number {
-            *latest = (row.change_number, row.to_state.as_deref());
-        }
-    }
-    states
+/// Whether a channel gets the changes to a finding's state.
+fn selects(channel: &AlertChannel, finding: &Finding) -> bool {
+    let (part, tail) = (finding.unit.0.as_deref(), finding.tail_number.as_deref());
+    channel.enabled && channel.selects(finding.state, part, tail)
 }
 
 fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timestamp) -> Vec<AlertRecord> {
     let is_kept = |finding: &&Finding| finding.quantity == GAP || finding.is_noteworthy();
-    let mut rows: Vec<AlertRecord> = findings
-        .iter()
-        .filter(is_kept)
-        .map(|finding| {
-            let id = change_id(finding, 0, None);
-            row(&id, BASELINE, 0, None, finding, run_id, now)
-        })
-        .collect();
+    let state = |to: &Finding| row(&change_id(to, 0, None), BASELINE, 0, None, to, run_id, now);
+    let mut rows: Vec<AlertRecord> = findings.iter().filter(is_kept).map(state).collect();
     let Some(first) = findings.first() else { return rows };
     let all: Vec<&Finding> = findings.iter().filter(|finding| finding.quantity == GAP).collect();
     for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
-        let is_selected =
-            |f: &&Finding| channel.selects(f.state, f.unit.0.as_deref(), f.tail_number.as_deref());
-        let selected: Vec<&Finding> = findings.iter().filter(is_selected).collect();
+        let selected: Vec<&Finding> = findings.iter().filter(|finding| selects(channel, finding)).collect();
         let id = identifier(first.as_of_utc, &[BASELINE, name, run_id]);
         let message = alert_message::baseline(&id, &all, &selected, run_id);
         let (quantity, as_of_utc) = (first.quantity, first.as_of_utc);

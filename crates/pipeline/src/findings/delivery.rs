@@ -88,19 +88,17 @@ pub fn deliver<C: Courier>(
         if !channel.enabled {
             continue;
         }
-        let is_repeatable = is_repeatable(channel);
-        let is_cut = row.status == AlertStatus::Sending;
-        if is_cut && !is_repeatable {
-            row.error = Some("the run was killed while the message was sent".to_owned());
-            mark(&mut row, AlertStatus::Unconfirmed, run_id);
-            delivery.unconfirmed.push(row);
-        } else if is_cut
-            || row.status == AlertStatus::Pending
-            || (row.status == AlertStatus::Unconfirmed && is_repeatable)
-        {
-            due.entry(row.channel.clone()).or_default().push(row);
-        } else if row.status == AlertStatus::Unconfirmed {
-            summary.unconfirmed_before += 1;
+        match (row.status, is_repeatable(channel)) {
+            (AlertStatus::Sending, false) => {
+                row.error = Some("the run was killed while the message was sent".to_owned());
+                mark(&mut row, AlertStatus::Unconfirmed, run_id);
+                delivery.unconfirmed.push(row);
+            }
+            (AlertStatus::Unconfirmed, false) => summary.unconfirmed_before += 1,
+            (AlertStatus::Pending | AlertStatus::Sending | AlertStatus::Unconfirmed, _) => {
+                due.entry(row.channel.clone()).or_default().push(row);
+            }
+            _ => {}
         }
     }
     if !delivery.unconfirmed.is_empty() {

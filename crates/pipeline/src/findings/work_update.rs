@@ -10,7 +10,7 @@ use crate::findings::finding::Finding;
 use crate::findings::work_requests::{event_of, next_number, requests};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
-use crate::fleet::histories::UnitKey;
+use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// Microseconds of a day.
 const DAY_US: i64 = 86_400_000_000;
@@ -77,45 +77,35 @@ fn of_open(
     let name = request.unit();
     let event = |event: WorkEventKind| WorkEvent { event, ..event_of(request, now) };
     let state = finding.and_then(|finding| finding.state);
-    let close = |kind: WorkEventKind| {
-        let closed = event(kind);
-        WorkEvent { state: state.map(str::to_owned).or_else(|| closed.state.clone()), ..closed }
+    let closed = |kind: WorkEventKind, reason: String, as_of_utc: Timestamp| {
+        let state = state.map(str::to_owned).or_else(|| request.state.clone());
+        vec![WorkEvent { state, reason: Some(reason), as_of_utc, ..event(kind) }]
     };
     if let Some(repaired) = tables.repair_after(&name, request.opened_utc) {
         let reason = format!("repair of {} in the maintenance table", repaired.strftime("%Y-%m-%d"));
-        let closed = close(WorkEventKind::Maintained);
-        return vec![WorkEvent { reason: Some(reason), as_of_utc: repaired, ..closed }];
+        return closed(WorkEventKind::Maintained, reason, repaired);
     }
     if let Some((last, removed)) = tables.removal(&name) {
         let date = removed.strftime("%Y-%m-%d");
         let reason = format!("removed from {} of {} on {date}", last.position, last.tail_number);
-        let closed = close(WorkEventKind::Removed);
-        return vec![WorkEvent { reason: Some(reason), as_of_utc: removed, ..closed }];
+        return closed(WorkEventKind::Removed, reason, removed);
     }
+    let known = TailPosition { tail_number: request.tail_number.clone(), position: request.position.clone() };
+    let installed = tables.place(&name);
+    let place = installed.map_or_else(|| known.clone(), TailPosition::of);
     let mut found = Vec::new();
-    if let Some(place) = tables.place(&name) {
-        let (tail, position) = (place.tail_number.to_string(), place.position.to_string());
-        let is_same =
-            (request.tail_number.as_ref(), request.position.as_ref()) == (Some(&tail), Some(&position));
-        if !is_same {
-            let (tail_number, position) = (Some(tail), Some(position));
-            let as_of_utc = place.installed_utc;
-            found.push(WorkEvent { tail_number, position, as_of_utc, ..event(WorkEventKind::Moved) });
-        }
+    if let Some(installed) = installed.filter(|_| place != known) {
+        found.push(WorkEvent { as_of_utc: installed.installed_utc, ..event(WorkEventKind::Moved) });
     }
     let is_worse = rank(state) > rank(request.state.as_deref());
     let is_due = request.status == "open" && request.until_utc.is_some();
     if is_due || (request.status == "deferred" && is_worse) {
         found.push(event(WorkEventKind::Returned));
     }
-    if let Some(finding) = finding {
-        found.extend(state_change(request, finding, now));
-    }
+    found.extend(finding.and_then(|finding| state_change(request, finding, now)));
     // The place of a move is that of the events after it.
-    if let Some(moved) = found.first().filter(|event| event.event == WorkEventKind::Moved).cloned() {
-        for event in &mut found {
-            (event.tail_number, event.position) = (moved.tail_number.clone(), moved.position.clone());
-        }
+    for event in &mut found {
+        (event.tail_number, event.position) = (place.tail_number.clone(), place.position.clone());
     }
     found
 }
@@ -161,14 +151,14 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
     if !wants_work(finding.state) || tables.removal(&finding.unit).is_some() {
         return None;
     }
-    let place = tables.place(&finding.unit);
-    let tail = place.map(|place| place.tail_number.to_string()).or_else(|| finding.tail_number.clone());
-    let position = place.map(|place| place.position.to_string()).or_else(|| finding.position.clone());
+    let (tail_number, position) = (finding.tail_number.clone(), finding.position.clone());
+    let installed = tables.place(&finding.unit).map(TailPosition::of);
+    let TailPosition { tail_number, position } = installed.unwrap_or(TailPosition { tail_number, position });
     Some(WorkEvent {
         event: WorkEventKind::Opened,
         part_number: finding.unit.0.clone(),
         serial_number: finding.unit.1.clone(),
-        tail_number: tail,
+        tail_number,
         position,
         quantity: finding.quantity.to_owned(),
         state: finding.state.map(str::to_owned),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch, TimestampMicrosecondArray};
+use arrow::array::{Array, AsArray, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use rayon::prelude::*;
@@ -56,135 +56,91 @@ pub(crate) fn histories<R: Send>(
         ((name.clone(), history), (name, further))
     };
     let (units, further): (Vec<_>, Vec<_>) = parts.into_par_iter().map(history).unzip();
-    (Histories::new(units.into_iter().collect(), is_booked), further.into_iter().collect())
+    (Histories { units: units.into_iter().collect(), is_booked }, further.into_iter().collect())
 }
 
-/// The columns of some rows that a history is made from.
-pub(crate) struct FlightColumns<'a> {
-    chunk: &'a TableBatch,
-    departure: usize,
-    departures: TimestampMicrosecondArray,
-    flights: TextColumn,
-    gaps_m: Float64Array,
-    errors_m: Float64Array,
-    hours: Float64Array,
-    meters: Float64Array,
-    reversals: Float64Array,
-    /// The gaps of the other estimator, m.
-    others_m: Float64Array,
-    settings: TextColumn,
-    flags: Flags,
+/// Adds the flights of an estimates table to those of their units.
+///
+/// # Errors
+/// When a column that must be there is not, or has another type, and as [`add_stored`].
+pub(crate) fn add_external(
+    rows: &mut RowsByUnit<(StoredFlight, ())>,
+    chunk: &TableBatch,
+) -> Result<(), ingest::Error> {
+    chunk.column(&["serial_number", "serial"])?;
+    let flags = TextColumn::of(chunk, &["flags"])?;
+    // A record with any flag contradicts itself, so that it alone confirms nothing. A list without flags is written as `[]`.
+    let other_gap_m = |row, gap_m| flags.get(row).filter(|flags| *flags != "[]").map(|_| gap_m);
+    add(rows, chunk, other_gap_m, |_| ())
 }
 
-/// Quality flags of the gaps.
-enum Flags {
-    /// A record of an external table with any flag contradicts itself, so that it alone confirms nothing.
-    External(TextColumn),
-    /// A record of the store whose estimators disagree has the gap of the other one.
-    Stored(Option<ListArray>),
+/// Adds the flights of the store's records to those of their units, each with what else `further` makes of its row.
+///
+/// # Errors
+/// The first row without a serial number, or without a departure that a calendar has.
+pub(crate) fn add_stored<R>(
+    rows: &mut RowsByUnit<(StoredFlight, R)>,
+    chunk: &TableBatch,
+    batch: &RecordBatch,
+    further: impl Fn(usize) -> R,
+) -> Result<(), ingest::Error> {
+    let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
+    let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
+    // A record whose estimators disagree has the gap of the other one.
+    let other_gap_m = |row, _| {
+        let has_flags = |flags: &&ListArray| flags.is_valid(row) && flags.value_length(row) > 0;
+        let of_row = flags.filter(has_flags)?.value(row);
+        let is_disputed = of_row.as_string_opt::<i32>()?.iter().any(|flag| flag == Some(DISAGREE));
+        at(&others_m, row).filter(|_| is_disputed)
+    };
+    add(rows, chunk, other_gap_m, further)
 }
 
-impl<'a> FlightColumns<'a> {
-    /// Those of an estimates table.
-    ///
-    /// # Errors
-    /// When a column that must be there is not, or has another type.
-    pub(crate) fn external(chunk: &'a TableBatch) -> Result<Self, ingest::Error> {
-        chunk.column(&["serial_number", "serial"])?;
-        Self::of(chunk, Flags::External(TextColumn::of(chunk, &["flags"])?))
-    }
-
-    /// Those of the store's records.
-    pub(crate) fn stored(chunk: &'a TableBatch, batch: &RecordBatch) -> Result<Self, ingest::Error> {
-        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
-        Self::of(chunk, Flags::Stored(flags))
-    }
-
-    fn of(chunk: &'a TableBatch, flags: Flags) -> Result<Self, ingest::Error> {
-        let numbers = |name: &str| chunk.numbers(chunk.find(&[name]));
-        let departure = chunk.column(&["departure_utc"])?;
-        Ok(Self {
-            chunk,
-            departure,
-            departures: chunk.timestamps(Some(departure))?,
-            flights: TextColumn::of(chunk, &["flight_id"])?,
-            gaps_m: chunk.numbers(Some(chunk.column(&["gap_m"])?))?,
-            errors_m: numbers("gap_se_m")?,
-            hours: numbers("flight_hours")?,
-            meters: numbers("tail_hours_end")?,
-            reversals: numbers("load_reversals")?,
-            others_m: numbers(OTHER_GAP)?,
-            settings: TextColumn::of(chunk, &[SETTINGS])?,
-            flags,
-        })
-    }
-
-    /// Adds the flights of the rows to those of their units, each with what else `further` makes of its row.
-    ///
-    /// # Errors
-    /// The first row without a serial number, or without a departure that a calendar has.
-    pub(crate) fn add_to<R>(
-        &self,
-        rows: &mut RowsByUnit<(StoredFlight, R)>,
-        further: impl Fn(usize) -> R,
-    ) -> Result<(), ingest::Error> {
-        rows.add_rows(self.chunk, |row, unit, place| {
-            let flight = self.flight(row, unit, place)?;
-            unit.rows.push((flight, further(row)));
-            Ok(())
-        })
-    }
-
-    /// The flight of a row in a place of its unit, which takes its name and counts its settings.
-    ///
-    /// # Errors
-    /// A departure that is missing or that no calendar has.
-    fn flight<R>(
-        &self,
-        row: usize,
-        unit: &mut UnitRows<R>,
-        place: u32,
-    ) -> Result<StoredFlight, ingest::Error> {
-        let wrong = |detail: String| self.chunk.error(row, Some(self.departure), detail);
-        let departure_us = self.departures.is_valid(row).then(|| self.departures.value(row));
+/// Adds the flights of some rows. `other_gap_m` gives the gap that contradicts that of a row, m.
+fn add<R>(
+    rows: &mut RowsByUnit<(StoredFlight, R)>,
+    chunk: &TableBatch,
+    other_gap_m: impl Fn(usize, f64) -> Option<f64>,
+    further: impl Fn(usize) -> R,
+) -> Result<(), ingest::Error> {
+    let numbers = |name: &str| chunk.numbers(chunk.find(&[name]));
+    let departure = chunk.column(&["departure_utc"])?;
+    let departures = chunk.timestamps(Some(departure))?;
+    let gaps_m = chunk.numbers(Some(chunk.column(&["gap_m"])?))?;
+    let (errors_m, reversals) = (numbers("gap_se_m")?, numbers("load_reversals")?);
+    let (hours, meters) = (numbers("flight_hours")?, numbers("tail_hours_end")?);
+    let (flights, settings) = (TextColumn::of(chunk, &["flight_id"])?, TextColumn::of(chunk, &[SETTINGS])?);
+    rows.add_rows(chunk, |row, unit, place| {
+        let wrong = |detail: String| chunk.error(row, Some(departure), detail);
+        let departure_us = departures.is_valid(row).then(|| departures.value(row));
         let departure_us = departure_us.ok_or_else(|| wrong("it is empty".into()))?;
         Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
-        let gap_m = at(&self.gaps_m, row);
-        if let Some(settings) = self.settings.get(row).filter(|_| gap_m.is_some()) {
+        let gap_m = at(&gaps_m, row);
+        if let Some(settings) = settings.get(row).filter(|_| gap_m.is_some()) {
             unit.settings.add(settings, 1, departure_us);
         }
-        let name = self.flights.get(row).unwrap_or_default();
+        let name = flights.get(row).unwrap_or_default();
         let flown = FlightRow::new(departure_us, gap_m, place, name, &mut unit.names);
-        let other_m = gap_m.and_then(|gap_m| self.other_gap_m(row, gap_m));
+        let other_m = gap_m.and_then(|gap_m| other_gap_m(row, gap_m));
         let extras = FlightExtras {
-            flight_hours: number(&self.hours, row),
-            tail_hours_end: number(&self.meters, row),
-            gap_se_m: signed_error(at(&self.errors_m, row), gap_m.zip(other_m)),
-            load_reversals: at(&self.reversals, row).map_or(u64::MAX, |n| n as u64),
+            flight_hours: number(&hours, row),
+            tail_hours_end: number(&meters, row),
+            gap_se_m: signed_error(at(&errors_m, row), gap_m.zip(other_m)),
+            load_reversals: at(&reversals, row).map_or(u64::MAX, |n| n as u64),
         };
-        Ok((flown, extras))
-    }
-
-    /// The gap that contradicts that of a row, m.
-    fn other_gap_m(&self, row: usize, gap_m: f64) -> Option<f64> {
-        match &self.flags {
-            // A list without flags is written as `[]`.
-            Flags::External(texts) => texts.get(row).filter(|flags| *flags != "[]").map(|_| gap_m),
-            Flags::Stored(flags) => {
-                let has_flags = |flags: &&ListArray| flags.is_valid(row) && flags.value_length(row) > 0;
-                let flags = flags.as_ref().filter(has_flags)?.value(row);
-                let is_disputed = flags.as_string_opt::<i32>()?.iter().any(|flag| flag == Some(DISAGREE));
-                at(&self.others_m, row).filter(|_| is_disputed)
-            }
-        }
-    }
+        unit.rows.push(((flown, extras), further(row)));
+        Ok(())
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{ArrayRef, Int64Array, ListBuilder, StringArray, StringBuilder};
+    use arrow::array::{
+        ArrayRef, Float64Array, Int64Array, ListBuilder, StringArray, StringBuilder,
+        TimestampMicrosecondArray,
+    };
     use arrow::compute::cast;
     use arrow::datatypes::DataType;
 
@@ -212,9 +168,9 @@ mod tests {
         ];
         let batch = RecordBatch::try_from_iter(columns).unwrap();
         let histories = of_batches(&[batch], add_batch);
-        let history = histories.get(&(None, "S".into())).unwrap();
+        let history = &histories.units[&(None, "S".into())];
         let errors: Vec<f64> =
-            history.flights().iter().map(|flown| history.extras(flown).gap_se_m().unwrap() * 1e6).collect();
+            history.flights().iter().map(|flown| history.extras(flown).gap_se_m.abs() * 1e6).collect();
         assert!((errors[0] - 5.0).abs() < 1e-9 && (errors[1] - 3.0).abs() < 1e-9, "{errors:?}");
         let at = |us| Timestamp::from_microsecond(us).unwrap();
         assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
@@ -228,11 +184,11 @@ mod tests {
     }
 
     fn add_batch(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        FlightColumns::stored(&chunk(batch), batch)?.add_to(rows, |_| ())
+        add_stored(rows, &chunk(batch), batch, |_| ())
     }
 
     fn add_plain(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        FlightColumns::external(&chunk(batch))?.add_to(rows, |_| ())
+        add_external(rows, &chunk(batch))
     }
 
     /// The histories of a table in batches.
@@ -294,7 +250,7 @@ mod tests {
             };
             format!("{name:?} {:?}", history.flights().iter().map(flight).collect::<Vec<_>>())
         };
-        histories.iter().map(of_unit).collect()
+        histories.units.iter().map(of_unit).collect()
     }
 
     /// Rows of the store and of an estimates table. The order of parts decides, not that of the workers, of whom there may be

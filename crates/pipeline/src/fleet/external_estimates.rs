@@ -5,7 +5,7 @@ use std::path::Path;
 use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
-use crate::fleet::builder::{self, FlightColumns};
+use crate::fleet::builder::{self, add_external};
 use crate::fleet::histories::Histories;
 use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::unit_rows::of_parts;
@@ -31,7 +31,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
     let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS)?;
     let parts = of_parts(table.len(), |rows, part| {
         let mut chunks = table.batches(part..part + 1)?;
-        Ok(chunks.try_for_each(|chunk| FlightColumns::external(&chunk?)?.add_to(rows, |_| ()))?)
+        Ok(chunks.try_for_each(|chunk| add_external(rows, &chunk?))?)
     })?;
     Ok(builder::histories(parts, false).0)
 }
@@ -41,9 +41,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    let parts = of_parts(chunks.len(), |rows, part| {
-        Ok(FlightColumns::external(&chunks[part])?.add_to(rows, |_| ())?)
-    })?;
+    let parts = of_parts(chunks.len(), |rows, part| Ok(add_external(rows, &chunks[part])?))?;
     Ok(builder::histories(parts, false).0)
 }
 

@@ -1,6 +1,7 @@
 //! One flight of one unit in as few bytes as its numbers take: a fleet has tens of millions of them.
 
 use jiff::Timestamp;
+use trend::Observation;
 
 /// A flight, and its secondary columns.
 pub(crate) type StoredFlight = (FlightRow, FlightExtras);
@@ -75,7 +76,7 @@ impl FlightRow {
 
 /// Secondary columns of a flight, in 32 bytes: needed only until usage is accumulated.
 #[derive(Debug, Clone, Copy)]
-pub struct FlightExtras {
+pub(crate) struct FlightExtras {
     /// Numbers; `NaN` for none.
     pub(crate) flight_hours: f64,
     pub(crate) tail_hours_end: f64,
@@ -86,29 +87,23 @@ pub struct FlightExtras {
 }
 
 impl FlightExtras {
-    /// The flight's length, hours.
-    pub fn flight_hours(&self) -> Option<f64> {
-        known(self.flight_hours)
-    }
-
-    /// The tail's hours after it.
-    pub fn tail_hours_end(&self) -> Option<f64> {
-        known(self.tail_hours_end)
-    }
-
-    /// Load reversals in it.
-    pub fn load_reversals(&self) -> Option<u64> {
-        (self.load_reversals != u64::MAX).then_some(self.load_reversals)
-    }
-
-    /// The gap's standard error, m; it spans both estimators where they disagree.
-    pub fn gap_se_m(&self) -> Option<f64> {
-        known(self.gap_se_m.abs())
-    }
-
     /// Whether the estimators disagree, or the record of an external table is flagged.
     pub(crate) fn is_disputed(&self) -> bool {
         self.gap_se_m.is_sign_negative()
+    }
+
+    /// The flight as the trend knows it, in an installation. The standard error spans both estimators where they disagree.
+    pub(crate) fn observation(&self, flown: &FlightRow, installation: u32) -> Observation {
+        Observation {
+            departure_us: flown.departure_us,
+            installation,
+            flight_hours: known(self.flight_hours),
+            tail_hours_end: known(self.tail_hours_end),
+            load_reversals: (self.load_reversals != u64::MAX).then_some(self.load_reversals),
+            gap_m: flown.gap_m(),
+            gap_se_m: known(self.gap_se_m.abs()).filter(|se_m| *se_m > 0.0),
+            is_doubtful: self.is_disputed(),
+        }
     }
 }
 

@@ -10,7 +10,6 @@ use jiff::Timestamp;
 use records::Installation;
 
 use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
-use crate::fleet::places::Positions;
 use crate::fleet::settings_counts::SettingsCounts;
 use crate::fleet::unit_rows::UnitRows;
 
@@ -73,7 +72,7 @@ impl History {
     }
 
     /// Secondary columns of one of them.
-    pub fn extras(&self, flown: &FlightRow) -> FlightExtras {
+    pub(crate) fn extras(&self, flown: &FlightRow) -> FlightExtras {
         self.extras[flown.row as usize]
     }
 
@@ -106,7 +105,7 @@ impl History {
     /// The history of a unit's rows, each with what else `R` holds of it; sorted, so that it does not depend on the order of
     /// arrival.
     pub(crate) fn of_rows<R>(rows: UnitRows<(StoredFlight, R)>) -> (Self, Vec<R>) {
-        let UnitRows { places: Positions(places), names, settings, mut rows } = rows;
+        let UnitRows { places, names, settings, mut rows } = rows;
         let place = |flown: &FlightRow| &places[flown.place as usize];
         let order = |((a, _), _): &(StoredFlight, R), ((b, _), _): &(StoredFlight, R)| {
             let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(&names).cmp(&b.name_in(&names)));
@@ -127,45 +126,17 @@ impl History {
 /// All units' flights.
 #[derive(Debug, Clone, Default)]
 pub struct Histories {
-    units: BTreeMap<UnitKey, History>,
-    is_booked: bool,
+    /// Each unit's flights.
+    pub units: BTreeMap<UnitKey, History>,
+    /// Whether these are the store's own, whose flights belong to rows of the installations table. Those of a table made
+    /// elsewhere may be of other aircraft under the same names.
+    pub(crate) is_booked: bool,
 }
 
 impl Histories {
-    pub(crate) fn new(units: BTreeMap<UnitKey, History>, is_booked: bool) -> Self {
-        Self { units, is_booked }
-    }
-
-    /// Whether these are the store's own, whose flights belong to rows of the installations table.
-    ///
-    /// Those of a table made elsewhere may be of other aircraft under the same names.
-    pub(crate) fn is_booked(&self) -> bool {
-        self.is_booked
-    }
-
-    /// Every unit and its flights, by name, to be changed.
-    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (&UnitKey, &mut History)> {
-        self.units.iter_mut()
-    }
-
-    /// Every unit and its flights, by name.
-    pub fn iter(&self) -> impl Iterator<Item = (&UnitKey, &History)> {
-        self.units.iter()
-    }
-
-    /// Every unit.
-    pub fn names(&self) -> impl Iterator<Item = &UnitKey> {
-        self.units.keys()
-    }
-
     /// The tails of all flights; a tail may come several times.
     pub fn tails(&self) -> impl Iterator<Item = &str> {
         self.units.values().flat_map(History::tails)
-    }
-
-    /// A unit's flights.
-    pub fn get(&self, name: &UnitKey) -> Option<&History> {
-        self.units.get(name)
     }
 
     /// The last departure of all, but no later than now: a record dated ahead must not make all others stale.

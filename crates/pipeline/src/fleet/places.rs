@@ -27,32 +27,18 @@ impl TailPosition {
     }
 }
 
-/// A unit's places, as they come.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Positions(pub(crate) Vec<TailPosition>);
-
-impl Positions {
-    /// The place with a number.
-    pub(crate) fn get(&self, number: u32) -> &TailPosition {
-        &self.0[number as usize]
-    }
-
-    /// The number of a place.
-    pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
-        // A unit sits where it sat in the row before, or in one of a handful of places.
-        let known = self.0.iter().rposition(|place| place.is(tail_number, position));
-        let at = known.unwrap_or_else(|| {
-            let owned = |name: Option<&str>| name.map(str::to_owned);
-            self.0.push(TailPosition { tail_number: owned(tail_number), position: owned(position) });
-            self.0.len() - 1
-        });
-        at as u32
-    }
-
-    /// The numbers of others.
-    pub(crate) fn numbers(&mut self, others: &Self) -> Vec<u32> {
-        let number =
-            |place: &TailPosition| self.number(place.tail_number.as_deref(), place.position.as_deref());
-        others.0.iter().map(number).collect()
-    }
+/// The number of a place among those of a unit, as they come.
+pub(crate) fn place_number(
+    places: &mut Vec<TailPosition>,
+    tail_number: Option<&str>,
+    position: Option<&str>,
+) -> u32 {
+    // A unit sits where it sat in the row before, or in one of a handful of places.
+    let known = places.iter().rposition(|place| place.is(tail_number, position));
+    let at = known.unwrap_or_else(|| {
+        let owned = |name: Option<&str>| name.map(str::to_owned);
+        places.push(TailPosition { tail_number: owned(tail_number), position: owned(position) });
+        places.len() - 1
+    });
+    at as u32
 }

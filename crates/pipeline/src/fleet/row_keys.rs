@@ -4,12 +4,17 @@ use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;
 use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
 
+/// Numbers of a unit and of its place.
+type Seat = (usize, u32);
+
 /// Key columns of some rows.
 pub(crate) struct KeyColumns {
     pub(crate) serials: TextColumn,
     pub(crate) parts: TextColumn,
     pub(crate) tails: TextColumn,
     pub(crate) positions: TextColumn,
+    /// The last row of each serial number with its seat, by code; the first entry is that of serial numbers without codes.
+    seats: Vec<Option<(usize, Seat)>>,
 }
 
 impl KeyColumns {
@@ -19,46 +24,36 @@ impl KeyColumns {
 
     /// Those of some rows of a table.
     pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
-        let names: [&[&str]; 4] =
-            [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
-        let [serials, parts, tails, positions] = names.map(|names| TextColumn::of(chunk, names));
-        Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
+        let column = |names: &[&str]| TextColumn::of(chunk, names);
+        Ok(Self {
+            serials: column(&["serial_number", "serial"])?,
+            parts: column(&["part_number"])?,
+            tails: column(&["tail_number", "tail"])?,
+            positions: column(&["position"])?,
+            seats: Vec::new(),
+        })
+    }
+
+    /// The seat of a row: that of an earlier row with the same keys, or what `find` finds.
+    pub(crate) fn seat(
+        &mut self,
+        row: usize,
+        find: impl FnOnce(&Self) -> Result<Seat, ingest::Error>,
+    ) -> Result<Seat, ingest::Error> {
+        let entry = self.serials.code(row).map_or(0, |code| code + 1);
+        let known = self.seats.get(entry).copied().flatten();
+        if let Some((_, seat)) = known.filter(|(before, _)| self.are_same(*before, row)) {
+            return Ok(seat);
+        }
+        let seat = find(self)?;
+        self.seats.resize(self.seats.len().max(entry + 1), None);
+        self.seats[entry] = Some((row, seat));
+        Ok(seat)
     }
 
     /// Whether two rows are of one unit in one place.
     fn are_same(&self, a: usize, b: usize) -> bool {
         [&self.serials, &self.positions, &self.tails, &self.parts].iter().all(|names| names.are_same(a, b))
-    }
-}
-
-/// Numbers of a unit and of its place.
-type Seat = (usize, u32);
-
-/// Seats of earlier rows: of the last one, and of the last one of each serial number where these have codes.
-#[derive(Default)]
-pub(crate) struct KeyCache {
-    last: Option<(usize, Seat)>,
-    by_code: Vec<Option<(usize, Seat)>>,
-}
-
-impl KeyCache {
-    /// The seat of a row, if it is that of an earlier row.
-    pub(crate) fn get(&self, keys: &KeyColumns, row: usize) -> Option<Seat> {
-        let of_code = match keys.serials.code(row) {
-            Some(code) => self.by_code.get(code).copied().flatten(),
-            None => self.last,
-        };
-        of_code.filter(|(before, _)| keys.are_same(*before, row)).map(|(_, found)| found)
-    }
-
-    /// Remembers the seat of a row.
-    pub(crate) fn put(&mut self, keys: &KeyColumns, row: usize, found: Seat) {
-        self.last = Some((row, found));
-        let Some(code) = keys.serials.code(row) else { return };
-        if self.by_code.len() <= code {
-            self.by_code.resize(code + 1, None);
-        }
-        self.by_code[code] = self.last;
     }
 }
 

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use store::ColumnScan;
 
 use crate::error::Error;
-use crate::fleet::places::{Positions, UnitKey};
-use crate::fleet::row_keys::{KeyCache, KeyColumns};
+use crate::fleet::places::{TailPosition, UnitKey, place_number};
+use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::settings_counts::SettingsCounts;
 
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
@@ -20,7 +20,7 @@ const SHARES: usize = 4;
 #[derive(Debug)]
 pub(crate) struct UnitRows<R> {
     /// Where the unit was; a row holds the number of its place.
-    pub(crate) places: Positions,
+    pub(crate) places: Vec<TailPosition>,
     /// Flights' names one after the other, for readers that keep them.
     pub(crate) names: String,
     /// Gaps by the settings that they were estimated with, for readers that count them.
@@ -31,7 +31,7 @@ pub(crate) struct UnitRows<R> {
 impl<R> Default for UnitRows<R> {
     fn default() -> Self {
         let (names, settings) = (String::new(), SettingsCounts::default());
-        Self { places: Positions::default(), names, settings, rows: Vec::new() }
+        Self { places: Vec::new(), names, settings, rows: Vec::new() }
     }
 }
 
@@ -43,7 +43,10 @@ impl<R> UnitRows<R> {
         all.rows.reserve_exact(parts.iter().map(|part| part.rows.len()).sum());
         all.names.reserve_exact(parts.iter().map(|part| part.names.len()).sum());
         for mut part in parts {
-            let places = all.places.numbers(&part.places);
+            let number = |place: &TailPosition| {
+                place_number(&mut all.places, place.tail_number.as_deref(), place.position.as_deref())
+            };
+            let places: Vec<u32> = part.places.iter().map(number).collect();
             let names = all.names.len() as u32;
             part.rows.iter_mut().for_each(|row| moved(row, &places, names));
             all.rows.append(&mut part.rows);
@@ -82,21 +85,15 @@ impl<R> RowsByUnit<R> {
         chunk: &TableBatch,
         mut read: impl FnMut(usize, &mut UnitRows<R>, u32) -> Result<(), ingest::Error>,
     ) -> Result<(), ingest::Error> {
-        let keys = KeyColumns::of(chunk)?;
-        let mut seen = KeyCache::default();
+        let mut keys = KeyColumns::of(chunk)?;
         for row in chunk.rows() {
-            let (unit, place) = match seen.get(&keys, row) {
-                Some(known) => known,
-                None => {
-                    let column = chunk.find(&["serial_number", "serial"]);
-                    let empty = || chunk.error(row, column, "it is empty".into());
-                    let unit = self.unit(keys.parts.get(row), keys.serials.get(row).ok_or_else(empty)?);
-                    let places = &mut self.units[unit].1.places;
-                    let found = (unit, places.number(keys.tails.get(row), keys.positions.get(row)));
-                    seen.put(&keys, row, found);
-                    found
-                }
-            };
+            let (unit, place) = keys.seat(row, |keys| {
+                let column = chunk.find(&["serial_number", "serial"]);
+                let empty = || chunk.error(row, column, "it is empty".into());
+                let unit = self.unit(keys.parts.get(row), keys.serials.get(row).ok_or_else(empty)?);
+                let places = &mut self.units[unit].1.places;
+                Ok((unit, place_number(places, keys.tails.get(row), keys.positions.get(row))))
+            })?;
             read(row, &mut self.units[unit].1, place)?;
         }
         Ok(())

@@ -56,7 +56,7 @@ pub fn compose(
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
     checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));
-    let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
+    let known = |c: &InspectionRow| histories.units.keys().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
     let mut requests = by_unit(work_requests::requests(&store.work_events()?, made_utc), WorkRequest::unit);
     let mut tails = tails(&histories, config, as_of_utc);
@@ -74,7 +74,7 @@ pub fn compose(
         let name = row.unit();
         let extras = extras.remove(&name).unwrap_or_default();
         let work_requests = requests.remove(&name).unwrap_or_default();
-        let history = histories.get(&name);
+        let history = histories.units.get(&name);
         let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), extras);
         UnitView { work_requests, ..view }
     };
@@ -338,7 +338,7 @@ fn tails(
     as_of: Option<Timestamp>,
 ) -> BTreeMap<String, ReportTailRow> {
     let mut tails: BTreeMap<&str, (ReportTailRow, BTreeSet<i64>)> = BTreeMap::new();
-    let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(move |f| (h, f)));
+    let flown = histories.units.values().flat_map(|h| h.flights().iter().map(move |f| (h, f)));
     for (history, record) in flown {
         let Some(name) = history.place(record).tail_number.as_deref() else { continue };
         let (tail, departures) = tails.entry(name).or_default();

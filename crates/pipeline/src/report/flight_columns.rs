@@ -12,7 +12,7 @@ use records::row_schema::NoColumn;
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::fleet::builder::{self, FlightColumns};
+use crate::fleet::builder;
 use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::TextColumn;
@@ -73,7 +73,6 @@ fn add(
     chunk: &TableBatch,
     batch: &RecordBatch,
 ) -> Result<(), ingest::Error> {
-    let flights = FlightColumns::stored(chunk, batch)?;
     let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
     let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
     let quantities = Quantity::ALL.map(|quantity| column(quantity.as_str()));
@@ -82,7 +81,7 @@ fn add(
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
     let profiles =
         PROFILE.map(|name| batch.column_by_name(name).and_then(|column| column.as_list_opt::<i32>()));
-    flights.add_to(rows, |row| {
+    builder::add_stored(rows, chunk, batch, |row| {
         let [
             unit_hours,
             gap_p05_m,

@@ -269,19 +269,6 @@ fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
     // A first night stores states and tells nothing.
     let first = night(&[], &with_records, &config());
     assert_eq!((first.changed.len(), first.states.len()), (0, 14));
-    // The same records under another limit: the limit is the cause, with its line.
-    let mut lower = states(&rows);
-    lower.iter_mut().for_each(|state| {
-        state.limit_m = Some(40e-6);
-        state.state = Some("act".to_owned());
-    });
-    let limit = &night(&lower, &nothing, &config()).changed[0];
-    assert_eq!(limit.cause, Cause::Limit);
-    assert!(
-        limit.because.contains("limit_m changed from 40 µm to 150 µm (pipeline.toml line"),
-        "{}",
-        limit.because
-    );
 }
 
 /// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.

@@ -4,7 +4,7 @@
 //! another part. A unit is compared with the units of its part on other tails, by median and robust spread; what belongs to
 //! sensors and recorders, with all units on other tails where its part has too few.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use job::config::QuantityLimits;
 use records::{Quantity, QuantityRow};
@@ -47,7 +47,7 @@ struct Deviation<'a> {
 
 /// What differs of the selected units, in words: tails first, then units.
 pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> bool) -> Vec<String> {
-    let (mut tails, mut units) = (Vec::new(), Vec::new());
+    let (mut tails, mut units, mut named) = (Vec::new(), Vec::new(), BTreeSet::new());
     for quantity in COMPARED {
         let found = deviations(rows, quantity);
         let of_tails = of_tails(&found);
@@ -56,16 +56,16 @@ pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> 
         };
         let is_unit = |d: &&Deviation<'_>| d.share.abs() > 1.0 && !is_tails(d) && is_selected(d.row);
         units.extend(found.iter().filter(is_unit).map(unit_note));
-        // Innovations grow with every fault of a sensor: a tail that is named has its reason.
-        let is_named = |tail: &str| tails.iter().any(|(named, _)| named == tail);
-        let new = of_tails.iter().filter(|(tail, members)| {
-            let is_new = quantity != Quantity::Nis || !is_named(tail);
-            is_new && members.iter().any(|d| is_selected(d.row))
-        });
-        let new: Vec<_> = new.map(|(tail, members)| ((*tail).to_owned(), tail_note(tail, members))).collect();
-        tails.extend(new);
+        for (tail, members) in &of_tails {
+            // Innovations grow with every fault of a sensor: a tail that is named has its reason.
+            let is_new = quantity != Quantity::Nis || !named.contains(tail);
+            if is_new && members.iter().any(|d| is_selected(d.row)) {
+                named.insert(*tail);
+                tails.push(tail_note(tail, members));
+            }
+        }
     }
-    tails.into_iter().map(|(_, note)| note).chain(units).collect()
+    tails.into_iter().chain(units).collect()
 }
 
 fn deviations(rows: &[QuantityRow], quantity: Quantity) -> Vec<Deviation<'_>> {

@@ -9,7 +9,7 @@ use store::{Query, Store};
 
 use crate::error::Error;
 use crate::findings::monitoring::median;
-use crate::fleet::places::{Positions, TailPosition, UnitKey};
+use crate::fleet::places::{TailPosition, UnitKey};
 use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, number, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
@@ -43,14 +43,14 @@ pub(crate) struct FlightValues {
 /// Values of one unit, by departure.
 #[derive(Debug, Default)]
 pub(crate) struct UnitValues {
-    pub(crate) places: Positions,
+    pub(crate) places: Vec<TailPosition>,
     pub(crate) flights: Vec<FlightValues>,
     /// Median 95 % load, N.
     pub(crate) usual_load_n: Option<f64>,
 }
 
 impl UnitValues {
-    fn new(places: Positions, mut flights: Vec<FlightValues>) -> Self {
+    fn new(places: Vec<TailPosition>, mut flights: Vec<FlightValues>) -> Self {
         flights.sort_by_key(|flight| flight.departure_us);
         let loads_n: Vec<f64> =
             flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
@@ -60,7 +60,7 @@ impl UnitValues {
 
     /// Where a flight was flown.
     pub(crate) fn place(&self, flight: &FlightValues) -> &TailPosition {
-        self.places.get(flight.place)
+        &self.places[flight.place as usize]
     }
 }
 
@@ -141,9 +141,7 @@ pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
         if of_units.get(name).is_some_and(|(known_us, _)| *known_us >= last_us) {
             continue;
         }
-        let mut places = Positions::default();
-        places.number(position.tail_number.as_deref(), position.position.as_deref());
-        of_units.insert(name, (last_us, UnitValues::new(places, flights)));
+        of_units.insert(name, (last_us, UnitValues::new(vec![position.clone()], flights)));
     }
     of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
 }

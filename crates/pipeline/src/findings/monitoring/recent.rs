@@ -61,7 +61,7 @@ pub(crate) fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<Rece
     for ((part_number, serial_number), parts) in parts {
         for part in parts {
             for (place, flight) in part.rows {
-                let TailPosition { tail_number, position } = part.places.get(place).clone();
+                let TailPosition { tail_number, position } = part.places[place as usize].clone();
                 let key = PositionKey {
                     tail_number: tail_number.unwrap_or_default(),
                     position: position.unwrap_or_default(),

@@ -15,22 +15,15 @@ const MAX_SKIPPED: usize = 200;
 pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
     let mut order: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].tail_hours_end.is_some()).collect();
     order.sort_by_key(|&row| (rows[row].installation, rows[row].departure_us));
-    let mut dropped = 0;
-    let mut begin = 0;
-    while begin < order.len() {
-        let installation = rows[order[begin]].installation;
-        let end = begin + order[begin..].partition_point(|&row| rows[row].installation <= installation);
-        let readings: Vec<Reading> =
-            order[begin..end].iter().filter_map(|&row| Reading::of(&rows[row])).collect();
-        for (at, is_kept) in agreeing(&readings).into_iter().enumerate() {
-            if !is_kept {
-                rows[order[begin + at]].tail_hours_end = None;
-                dropped += 1;
-            }
-        }
-        begin = end;
-    }
-    dropped
+    let is_of_one = |a: &usize, b: &usize| rows[*a].installation == rows[*b].installation;
+    let contradicting = |of_one: &[usize]| {
+        let readings: Vec<Reading> = of_one.iter().filter_map(|&row| Reading::of(&rows[row])).collect();
+        let kept = of_one.iter().zip(agreeing(&readings));
+        kept.filter_map(|(row, is_kept)| (!is_kept).then_some(*row)).collect::<Vec<_>>()
+    };
+    let dropped: Vec<usize> = order.chunk_by(is_of_one).flat_map(contradicting).collect();
+    dropped.iter().for_each(|&row| rows[row].tail_hours_end = None);
+    dropped.len()
 }
 
 /// A reading, and when its flight ended.

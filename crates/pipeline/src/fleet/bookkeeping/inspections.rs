@@ -1,7 +1,5 @@
 //! Inspections table: free play measured in the hangar.
 
-use std::collections::HashMap;
-
 use ingest::tables::{Table, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
@@ -70,37 +68,20 @@ impl InspectionRow {
     }
 }
 
-/// Inspections by serial number, earliest first.
-#[derive(Debug, Default)]
-pub(crate) struct InspectionIndex(HashMap<String, Vec<InspectionRow>>);
-
-impl InspectionIndex {
-    /// The configured inspections.
-    pub(crate) fn read(config: &Config) -> Result<Self, Error> {
-        let mut rows = read(config)?.unwrap_or_default();
-        rows.sort_by_key(|row| row.date_utc);
-        let mut by_serial = HashMap::<String, Vec<InspectionRow>>::new();
-        for row in rows {
-            by_serial.entry(row.serial_number.clone()).or_default().push(row);
-        }
-        Ok(Self(by_serial))
-    }
-
-    /// The latest inspection of a unit until a date, in the installation that it is in then and after its last renewal.
-    pub(crate) fn latest(
-        &self,
-        unit: &UnitKey,
-        installed: &Installation,
-        renewed: Option<Timestamp>,
-        as_of: Timestamp,
-    ) -> Option<&InspectionRow> {
-        let is_of_now = |inspection: &&InspectionRow| {
-            inspection.is_of(unit)
-                && (installed.installed_utc..=as_of).contains(&inspection.date_utc)
-                && renewed.is_none_or(|renewed| renewed < inspection.date_utc)
-        };
-        self.0.get(&unit.1)?.iter().rev().find(is_of_now)
-    }
+/// The latest of some inspections of a unit until a date, in the installation that it is in then and after its last renewal.
+pub(crate) fn latest<'i>(
+    inspections: &'i [InspectionRow],
+    unit: &UnitKey,
+    installed: &Installation,
+    renewed: Option<Timestamp>,
+    as_of: Timestamp,
+) -> Option<&'i InspectionRow> {
+    let is_of_now = |inspection: &&InspectionRow| {
+        inspection.is_of(unit)
+            && (installed.installed_utc..=as_of).contains(&inspection.date_utc)
+            && renewed.is_none_or(|renewed| renewed < inspection.date_utc)
+    };
+    inspections.iter().filter(is_of_now).max_by_key(|inspection| inspection.date_utc)
 }
 
 /// A measured play, m.

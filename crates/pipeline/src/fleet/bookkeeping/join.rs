@@ -152,7 +152,7 @@ impl Bookkeeping {
         let moved = Mutex::new(MovedByPlace::new());
         let change = |batch: &RecordBatch| {
             let mut moved = moved.lock().unwrap_or_else(PoisonError::into_inner);
-            with_new_paths(&self.join(batch, |names, at| add_moved(&mut moved, names, at))?, renamed)
+            with_new_paths(self.join(batch, |names, at| add_moved(&mut moved, names, at))?, renamed)
         };
         let rows = writer.rewrite(&COLUMNS, &change)?;
         let moved = moved.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -208,22 +208,27 @@ impl Bookkeeping {
                 hours[row] = installation.unit_hours(meters.as_ref().and_then(|meters| meters[row]));
             }
         }
-        let mut columns = batch.columns().to_vec();
-        let mut put = |name: &str, column: ArrayRef| -> Result<(), ArrowError> {
-            if let Ok(place) = schema.index_of(name) {
-                columns[place] = cast(&column, schema.field(place).data_type())?;
-            }
-            Ok(())
-        };
-        put("part_number", Arc::new(StringArray::from(parts)))?;
-        put("serial_number", Arc::new(StringArray::from(serials)))?;
-        for (name, values) in [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)] {
-            if let Some(values) = values {
-                put(name, Arc::new(Float64Array::from(values)))?;
-            }
-        }
-        RecordBatch::try_new(schema, columns)
+        let texts: [(_, ArrayRef); 2] = [
+            ("part_number", Arc::new(StringArray::from(parts))),
+            ("serial_number", Arc::new(StringArray::from(serials))),
+        ];
+        let numbers = [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)];
+        let numbers = numbers
+            .into_iter()
+            .filter_map(|(name, values)| Some((name, Arc::new(Float64Array::from(values?)) as ArrayRef)));
+        texts
+            .into_iter()
+            .chain(numbers)
+            .try_fold(batch.clone(), |batch, (name, column)| replaced(batch, name, &column))
     }
+}
+
+/// A batch with another column in the place of that of a name, in its type.
+fn replaced(batch: RecordBatch, name: &str, column: &ArrayRef) -> Result<RecordBatch, ArrowError> {
+    let (schema, mut columns, _) = batch.into_parts();
+    let place = schema.index_of(name)?;
+    columns[place] = cast(column, schema.field(place).data_type())?;
+    RecordBatch::try_new(schema, columns)
 }
 
 fn numbers(column: &ArrayRef) -> Vec<Option<f64>> {
@@ -237,20 +242,14 @@ fn set(values: Option<&mut Vec<Option<f64>>>, row: usize, value: Option<f64>) {
 }
 
 /// A batch with the new paths of renamed logs.
-fn with_new_paths(
-    batch: &RecordBatch,
-    renamed: &BTreeMap<String, String>,
-) -> Result<RecordBatch, ArrowError> {
+fn with_new_paths(batch: RecordBatch, renamed: &BTreeMap<String, String>) -> Result<RecordBatch, ArrowError> {
     if renamed.is_empty() {
-        return Ok(batch.clone());
+        return Ok(batch);
     }
-    let place = batch.schema_ref().index_of("log_path")?;
-    let paths = batch.column(place).as_string::<i32>();
+    let paths = batch.column(batch.schema_ref().index_of("log_path")?).as_string::<i32>();
     let new = paths.iter().map(|path| path.map(|path| renamed.get(path).map_or(path, String::as_str)));
-    let paths: StringArray = new.collect();
-    let mut columns = batch.columns().to_vec();
-    columns[place] = Arc::new(paths);
-    RecordBatch::try_new(batch.schema(), columns)
+    let paths: ArrayRef = Arc::new(new.collect::<StringArray>());
+    replaced(batch, "log_path", &paths)
 }
 
 /// Moved flights by place and units.

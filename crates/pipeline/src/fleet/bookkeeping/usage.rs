@@ -31,7 +31,7 @@ impl<'a> UsageSources<'a> {
 
     /// Where the hours of a unit are known from.
     fn source(&self, history: &History) -> UsageSource {
-        let has_meter = || history.flights().iter().any(|f| history.extras(f).tail_hours_end().is_some());
+        let has_meter = || history.flights().iter().any(|f| !history.extras(f).tail_hours_end.is_nan());
         if history.tails().any(|tail| self.unlogged.has_tail(tail)) {
             UsageSource::FlightsTable
         } else if has_meter() {
@@ -68,20 +68,10 @@ fn observations(
 ) -> Vec<Observation> {
     let outside = history.place_ranks();
     let seen = history.flights().iter().map(|f| {
-        let extras = history.extras(f);
         // Numbers beyond the installations are those of places without one.
         let installation = history.installation(f, installations);
         let installation = installation.unwrap_or_else(|| installations.len() + outside[f.place as usize]);
-        Observation {
-            departure_us: f.departure_us(),
-            installation: installation as u32,
-            flight_hours: extras.flight_hours(),
-            tail_hours_end: extras.tail_hours_end(),
-            load_reversals: extras.load_reversals(),
-            gap_m: f.gap_m(),
-            gap_se_m: extras.gap_se_m().filter(|se| *se > 0.0),
-            is_doubtful: extras.is_disputed(),
-        }
+        history.extras(f).observation(f, installation as u32)
     });
     let mut observations: Vec<Observation> = seen.collect();
     observations.extend(unlogged.iter().map(|(installation, flight)| Observation {
