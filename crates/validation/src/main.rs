@@ -1,4 +1,4 @@
-//! Runs the accuracy study and writes `docs/accuracy.md` and its pictures.
+//! Runs the accuracy study and writes `docs/accuracy.md`, or reproduces the paper and writes `docs/paper.md`.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a study prints")]
 
@@ -12,13 +12,14 @@ use rayon::prelude::*;
 
 use validation::methods::{MethodResults, estimate_flight};
 use validation::metrics::ErrorStats;
+use validation::paper::{self, Claims};
 use validation::scenarios::{Class, Kind, classes};
-use validation::{accuracy_page, gear_bench, plots, robot_logs, write};
+use validation::{Drawn, accuracy_page, gear_bench, plots, robot_logs, write};
 
 /// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]
 #[command(
-    after_help = "Examples:\n  cargo run --release -p validation\n  cargo run --release -p validation -- --flights 20 --only buffet\n  cargo run --release -p validation -- --only friction --csv /tmp/friction.csv"
+    after_help = "Examples:\n  cargo run --release -p validation\n  cargo run --release -p validation -- --flights 20 --only buffet\n  cargo run --release -p validation -- --only friction --csv /tmp/friction.csv\n  cargo run -p validation -- --paper docs"
 )]
 struct Args {
     /// Flights of each class.
@@ -46,6 +47,9 @@ struct Args {
     /// Folder for `accuracy.md` and its plots. Default: docs, or none with `--only`.
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Run no study, but draw the paper's figures, measure its claims, and write `paper.md` and its pictures to DIR.
+    #[arg(long, value_name = "DIR")]
+    paper: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -59,6 +63,9 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), String> {
+    if let Some(folder) = &args.paper {
+        return write_paper(folder);
+    }
     let is_wanted = |class: &&Class| args.only.as_ref().is_none_or(|text| class.name.contains(text));
     let wanted: Vec<&Class> = classes().iter().filter(is_wanted).collect();
     if args.list {
@@ -82,6 +89,23 @@ fn run(args: &Args) -> Result<(), String> {
     }
 }
 
+/// The paper reproduced: a page with its claims, and its figures.
+fn write_paper(folder: &Path) -> Result<(), String> {
+    let claims = Claims::measure().map_err(|e| e.to_string())?;
+    write(folder, "paper.md", &paper::page(&claims))?;
+    write_pictures(folder, paper::pictures(&claims))
+}
+
+fn write_pictures(
+    folder: &Path,
+    pictures: impl IntoIterator<Item = (&'static str, Drawn)>,
+) -> Result<(), String> {
+    let folder = folder.join("pictures");
+    let each =
+        |(name, picture): (&str, Drawn)| write(&folder, name, &picture.map_err(|e| format!("{name}: {e}"))?);
+    pictures.into_iter().try_for_each(each)
+}
+
 /// The page with its plots, real machines included.
 fn write_page(folder: &Path, stats: &[ErrorStats], args: &Args) -> Result<(), String> {
     let robot = robot_logs::robot(&args.robot)?;
@@ -95,9 +119,7 @@ fn write_page(folder: &Path, stats: &[ErrorStats], args: &Args) -> Result<(), St
     ];
     write(folder, "accuracy.md", &page)?;
     write(folder, "accuracy.csv", &accuracy_page::csv(stats))?;
-    for (name, plot) in plots {
-        write(&folder.join("pictures"), name, &plot.map_err(|e| format!("{name}: {e}"))?)?;
-    }
+    write_pictures(folder, plots)?;
     println!("{page}");
     Ok(())
 }

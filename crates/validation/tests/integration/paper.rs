@@ -34,7 +34,7 @@ fn the_claims_hold_and_the_page_is_that_of_the_code() {
     assert!(bytes < MOST_BYTES, "{bytes} bytes of figures");
     let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     let kept = std::fs::read_to_string(docs.join("paper.md")).unwrap();
-    let hint = "run: cargo run -p validation --bin paper -- --output docs";
+    let hint = "run: cargo run -p validation -- --paper docs";
     assert_eq!(kept, page(&claims), "{hint}");
     for (name, _) in drawn {
         assert!(docs.join("pictures").join(name).exists(), "{name} is missing; {hint}");
