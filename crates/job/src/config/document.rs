@@ -19,7 +19,6 @@ use smart_default::SmartDefault;
 use super::alerts::AlertChannel;
 use super::faults::Faults;
 use super::keys::with_nearest;
-use super::validate_channels;
 use crate::config::part::{PartSettings, WearAxis};
 use crate::config::quantity_limits::QuantityLimits;
 
@@ -319,7 +318,8 @@ impl Document {
         self.part.values().any(|part| part.output.is_locked())
     }
 
-    /// Reports everything that reads well but cannot be meant, with the numbers that are not plausible in its place.
+    /// Reports everything but faults of channels that reads well but cannot be meant, with the numbers that are not plausible
+    /// in its place.
     pub(super) fn check(&self, implausible: Vec<Diagnostic>, faults: &mut Faults<'_>) {
         if self.logs.files.is_empty() {
             let fault = Diagnostic::new("no_logs", "`logs.files` has no pattern");
@@ -329,7 +329,6 @@ impl Document {
             let fault = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
             faults.report(&["store", "path"], fault.hint("path = \"results\""));
         }
-        faults.within(&["channel"], |faults| validate_channels::check(&self.channel, self, faults));
         faults.within(&["clock"], |faults| check_clock(&self.clock, faults));
         faults.within(&["layout"], |faults| check_layout(&self.layout, faults));
         self.check_groups(faults);

@@ -142,6 +142,8 @@ impl Config {
         let implausible = keys::check(&source, &Document::schema())?;
         let document: Document = source.document().map_err(|diagnostic| vec![diagnostic])?;
         let mut faults = Faults::new(&source);
+        // Here, since the check of channels reads the document.
+        faults.within(&["channel"], |faults| validate_channels::check(&document.channel, &document, faults));
         document.check(implausible, &mut faults);
         let mut parts = BTreeMap::new();
         for (number, settings) in &document.part {
