@@ -8,10 +8,10 @@ fn a_memory_budget_and_idle_workers_change_no_record() {
     let plain = TestFleet::sample();
     plain.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
     plain.run_ok(&["run", "--jobs", "1"]);
-    for settings in ["", "[run]\nmemory_mib = 1\n\n", "[run]\nmemory_mib = 4\n\n"] {
+    for settings in ["", "memory_mib = 1\n", "memory_mib = 4\n"] {
         let spread = TestFleet::sample();
         spread.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
-        spread.configure("[store]", &format!("{settings}[store]"));
+        spread.configure("[store]", &format!("[run]\n{settings}\n[store]"));
         spread.run_ok(&["run", "--jobs", "8"]);
         assert_eq!(spread.exported(), plain.exported(), "{settings}");
     }
