@@ -5,7 +5,8 @@ use std::ops::Range;
 
 /// Bytes that are fetched together. The last block of an object may be shorter.
 const BLOCK: u64 = 64 << 10;
-/// Up to as many blocks between two missing ones are fetched too: a request costs as much time as a mebibyte.
+/// Most blocks between two missing ones that one request fetches as well: a further request would cost as much time as
+/// a mebibyte.
 const MAX_GAP: u64 = (1 << 20) / BLOCK;
 /// Blocks of one request at most: a failed request is repeated, and several run in parallel.
 const MAX_REQUEST: u64 = (8 << 20) / BLOCK;
@@ -15,7 +16,7 @@ const MAX_REQUEST: u64 = (8 << 20) / BLOCK;
 pub(crate) struct FetchedBlocks(BTreeSet<u64>);
 
 impl FetchedBlocks {
-    /// The requests, as bytes of an object of `size` bytes, that fetch what is missing of some ranges.
+    /// The requests that fetch all missing blocks of some ranges, as byte ranges of an object of `size` bytes.
     pub(crate) fn missing(&self, wanted: &[Range<u64>], size: u64) -> Vec<Range<u64>> {
         let blocks = wanted.iter().flat_map(|range| range.start / BLOCK..range.end.div_ceil(BLOCK));
         let missing: BTreeSet<u64> = blocks.filter(|block| !self.0.contains(block)).collect();

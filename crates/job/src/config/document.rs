@@ -318,8 +318,8 @@ impl Document {
         self.part.values().any(|part| part.output.is_locked())
     }
 
-    /// Reports everything but faults of channels that reads well but cannot be meant, with the numbers that are not plausible
-    /// in its place.
+    /// Reports each value that can be read but makes no sense, faults of channels excepted. `implausible` holds those of
+    /// numbers, which are reported in their place among the others.
     pub(super) fn check(&self, implausible: Vec<Diagnostic>, faults: &mut Faults<'_>) {
         if self.logs.files.is_empty() {
             let fault = Diagnostic::new("no_logs", "`logs.files` has no pattern");
@@ -429,7 +429,7 @@ fn check_layout(layout: &Layout, faults: &mut Faults<'_>) {
     }
 }
 
-/// Reports everything about a clock that cannot be meant.
+/// Reports each key of a clock whose value makes no sense.
 pub(super) fn check_clock(clock: &ClockMapping, faults: &mut Faults<'_>) {
     if clock.column.as_deref() == Some("") {
         let fault = Diagnostic::new("empty_name", "`clock.column` names no column");

@@ -1,4 +1,4 @@
-//! Faults of a configuration: diagnostics of the keys whose values cannot be meant, each with its line.
+//! Faults of a configuration: diagnostics of the keys whose values make no sense, each with its line.
 
 use records::Diagnostic;
 

@@ -94,7 +94,7 @@ impl Config {
     ///
     /// # Errors
     /// All diagnostics at once: an unreadable file or broken TOML alone, else every unknown key, else
-    /// the first key of a wrong type, else every value that cannot be meant.
+    /// the first key of a wrong type, else every value that makes no sense.
     pub fn read_settings(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
             let file_name = file.display().to_string();

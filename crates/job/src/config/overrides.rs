@@ -133,7 +133,7 @@ fn locked_parts(document: &Document) -> Option<ValidatedOverride> {
     (!one.exact_parts.is_empty()).then_some(one)
 }
 
-/// Tries an override alone, and reports what it cannot mean.
+/// Applies one override alone to the document, and reports the faults that it causes.
 fn validate(
     settings: &Override,
     number: usize,

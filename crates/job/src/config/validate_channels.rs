@@ -138,7 +138,7 @@ fn status_bits(channel: &ChannelMapping) -> Option<Diagnostic> {
     Some(Diagnostic::new("bad_parameter", what).hint(hint))
 }
 
-/// Reports what a condition asks and cannot mean.
+/// Reports the faults of a condition.
 fn check_condition(condition: &SampleFilter, document: &Document, faults: &mut Faults<'_>) {
     let column = &condition.column;
     let mut report = |fault: Diagnostic| faults.report(&["when"], fault);

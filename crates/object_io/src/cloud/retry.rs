@@ -118,7 +118,7 @@ impl RetryingStore {
         }
     }
 
-    /// The same; after an error the listing resumes after the last received key.
+    /// The keys after `last`, from a listing that resumes after the last received key where a request fails.
     fn resumable_list(
         &self,
         prefix: Option<&Path>,

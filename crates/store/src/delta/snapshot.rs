@@ -23,7 +23,7 @@ impl Snapshot {
         self.files.iter().map(|file| file.path.clone())
     }
 
-    /// Paths of the data files that hold rows, and may hold some that a function looks for in their statistics.
+    /// Paths of the data files with rows whose statistics `may_be_in` accepts.
     pub(crate) fn paths_where(&self, may_be_in: impl Fn(&Stats) -> bool) -> Vec<PathBuf> {
         let files = self.files.iter().filter(|file| file.has_rows() && may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()

@@ -86,8 +86,8 @@ fn levels(cells: &[Cell], units: usize) -> Vec<f64> {
     of_unit.into_iter().map(|values| median(values).unwrap_or_default()).collect()
 }
 
-/// The median over the tails of a week of what they differ from the levels of their units, which its cells then keep;
-/// none of a week that too few tails flew in.
+/// Deviation of a week: the median over its tails of the difference between the tail's cells and the levels of their
+/// units. The cells keep it for the next sweep. None for a week in which too few tails flew.
 fn deviation(of_week: &mut [Cell], levels: &[f64]) -> Option<Deviation> {
     let of_tail = |cells: &[Cell]| {
         let sum = cells.iter().fold(0.0, |sum, cell| sum + cell.mean - levels[cell.unit]);
