@@ -141,4 +141,4 @@ def test_a_worker_with_other_settings_is_refused(spark: SparkSession, fleet: Pat
     files, task = (str(fleet / "pipeline.toml"),), ["{}"]
     work = fp.spark._worker(files, "of another configuration", task)
     with pytest.raises(Exception, match="worker_differs"):
-        spark.range(0, 1, 1, 1).mapInArrow(work, fp.spark._spark_schema()).collect()
+        spark.range(0, 1, 1, 1).mapInArrow(work, "result string").collect()
