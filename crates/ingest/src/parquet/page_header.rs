@@ -93,7 +93,7 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
 /// Compares the size that a page claims with its values, and returns how many it claims.
 fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Result<u32, String> {
     let is_required = chunk.column_descr().max_def_level() == 0;
-    // The number of values, that of nulls among them where the header tells it, and the encoding.
+    // The number of values, that of nulls among them where the header states it, and the encoding.
     let claimed = match header.type_ {
         PageType::DATA_PAGE => {
             let page = header.data_page_header.as_ref();

@@ -31,6 +31,7 @@ impl<'s> Faults<'s> {
         let path: Vec<&str> = self.table.iter().map(String::as_str).chain(key.iter().copied()).collect();
         self.found.push(self.source.at(&path, fault));
     }
+
     /// A pattern of `*` and `?`; a text that is none is reported.
     pub(super) fn pattern(&mut self, key: &[&str], text: &str, kind: &str) -> Option<glob::Pattern> {
         let pattern = glob::Pattern::new(text);

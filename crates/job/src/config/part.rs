@@ -173,7 +173,7 @@ pub struct Part {
     pub noise: estimator::NoiseModel,
     /// Variances of the filter's initial state, P₀.
     pub initial: estimator::InitialVariances,
-    /// The settings that need no conversion: output, reference load and limits.
+    /// The settings as configured. Users take from them what needs no conversion: output, reference load and limits.
     pub settings: PartSettings,
     /// Gain schedules of its logs, as far as they have been found.
     pub filters: FilterCache,

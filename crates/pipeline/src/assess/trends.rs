@@ -493,7 +493,7 @@ impl<'a> FleetContext<'a> {
     }
 
     fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide<'_>) -> TrendRow {
-        let nobody = History::default();
+        let no_history = History::default();
         let unit = self.units.get(name);
         let series = unit.map(|(_, series)| series);
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
@@ -504,7 +504,7 @@ impl<'a> FleetContext<'a> {
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
         RowSources {
             name,
-            history: unit.map_or(&nobody, |(history, _)| history),
+            history: unit.map_or(&no_history, |(history, _)| history),
             series,
             limits: self.limits,
             trend,
