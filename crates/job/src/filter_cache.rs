@@ -13,7 +13,7 @@ pub struct FilterCache(Arc<Mutex<Vec<Arc<GainSchedule>>>>);
 
 impl FilterCache {
     /// The schedule of a filter, made now unless it is there.
-    pub fn of(&self, filter: &Filter) -> Arc<GainSchedule> {
+    pub(crate) fn of(&self, filter: &Filter) -> Arc<GainSchedule> {
         let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let find = |known: &[Arc<GainSchedule>]| known.iter().find(|s| s.filter() == filter).cloned();
         if let Some(schedule) = find(&known()) {

@@ -78,12 +78,12 @@ impl FlightLog {
     }
 
     /// Its name in records and diagnostics.
-    pub fn display_name(&self) -> &str {
+    pub(crate) fn display_name(&self) -> &str {
         &self.display_name
     }
 
     /// How the channels of a position are read.
-    pub fn channels_map(&self, at: &ActuatorColumns) -> Option<&Channels> {
+    pub(crate) fn channels_map(&self, at: &ActuatorColumns) -> Option<&Channels> {
         self.mappings.get(&at.position).map(|mapping| &mapping.channels)
     }
 

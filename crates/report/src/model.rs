@@ -228,7 +228,7 @@ impl UnitView {
     }
 
     /// State to show.
-    pub fn badge(&self) -> StateBadge {
+    pub(crate) fn badge(&self) -> StateBadge {
         StateBadge::from_state(self.row.state)
     }
 
@@ -238,7 +238,7 @@ impl UnitView {
     }
 
     /// The latest work request that is not closed.
-    pub fn open_request(&self) -> Option<&WorkRequest> {
+    pub(crate) fn open_request(&self) -> Option<&WorkRequest> {
         self.work_requests.iter().rfind(|request| request.is_open())
     }
 

@@ -13,7 +13,7 @@ impl StateBadge {
     }
 
     /// Word shown to readers.
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         self.0.map_or("removed", State::as_str)
     }
 
@@ -30,7 +30,7 @@ impl StateBadge {
     }
 
     /// CSS class that sets the colour.
-    pub fn class(self) -> &'static str {
+    pub(crate) fn class(self) -> &'static str {
         match self.0 {
             None | Some(State::Unassessed) => "unstated",
             Some(state) => state.as_str(),

@@ -112,7 +112,7 @@ pub struct FleetPrior {
 impl FleetPrior {
     /// Prior of a part number without data: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
-    pub fn uninformative(limit_m: f64) -> Self {
+    pub(crate) fn uninformative(limit_m: f64) -> Self {
         Self {
             axis: UsageAxis::Hours,
             hours_per_unit: 1.0,

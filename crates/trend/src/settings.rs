@@ -43,7 +43,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`Error::Setting`] for a value that is not positive or not plausible, [`Error::LimitOrder`].
-    pub fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         let values = [
             ("limit_m", self.limit_m),
             ("watch_m", self.watch_m),

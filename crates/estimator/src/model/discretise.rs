@@ -23,7 +23,7 @@ impl DiscreteModel {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a step that is not positive and finite.
-    pub fn new(actuator: &ActuatorModel, step_s: f64) -> Result<Self, Error> {
+    pub(crate) fn new(actuator: &ActuatorModel, step_s: f64) -> Result<Self, Error> {
         positive("step_s", step_s)?;
         let mut whole = Matrix4::zeros();
         whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&(actuator.a() * step_s));

@@ -64,7 +64,7 @@ pub struct NoiseCovariances {
 impl SensorNoise {
     /// σ_y² = both noise variances plus resolution²/12 each, m² (quantisation noise: Bennett 1948,
     /// <https://doi.org/10.1002/j.1538-7305.1948.tb01340.x>).
-    pub fn variance_m2(&self) -> f64 {
+    pub(crate) fn variance_m2(&self) -> f64 {
         let square = |v: f64| v * v;
         square(self.screw_rms_m)
             + square(self.motor_rms_m)
@@ -110,7 +110,7 @@ impl NoiseModel {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a level that is negative or not finite, or a measurement without noise.
-    pub fn covariances(
+    pub(crate) fn covariances(
         &self,
         actuator: &ActuatorModel,
         discrete: &DiscreteModel,

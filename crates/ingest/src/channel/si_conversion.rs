@@ -30,7 +30,7 @@ impl Geometry {
     /// let quarter_turn_m = screw.metres_per_radian().map(|m| m * std::f64::consts::FRAC_PI_2);
     /// assert!(quarter_turn_m.is_some_and(|m| (m - 0.00125).abs() < 1e-15));
     /// ```
-    pub fn metres_per_radian(self) -> Option<f64> {
+    pub(crate) fn metres_per_radian(self) -> Option<f64> {
         match self {
             Self::Linear { lead_m_per_rev } => lead_m_per_rev.map(|lead| lead / std::f64::consts::TAU),
             Self::Rotary { reference_radius_m } => Some(reference_radius_m),

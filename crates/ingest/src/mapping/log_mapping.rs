@@ -275,7 +275,7 @@ impl Role {
 
 impl Channels {
     /// The mapping of a channel, if it has one.
-    pub fn of(&self, role: Role) -> Option<&ChannelMapping> {
+    pub(crate) fn of(&self, role: Role) -> Option<&ChannelMapping> {
         match role {
             Role::Motor => Some(&self.motor_position),
             Role::Screw if self.output.is_locked() => None,

@@ -43,7 +43,7 @@ impl Table {
 
     /// The same table, whose columns go by a user's own names.
     #[must_use]
-    pub fn with_aliases(mut self, names: &ColumnAliases) -> Self {
+    pub(crate) fn with_aliases(mut self, names: &ColumnAliases) -> Self {
         self.whole.names.clone_from(names);
         self
     }

@@ -191,7 +191,7 @@ impl Config {
     }
 
     /// How logs are read where nothing is otherwise.
-    pub fn base_mapping(&self) -> &Arc<Mapping> {
+    pub(crate) fn base_mapping(&self) -> &Arc<Mapping> {
         self.overrides.base()
     }
 

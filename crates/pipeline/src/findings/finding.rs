@@ -71,7 +71,7 @@ impl Finding {
     }
 
     /// Serial number of a unit.
-    pub fn serial_number(&self) -> Option<&str> {
+    pub(crate) fn serial_number(&self) -> Option<&str> {
         Some(self.unit.1.as_str()).filter(|_| self.since_utc.is_none())
     }
 
@@ -81,7 +81,7 @@ impl Finding {
     }
 
     /// The finding about a unit's gap.
-    pub fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
+    pub(crate) fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
         Self {
             unit: row.unit(),
             tail_number: row.tail_number.clone(),

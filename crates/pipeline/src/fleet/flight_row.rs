@@ -58,18 +58,18 @@ impl FlightRow {
     }
 
     /// Departure, µs since 1970 UTC.
-    pub fn departure_us(&self) -> i64 {
+    pub(crate) fn departure_us(&self) -> i64 {
         self.departure_us
     }
 
     /// Departure, to the microsecond.
-    pub fn departure_utc(&self) -> Timestamp {
+    pub(crate) fn departure_utc(&self) -> Timestamp {
         // Parsed as an instant when it was stored, so it is valid here.
         Timestamp::from_microsecond(self.departure_us).unwrap_or_default()
     }
 
     /// The gap, m; none of a refused flight.
-    pub fn gap_m(&self) -> Option<f64> {
+    pub(crate) fn gap_m(&self) -> Option<f64> {
         known(self.gap_m)
     }
 }

@@ -67,7 +67,7 @@ impl History {
     }
 
     /// The name of one of them.
-    pub fn flight_id(&self, flown: &FlightRow) -> Option<&str> {
+    pub(crate) fn flight_id(&self, flown: &FlightRow) -> Option<&str> {
         flown.name_in(&self.names)
     }
 
@@ -82,7 +82,7 @@ impl History {
     }
 
     /// Where one of them was flown.
-    pub fn place(&self, flown: &FlightRow) -> &TailPosition {
+    pub(crate) fn place(&self, flown: &FlightRow) -> &TailPosition {
         &self.places[flown.place as usize]
     }
 

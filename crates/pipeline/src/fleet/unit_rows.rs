@@ -146,7 +146,7 @@ pub(crate) fn of_store<R: Send>(
     scan: &ColumnScan,
     put: impl Fn(&mut RowsByUnit<R>, &TableBatch, &RecordBatch) -> Result<(), ingest::Error> + Sync,
 ) -> Result<PartsByUnit<R>, Error> {
-    of_parts(scan.len(), |rows, part| {
+    of_parts(scan.file_count(), |rows, part| {
         scan.read(part)?.iter().try_for_each(|batch| {
             let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
             Ok(put(rows, &chunk, batch)?)

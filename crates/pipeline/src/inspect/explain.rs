@@ -157,7 +157,7 @@ impl ReplayVerdict {
     }
 
     /// Stable word for scripts.
-    pub fn code(self) -> &'static str {
+    pub(crate) fn code(self) -> &'static str {
         self.into()
     }
 }

@@ -48,7 +48,7 @@ impl Request {
     }
 
     /// Whether a flight is selected.
-    pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
+    pub(crate) fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
         let flew = |serial: &SerialNumber| {
             installations

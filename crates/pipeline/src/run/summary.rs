@@ -217,7 +217,7 @@ pub enum RunEnd {
 
 impl RunEnd {
     /// Exit code of the run's record.
-    pub fn exit_code(self) -> i64 {
+    pub(crate) fn exit_code(self) -> i64 {
         match self {
             Self::Complete => 0,
             Self::LogsInError => 1,
@@ -335,7 +335,7 @@ impl RunSummary {
     }
 
     /// Whether a wrong mapping shows in flights of this run.
-    pub fn has_mapping_fault(&self) -> bool {
+    pub(crate) fn has_mapping_fault(&self) -> bool {
         let units: BTreeSet<UnitKey> = self.trends.iter().map(TrendRow::unit).collect();
         self.mapping_faults.iter().any(|fault| !fault.units.is_disjoint(&units))
     }

@@ -25,14 +25,14 @@ pub enum Action {
 
 impl Action {
     /// Its word in columns.
-    pub fn as_str(self) -> &'static str {
+    pub(crate) fn as_str(self) -> &'static str {
         self.into()
     }
 
     /// The action that a state and its reason ask for, with the states of other quantities.
     ///
     /// `at_limit` is what the unit's part asks for in state `act`.
-    pub fn of(
+    pub(crate) fn of(
         state: Option<&str>,
         reason_code: Option<&str>,
         conditions: &[String],

@@ -60,7 +60,7 @@ pub struct Profile {
 
 impl Profile {
     /// Samples in the log.
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         (self.duration_s * self.sample_rate_hz).round() as usize
     }
 

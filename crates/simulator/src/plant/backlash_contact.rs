@@ -233,7 +233,7 @@ impl Contact {
     }
 
     /// Elastic energy at a relative position δX, J.
-    pub fn energy_j(&self, delta_m: f64) -> f64 {
+    pub(crate) fn energy_j(&self, delta_m: f64) -> f64 {
         let from_m = delta_m - self.offset_m;
         let energy_j = |(law, stiffness_n_per_m): (ContactLaw, f64), depth_m: f64| {
             stiffness_n_per_m * law.potential_m2(depth_m.max(0.0))

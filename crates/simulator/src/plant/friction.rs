@@ -57,7 +57,7 @@ impl Friction {
 
     /// The same friction, dry and load-dependent parts times a factor.
     #[must_use]
-    pub fn scaled(self, factor: f64) -> Self {
+    pub(crate) fn scaled(self, factor: f64) -> Self {
         let backdriven_load_share = self.backdriven_load_share.map(|share| share * factor);
         let (dry_n, load_share) = (self.dry_n * factor, self.load_share * factor);
         Self { dry_n, load_share, backdriven_load_share, ..self }

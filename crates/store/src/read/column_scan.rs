@@ -94,19 +94,14 @@ impl Store {
 }
 
 impl ColumnScan {
-    /// How many there are.
-    pub fn len(&self) -> usize {
+    /// How many files there are to read.
+    pub fn file_count(&self) -> usize {
         self.files.len()
     }
 
     /// Version of the store that they are of.
     pub fn version(&self) -> u64 {
         self.version
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.files.is_empty()
     }
 
     /// The rows of one that fit, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.

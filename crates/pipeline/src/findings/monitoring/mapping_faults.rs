@@ -38,7 +38,7 @@ pub struct MappingFault {
 
 impl MappingFault {
     /// The affected scope as text.
-    pub fn scope(&self) -> String {
+    pub(crate) fn scope(&self) -> String {
         match (&self.part_number, &self.tail_number, &self.position) {
             (Some(part), _, _) => format!("all actuators of part {part}"),
             (_, Some(tail), Some(position)) => format!("{position} of {tail}"),
@@ -48,7 +48,7 @@ impl MappingFault {
     }
 
     /// The code and its frequency.
-    pub fn evidence(&self) -> String {
+    pub(crate) fn evidence(&self) -> String {
         format!("{} on {} of the latest {} flights", self.reason, self.refused, self.flights)
     }
 }
