@@ -1,8 +1,8 @@
-//! One part of an estimate over a made flight of 250 Hz, once and on request: what `instructions` counts.
+//! Runs one part of an estimate once, over a synthetic flight of 250 Hz; `instructions` counts its instructions.
 //!
 //! `parts NAME SAMPLES`, with a name of [`PARTS`].
 
-#![allow(clippy::print_stderr, reason = "a program for the prompt")]
+#![allow(clippy::print_stderr, reason = "a command-line program")]
 
 mod made_flight;
 
@@ -13,7 +13,7 @@ use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{Error, GainSchedule, Samples, gap, midrange};
 use made_flight::{STEP_S, channels, filter};
 
-/// What can be asked for; `nothing` makes the flight and no more.
+/// Names of the parts; `nothing` only makes the flight.
 const PARTS: [&str; 7] = ["nothing", "schedule", "filter", "statistic", "load", "published", "contact"];
 
 fn main() -> ExitCode {

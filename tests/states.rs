@@ -1,4 +1,4 @@
-//! States of units whose records are drawn here, through `freeplay trend --estimates`.
+//! States of units with invented records, through `freeplay trend --estimates`.
 
 use serde_json::Value;
 
@@ -65,7 +65,7 @@ fn a_silent_unit_is_unassessed_and_one_above_its_limit_stays_so() {
     let state =
         |serial: &str| rows.iter().find(|row| row["serial_number"] == serial).unwrap()["state"].clone();
     assert_eq!((state("calm"), state("above")), ("unassessed".into(), "act".into()));
-    // Without a date the time of the run counts, years after these flights.
+    // Without `--as-of`, units are assessed now, long after these flights.
     assert!(trend(&units, &[]).iter().all(|row| row["state"] != "normal"), "{rows:?}");
 }
 
@@ -89,8 +89,8 @@ fn records_dated_ahead_and_negative_usage_are_named_and_decide_nothing() {
     }
 }
 
-/// Four actuators of a tail step by 90 µm with one flight to above their limit, as a sensor of the tail would make them
-/// do; a fifth on another tail has one record above its limit, which its estimator doubts.
+/// Four actuators of a tail step by 90 µm to above their limit in one flight, as with a fault of the tail's sensors; a
+/// fifth on another tail has one record above its limit, and that record is flagged.
 #[test]
 fn neither_a_flag_nor_a_step_of_the_whole_tail_hides_records_above_the_limit() {
     let fleet = TestFleet::empty();
@@ -117,7 +117,7 @@ fn neither_a_flag_nor_a_step_of_the_whole_tail_hides_records_above_the_limit() {
     assert_eq!(found.len(), 5);
 }
 
-/// Limits lowered below what every log shows: the next run says so of every unit, and ends as a scheduler was asked to.
+/// All gaps exceed the lowered limits: the run finds every unit due, and ends with the exit code of `--fail-on`.
 #[test]
 fn a_lowered_limit_makes_every_unit_of_the_logs_due() {
     let fleet = TestFleet::sample();

@@ -6,8 +6,8 @@
 //! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
 //! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
 //! `edit: ["FILE", "FROM", "TO"]` replaces text before its block.
-//! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except where lines are
-//! omitted.
+//! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except
+//! where lines are omitted.
 
 use std::fs;
 use std::ops::Range;
@@ -89,7 +89,7 @@ fn marks<'b>(blocks: &[&'b Block]) -> Vec<&'b str> {
     blocks.iter().filter_map(|block| block.mark("not run:")).collect()
 }
 
-/// Whether a block is to be run: all of a page's `console`, and of `sh` what shows a command of ours.
+/// Whether a block is run: each `console` block, and each `sh` block that calls Freeplay.
 fn runs(block: &Block) -> bool {
     let ours = |line: &str| {
         ["freeplay ", "cargo run -- ", "cargo run --locked -- "].iter().any(|ours| line.starts_with(ours))
@@ -109,7 +109,7 @@ struct Try<'p> {
     page: &'p Page,
     fleet: TestFleet,
     faults: Vec<String>,
-    /// What to write where, with `FREEPLAY_BLESS`.
+    /// Ranges of the page with their new text, for `FREEPLAY_BLESS`.
     blessed: Vec<(Range<usize>, String)>,
 }
 
@@ -127,7 +127,7 @@ impl<'p> Try<'p> {
         Self { page, fleet, faults: Vec::new(), blessed: Vec::new() }
     }
 
-    /// Runs a block, or compares the output of the one before with it.
+    /// Runs a block, or compares it with the output of the block before.
     fn block(&mut self, block: &Block, output: &mut String) {
         for change in block.marks.iter().filter_map(|mark| mark.strip_prefix("edit: ")) {
             let [file, from, to]: [String; 3] = serde_json::from_str(change).unwrap();
@@ -143,7 +143,7 @@ impl<'p> Try<'p> {
         }
     }
 
-    /// Runs a command in the shell, where the last one left off.
+    /// Runs a command in the shell, in the folder in which the last one ended.
     fn run(&mut self, step: &Step) -> String {
         let command =
             step.script.replace("cargo run --locked -- ", "freeplay ").replace("cargo run -- ", "freeplay ");
@@ -196,7 +196,7 @@ impl<'p> Try<'p> {
     }
 }
 
-/// A shell that finds the program, and nothing of this machine's settings.
+/// A shell that finds the program, and no configuration that the environment names.
 fn shell(folder: &std::path::Path, script: &str) -> Command {
     let program = std::path::Path::new(env!("CARGO_BIN_EXE_freeplay")).parent().unwrap();
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
@@ -206,7 +206,7 @@ fn shell(folder: &std::path::Path, script: &str) -> Command {
     shell
 }
 
-/// The commands of a block: all of a block of `sh` as one, those behind `$ ` one by one.
+/// The commands of a block: a `sh` block is one script; in a `console` block, each line after `$ ` is a command.
 fn steps(block: &Block) -> Vec<Step> {
     let code = block.mark("exit").map_or(0, |code| code.parse().unwrap());
     if block.language == "sh" {
@@ -235,12 +235,12 @@ fn steps(block: &Block) -> Vec<Step> {
     steps
 }
 
-/// Lines without what trails, and the last one whole.
+/// Lines without trailing spaces, each with its line end.
 fn trimmed(output: &str) -> String {
     output.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
-/// Lines in which what differs between two runs of the same logs is left out.
+/// Lines in which words replace times, sizes and digests, which differ between two runs of the same logs.
 fn masked(text: &str) -> Vec<String> {
     const DIFFERS: &[(&str, &str)] = &[
         (r"\d{8}T\d{9}Z-[0-9a-f]{8}", "RUN"),

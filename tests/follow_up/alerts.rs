@@ -67,7 +67,7 @@ fn a_folder_gets_a_summary_first_and_then_one_file_for_each_change() {
         (first.len(), &first[0]["kind"], &first[0]["states"]["normal"], &first[0]["states"]["watch"]),
         (1, &"baseline".into(), &11.into(), &1.into())
     );
-    // The run until September left logs out, but only those that were not selected.
+    // A run with `--until` is complete: the logs that it left out were not selected.
     let result = run(&fleet);
     assert_eq!(result.code, Some(0), "{result:?}");
     let messages = files(&fleet, "alerts");
@@ -107,7 +107,7 @@ fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
         fleet.configure("cat > baseline", script);
         let killed = run(&fleet);
         assert_eq!(killed.code, None, "{killed:?}");
-        // The run itself was complete before.
+        // The run was complete before it sent messages.
         let info = fleet.json(&["store", "info"]);
         assert_eq!((&info["last_run"]["ended"], &info["last_run"]["exit_code"]), (&"well".into(), &0.into()));
         let statuses = |fleet: &TestFleet| -> Vec<String> {
@@ -126,7 +126,7 @@ fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
         assert_eq!(got(&fleet).len(), received + 1);
         let after = run(&fleet);
         assert_eq!((after.code, &summary(&after)["unconfirmed_before"]), (Some(0), &1.into()));
-        // A person has compared, and wants it again.
+        // A person finds that the message is missing, and has it sent again.
         let rows = alerts(&fleet);
         let id =
             rows.iter().find(|row| row["status"] == "unconfirmed").unwrap()["alert_id"].as_str().unwrap();
@@ -166,7 +166,7 @@ fn a_failing_command_a_timeout_and_a_bad_folder_lose_no_result() {
     );
     assert!(result.out.contains("12 units: 2 plan, 10 normal;"), "{}", result.out);
     assert_eq!(fleet.exported().lines().count(), 121, "all records are stored");
-    // The state that a user waits for goes before.
+    // For the exit code, a state of `--fail-on` comes before a failed alert.
     assert_eq!(fleet.freeplay(&["run", "--fail-on", "plan", "--quiet"]).code, Some(4));
     fleet.configure("echo no route >&2; exit 75", "cat >> got");
     run(&fleet);

@@ -116,7 +116,7 @@ fn every_surface_has_the_same_states_dates_and_counts() {
     assert!(["normal", "plan", "act"].iter().all(|state| seen.contains_key(*state)), "{seen:?}");
 }
 
-/// Without new flights, a date until when moves by two days at most, or the state says why: the unit is now over its limit,
+/// Without new flights, a due date moves by two days at most, or the state says why: the unit is now over its limit,
 /// or its data are too old.
 fn dates_stay(fleet: &TestFleet, trend: &BTreeMap<String, Shown>, newest: Timestamp) {
     let plans = trend.iter().filter(|(_, shown)| shown.0 == "plan");

@@ -511,7 +511,7 @@ fn thirds(fleet: &TestFleet) {
     std::fs::remove_file(log).unwrap();
 }
 
-/// None of the pieces is a flight, in whichever order they are found; once the setting declares what they are, they are read.
+/// In whichever order the pieces are found, none is taken for a flight; once the setting declares pieces, they are read.
 #[test]
 fn undeclared_pieces_with_their_own_departures_are_an_error() {
     let fleet = one_tail();

@@ -1,8 +1,8 @@
 //! Stores as earlier releases left them.
 //!
-//! `tests/data/store-0.1` was written by release 0.1 before accounts knew *not reached*: one run over two logs
-//! of the small fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
-//! run on another tail that was killed between the commits of its records and of their accounts.
+//! `tests/data/store-0.1` was written by release 0.1 before logs had the status *not reached*: one run over two logs
+//! of the small fleet, one over the rest of that tail with a failed log, one `--redo` of one log, and a run on
+//! another tail that was killed between the commits of its records and of its log status.
 
 use crate::harness::{TestFleet, copy, top, without};
 
@@ -30,8 +30,8 @@ fn an_older_store_is_read_as_it_is() {
 #[test]
 fn a_run_on_an_older_store_ends_where_a_new_one_does() {
     let fleet = old();
-    let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("did not finish: 3 logs processed, 0 remaining"), "{account}");
+    let summary = fleet.run_ok(&["run"]);
+    assert!(summary.contains("did not finish: 3 logs processed, 0 remaining"), "{summary}");
     let plain = TestFleet::processed();
     let numbers = |fleet: &TestFleet| without(&fleet.exported(), &["program_version"]);
     assert_eq!(numbers(&fleet), numbers(&plain));
@@ -41,7 +41,7 @@ fn a_run_on_an_older_store_ends_where_a_new_one_does() {
     assert!(fleet.run_ok(&["run"]).contains("0 new or changed, 30 already processed"));
 }
 
-/// Half of the files know columns that came later, half do not: they are one table to us and to others.
+/// Only some of the files have the newer columns; all are one table for Freeplay and for other engines.
 #[test]
 fn files_of_two_releases_are_one_table() {
     let fleet = old();

@@ -13,7 +13,7 @@ use store::Store;
 
 use crate::args::{CONFIG, QUERY_KEYS};
 
-/// Most names that are offered at once.
+/// Maximum number of names that are offered at once.
 const MAX_CANDIDATES: usize = 200;
 
 /// Completes the values of a column of the records.

@@ -121,7 +121,7 @@ impl Output {
         self.err(&if self.color { coloured(&text) } else { text });
     }
 
-    /// Shows diagnostics: of each kind the first few whole, and how many more there are.
+    /// Shows the first few diagnostics of each code, and how many more there are.
     pub(crate) fn diagnostics<'c>(&self, diagnostics: impl IntoIterator<Item = &'c Diagnostic>) {
         let mut seen: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
         for diagnostic in diagnostics {
@@ -165,7 +165,7 @@ impl Output {
     }
 }
 
-/// A name from a log or table on its line: it must not move the cursor, change colours or reverse other text.
+/// Escapes a name from a log or table, so that it cannot move the cursor, change colours or reverse other text.
 pub(crate) fn escape(text: &str) -> String {
     escape_cell(text).into_owned()
 }

@@ -210,8 +210,8 @@ impl FlightLog {
     }
 }
 
-/// Passes on the channels of every actuator of a log with its part: as installed, or all as one part, for which the log needs
-/// no identity.
+/// Passes the channels of every actuator of a log to `take`, with its part: the installed one, or one part for all, for
+/// which the log needs no identity.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.

@@ -29,8 +29,8 @@ struct Identified {
 }
 
 /// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis, in the order of
-/// `KEYS`: stiffness that the contact regression fitted; white noise and smallest step of the screw and of the motor position;
-/// friction of the screw at the rms load, the force that the model does not know.
+/// `KEYS`: stiffness by the contact regression; white noise and smallest step of the screw and of the motor position; and
+/// the unknown force, which is the friction of the screw at the rms load.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct IdentifiedParams([Option<Identified>; KEYS.len()]);
 

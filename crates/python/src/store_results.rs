@@ -203,7 +203,7 @@ pub(crate) fn report(
     })
 }
 
-/// Selected work requests, by the date until when.
+/// Selected work requests, by due date.
 #[pyfunction]
 pub(crate) fn work(
     py: Python<'_>,

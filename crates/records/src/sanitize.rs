@@ -62,9 +62,9 @@ pub(crate) fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
     }
 }
 
-/// A text cell of a CSV file that no spreadsheet takes for a formula (OWASP, *CSV Injection*): an apostrophe stands
-/// before a first `=`, `+`, `-`, `@` (full-width too), tab or carriage return, unless the whole cell is a number. Control characters
-/// and direction overrides are replaced by their code points.
+/// A text cell of a CSV file that no spreadsheet takes for a formula (OWASP, *CSV Injection*): an apostrophe stands before
+/// a first `=`, `+`, `-`, `@` (full-width too), tab or carriage return, unless the whole cell is a number. Control
+/// characters and direction overrides are replaced by their code points.
 ///
 /// ```
 /// # use records::sanitize::csv_cell;

@@ -107,7 +107,7 @@ fn the_fleet_page_says_what_to_do_until_when_and_why() {
     assert!(calm.contains("No assessed unit needs action.") && calm.contains("1 fine"), "{calm}");
 }
 
-/// A state of yesterday, and none because the unit had no gap then.
+/// One unit had another state yesterday, one had none since it had no gap, and one had the same.
 #[test]
 fn what_is_new_is_a_change_or_a_first_assessment() {
     let mut worse = unit("A", Some("plan"));

@@ -61,7 +61,7 @@ pub(crate) struct NormalizeArgs {
     /// Write TAIL/DEPARTURE_FLIGHT/POSITION.parquet below this folder.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
-    /// Parquet encoding: smallest and fastest to read with Freeplay, or for readers without byte stream split, such as Spark.
+    /// Parquet encoding: `split` is small and fast with Freeplay; `compatible` is for readers such as Spark.
     #[arg(long, value_parser = encoding_parser(), default_value = "split")]
     pub encoding: Encoding,
     /// Use N workers; default: one per core.

@@ -17,7 +17,7 @@ pub(crate) struct WorkArgs {
 /// Commands on work requests.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WorkCommand {
-    /// List work requests by the date until when
+    /// List work requests, the earliest due date first
     List(WorkListArgs),
     /// Record that you have seen a request
     Acknowledge {

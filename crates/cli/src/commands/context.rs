@@ -49,7 +49,7 @@ pub(crate) fn load_trend_context(
     Ok((config, installations))
 }
 
-/// Notes a date of assessment that has not come: nothing is known of the flights until then.
+/// Prints a note if the date of assessment is in the future: flights until then are unknown.
 pub(crate) fn note_future(as_of: Option<Timestamp>, output: &Output) {
     const A_DAY: jiff::SignedDuration = jiff::SignedDuration::from_hours(24);
     if let Some(as_of) = as_of.filter(|as_of| *as_of > Timestamp::now() + A_DAY) {
@@ -70,7 +70,7 @@ pub(crate) fn check_range(since: Option<Timestamp>, until: Option<Timestamp>) ->
     }
 }
 
-/// Columns of names, and what a name of each is called.
+/// Columns of names, each with the word that messages use for it.
 const NAMES: [(&str, &str); 5] = [
     ("tail_number", "tail"),
     ("serial_number", "serial number"),
@@ -87,13 +87,13 @@ pub(crate) enum KnownNames {
     Estimates(Histories),
 }
 
-/// What a name of a column is called.
+/// The word that messages use for a column of names.
 pub(crate) fn called(column: &str) -> &str {
     NAMES.iter().find(|(name, _)| *name == column).map_or(column, |(_, word)| word)
 }
 
 impl KnownNames {
-    /// The names of the configured store and table; missing ones have none.
+    /// The names of the configured store and table; a missing store or table has none.
     pub(crate) fn of(config: &Config) -> Self {
         let installations = pipeline::run::scheduler::installations(config).unwrap_or_default();
         Self::Store(pipeline::open_store(config, &installations).ok().map(Box::new), installations)
@@ -122,7 +122,7 @@ impl KnownNames {
         }
     }
 
-    /// Refuses a name that is in none of some columns, with the nearest that is.
+    /// Refuses a name that none of the columns contains; the error suggests the nearest one.
     pub(crate) fn check(&self, columns: &[&str], name: Option<&str>) -> Result<(), Failure> {
         let Some(name) = name else { return Ok(()) };
         let known: BTreeSet<String> = columns.iter().flat_map(|column| self.names(column)).collect();
@@ -150,7 +150,7 @@ impl KnownNames {
         self.check(&["part_number"], units.part.as_deref())
     }
 
-    /// Why a selection has no unit: the tables have none there now, or none has flown.
+    /// Why a selection has no unit: none is installed there now, or none has flown.
     pub(crate) fn why_nothing(&self, ask: &UnitSelection) -> String {
         let flown_on = match (self, &ask.tail_number, ask.as_of_utc) {
             (Self::Store(Some(store), installations), Some(tail), None) => store
@@ -172,7 +172,7 @@ impl KnownNames {
         format!("{table}; list the flights there with `freeplay query tail {tail}`")
     }
 
-    /// What was searched, as text: the departures in the store.
+    /// The range of departures that was searched, as text.
     fn searched(&self) -> String {
         let range = match self {
             Self::Store(store, _) => store
@@ -190,7 +190,7 @@ impl KnownNames {
 }
 
 impl UnitFilterArgs {
-    /// The units, at a date.
+    /// The selected units, for an assessment at a date.
     pub(crate) fn selection(&self, as_of_utc: Option<Timestamp>) -> UnitSelection {
         UnitSelection {
             tail_number: self.tail.clone(),

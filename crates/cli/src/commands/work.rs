@@ -91,7 +91,7 @@ fn page(found: &[WorkRequest], units: &BTreeMap<UnitKey, TrendRow>) -> String {
     if found.is_empty() {
         return "no work request\n".to_owned();
     }
-    // A closed request has the state and the reason with which it was closed.
+    // A closed request shows the state and the reason that it had when it was closed.
     let present = |r: &WorkRequest| {
         units.get(&(r.part_number.clone(), r.serial_number.clone())).filter(|_| r.is_open())
     };

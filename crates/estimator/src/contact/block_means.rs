@@ -1,4 +1,4 @@
-//! A flight in blocks of 12 ms, or of 4 ms under a vibrating load: means of whole samples, without missing ones and spikes.
+//! A flight in blocks of 12 ms, or of 4 ms under a vibrating load: means of complete samples without spikes.
 
 use std::ops::Range;
 
@@ -13,11 +13,11 @@ use crate::gap::load_band::{quantiles, reversals};
 const PERIOD_S: f64 = 0.004;
 /// Length of a block, s, where the load hardly vibrates.
 const CALM_PERIOD_S: f64 = 0.012;
-/// Half of the time over which the speed of the motor is taken, s.
+/// Half of the time over which the speed of the motor is averaged, s.
 const SPEED_S: f64 = 0.03;
-/// Blocks of a window of an excerpt.
+/// Number of blocks in each window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
-/// Blocks that span too little time to hold a flight, s.
+/// Minimum time of sound blocks, s: a flight with less is rejected.
 const SHORTEST_S: f64 = 9.0;
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
@@ -39,7 +39,7 @@ pub(crate) struct BlockMeans {
     pub(crate) dx_m: Vec<f64>,
     /// F, N: as logged, then brought to the motor's clock.
     pub(crate) load_n: Vec<f64>,
-    /// Loads that do not lie at an end of the load cell's range, N: no row is made of blocks with other loads.
+    /// Loads that are not clipped at an end of the load cell's range, N: blocks with other loads give no row.
     pub(crate) in_range_n: Range<f64>,
     /// e^−(v/v_s)²: how near the motor is to rest.
     pub(crate) slowness: Vec<f64>,
@@ -54,7 +54,7 @@ pub(crate) struct BlockMeans {
 }
 
 impl BlockMeans {
-    /// Takes in a flight, in the memory of the one before.
+    /// Replaces the blocks by those of a flight, in the same memory.
     ///
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
@@ -94,7 +94,7 @@ impl BlockMeans {
         if (sound as f64) * self.period_s < SHORTEST_S { Err(Rejection::TooShort) } else { Ok(()) }
     }
 
-    /// No block, and room for so many.
+    /// Removes all blocks, and reserves memory for new ones.
     fn clear(&mut self, blocks: usize, period_s: f64) {
         let Self { segments, time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n, .. } = self;
         for column in [time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n] {
@@ -106,12 +106,12 @@ impl BlockMeans {
         (self.period_s, self.per_two_s) = (period_s, (2.0 * period_s).recip());
     }
 
-    /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
+    /// The load of one side beyond which the load cell is clipped, N; infinite if it is not.
     ///
-    /// Loads thin out towards the largest. At the end of a cell's range they pile up instead: near the 99.8 % quantile, in a
-    /// band of 3 % of it.
+    /// Large loads are rare. At the end of a cell's range they pile up instead: near the 99.8 % quantile, in a band of 3 %
+    /// of it.
     fn clipped_above_n(&self, side: f64) -> f64 {
-        // Noise of single samples would spread a pile.
+        // Means of several blocks, as noise would spread a pile.
         let count = (CALM_PERIOD_S / self.period_s).ceil() as usize;
         let sided_n: Vec<f64> =
             self.load_n.chunks(count).map(|loads_n| side * mean_of_sound(loads_n)).collect();
@@ -125,7 +125,7 @@ impl BlockMeans {
         };
         let pile = between(top_n - width_n, f64::INFINITY);
         let below = between(top_n - 3.0 * width_n, top_n - width_n);
-        // The ratio of both is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second or more.
+        // `pile / below` is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second or more.
         let is_pile = pile > 2.0 * below && pile * count as f64 * self.period_s > 1.0;
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
@@ -146,8 +146,8 @@ impl BlockMeans {
         (self.time_s[k] / 2.0) as u32
     }
 
-    /// Whether nothing of a block or its neighbours is missing. The first second is left out: offsets settle, and logs start
-    /// in motion.
+    /// Whether a block and its neighbours miss no value, and its load is in range. The first second is left out: offsets
+    /// settle, and logs start in motion.
     #[inline]
     pub(crate) fn is_complete(&self, k: usize) -> bool {
         let change = |values: &[f64]| Some(values.get(k + 1)? - values.get(k.wrapping_sub(1))?);
@@ -157,13 +157,13 @@ impl BlockMeans {
             && self.in_range_n.contains(&self.load_n[k])
     }
 
-    /// Whether an excerpt of so many blocks saves much.
+    /// Whether the flight is much longer than an excerpt of so many blocks.
     pub(crate) fn is_longer(&self, blocks: usize) -> bool {
         self.len() >= blocks * 3 / 2
     }
 
-    /// Takes in an excerpt of a flight: windows of `most` blocks together, or the whole of a flight that is hardly longer.
-    /// Where the load hardly vibrates, blocks are joined to longer ones. δX and the load follow when [delays are
+    /// Fills the blocks from an excerpt of a flight: windows of `most` blocks in total, or all of a flight that is hardly
+    /// longer. Where the load hardly vibrates, blocks are joined to longer ones. δX and the load follow when [delays are
     /// applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64, most: usize) {
         let count =
@@ -234,15 +234,15 @@ impl BlockMeans {
         self.dx_m.iter_mut().zip(&self.motor_m).for_each(|(dx, x)| *dx -= x);
     }
 
-    /// Sine and cosine of the screw's position times 2π over the period, 1/m, where that is not zero.
+    /// Sine and cosine of the screw's position times `per_period`, which is 2π over the period, 1/m; none if it is zero.
     pub(crate) fn find_phases(&mut self, per_period: f64) {
         if per_period > 0.0 {
             self.phases.extend(self.screw_m.iter().map(|m| <[f64; 2]>::from((m * per_period).sin_cos())));
         }
     }
 
-    /// e^−(v/v_s)² of every block with v_s = 3 mm/s, the speed at which most of the excess of friction at rest is gone; 0 where
-    /// the speed is not known.
+    /// e^−(v/v_s)² of every block with v_s = 3 mm/s, at which most of the excess friction of rest is gone; 0 where the
+    /// speed is not known.
     fn find_slowness(&mut self) {
         let slowness = |k| {
             let square = (self.speed_m_per_s(k) / 3e-3).powi(2);
@@ -254,8 +254,8 @@ impl BlockMeans {
     }
 }
 
-/// Whether the load hardly vibrates: the rms of the second difference of its sums over so many samples is less than 5 % of
-/// their rms.
+/// Whether the load hardly vibrates: the rms of the second difference of its sums over `summed` samples is less than 5 %
+/// of their rms.
 fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
     let sums = samples.segments.iter().flat_map(|segment| {
         let parts = samples.load_n[segment.clone()].chunks_exact(summed);
@@ -266,11 +266,11 @@ fn is_calm(samples: &Samples<'_>, summed: usize) -> bool {
     differences < 0.05 * 0.05 * loads
 }
 
-/// A channel read so many blocks later; NaN where that lies outside the flight.
+/// Reads a channel `shift` blocks later; NaN outside the flight.
 fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
     let u = shift - shift.floor();
     let (square, cube) = (u * u, u * u * u);
-    // For a place between the middle two of four.
+    // Weights of four blocks for a point between the middle two.
     let [a, b, c, d] = [
         0.5 * (2.0 * square - cube - u),
         0.5 * (3.0 * cube - 5.0 * square + 2.0),
@@ -278,7 +278,7 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
         0.5 * (cube - square),
     ];
     let (from, len) = ((shift.floor() as isize).saturating_sub(1), logged.len());
-    // The blocks for which all four lie within the flight.
+    // The points whose four blocks lie within the flight.
     let begin = len.min(from.saturating_neg().max(0) as usize);
     let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
     read[..begin].fill(f64::NAN);
@@ -298,8 +298,8 @@ fn mean_of_sound(values: &[f64]) -> f64 {
     if 2 * count < values.len() { f64::NAN } else { sum / count as f64 }
 }
 
-/// Means of motor, δX and load over the complete samples of a block that are no spikes of δX or the load, beyond some
-/// steps; NaN where they are fewer than half.
+/// Means of motor, δX and load over the complete samples of a block. Samples at which δX or the load has a spike, larger
+/// than its `steps`, are left out; NaN if fewer than half remain.
 fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> [f64; 3] {
     let Samples { motor_m, dx_m, load_n, .. } = *samples;
     let (mut sums, mut sound, least) = ([0.0; 3], 0.0, 0.5 * block.len() as f64);
@@ -318,15 +318,15 @@ fn mean(samples: &Samples<'_>, block: Range<usize>, steps: [f64; 2]) -> [f64; 3]
     sums.map(|sum| if sound >= least { sum / sound } else { f64::NAN })
 }
 
-/// Whether a sample leaps by more than some step, and the next one leaps back: a new level is no spike.
+/// Whether a sample leaps by more than `longest`, and the next one leaps back: a new level is no spike.
 fn is_spike(channel: &[f64], i: usize, longest: f64) -> bool {
     let from = channel[i] - channel[i.saturating_sub(1)];
     let back = || channel[i] - channel.get(i + 1).unwrap_or(&f64::NAN);
     from.abs() > longest && back() * from.signum() > longest
 }
 
-/// The longest step between neighbours of a channel that is no spike, in the channel's unit: eight times the 90 % quantile of
-/// the steps within segments that are not zero.
+/// The longest step between samples of a channel that is no spike, in the channel's unit: eight times the 90 % quantile
+/// of the nonzero steps within segments.
 ///
 /// # Errors
 /// [`Rejection::ChannelConstant`] for a channel that never moves.
@@ -337,7 +337,7 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
     };
     let stride = (segments.iter().map(Range::len).sum::<usize>() / LOOKS).max(1);
     let looked_at = steps(stride);
-    // Looks may keep step with a channel that is held, and see none of its steps.
+    // A channel that holds its values may step only between the pairs that are looked at.
     let mut steps = if looked_at.is_empty() { steps(1) } else { looked_at };
     if steps.is_empty() {
         return Err(Rejection::ChannelConstant);
@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(found, [2, 4]);
     }
 
-    /// Ten rows for each load, and every forty-fifth step in the subsample: none of them is one of the load's.
+    /// The load is held for ten rows, and the subsample takes every forty-fifth pair of rows: in none does the load step.
     #[test]
     fn a_channel_that_is_held_moves() {
         let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();
@@ -372,7 +372,7 @@ mod tests {
         assert!(longest_step(&vec![3.0; 50_000], 0..50_000).is_none());
     }
 
-    /// However little of a long log counts, its steps are known from as many looks as those of a short one.
+    /// A short segment of a long log is looked at as often as a log that consists of the segment.
     #[test]
     fn looks_fall_within_what_counts() {
         let wave: Vec<f64> = (0..9000).map(|k| (f64::from(k) * 0.01).sin()).collect();

@@ -12,7 +12,7 @@ pub enum Rejection {
     /// One flank is touched for less than a second.
     #[strum(message = "use a longer flight, or one with more manoeuvres, so that both flanks are pressed")]
     OneSideBrief,
-    /// The load does not rise above the friction that is to be expected, or above nothing.
+    /// The load stays below the expected friction, or is zero.
     #[strum(message = "check the load channel and its unit; a surface without airload shows no gap")]
     LoadTooSmall,
     /// The motor moves less than the wind-up.
@@ -51,7 +51,7 @@ pub enum Rejection {
         signs"
     )]
     PositionsSwapped,
-    /// One position is not a multiple of one of the other.
+    /// The ratio of the two positions is not 1.
     #[strum(
         message = "check `lead_m_per_rev` of the part (of a rotary one `gear_ratio` of the channel), and unit and \
         sign of the positions: screw against motor must have slope 1 (`freeplay check` shows it)"
@@ -79,7 +79,7 @@ pub enum QualityFlag {
     BelowDetection,
     /// The published statistic at the fitted stiffness differs by more than both methods explain.
     EstimatorsDisagree,
-    /// 1/K lies more than three spreads from the part's.
+    /// The compliance 1/K differs from the part's by more than three spreads.
     StiffnessImplausible,
     /// The 95 % load is under three times the friction.
     FrictionHeavy,

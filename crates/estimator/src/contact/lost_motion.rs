@@ -56,8 +56,8 @@ pub(crate) fn lost_motion_m(contact: &FlankFit, scaling: &Scaling, load_n: f64) 
     travel_m(contact, load, &rows.filter(move |row| (row.x[FORCE].abs() - load).abs() < 0.25 * load))
 }
 
-/// Relative travel between + and − a load over the 95 % load, and its standard error, m: that of the fitted line, and how far
-/// outwards of it some rows of either flank lie.
+/// Relative travel between plus and minus a load, given as a share of the 95 % load, and its standard error, m: travel of
+/// the fitted line, and how far outwards of it the rows of either flank lie.
 fn travel_m<'a>(
     contact: &FlankFit,
     load: f64,

@@ -1,8 +1,8 @@
 //! The gap statistic (equations 29–31).
 //!
-//! `multiversion` compiles its loops for each kind of vectors and chooses one when the program runs. Vectors change no result:
-//! each lane runs the same operations in the same order as scalar code, and no product is fused with a sum. So results are
-//! bitwise identical on every machine, and records do not hold the instruction set.
+//! `multiversion` compiles its loops for each kind of vectors and chooses one when the program runs. Vectors change no
+//! result: each lane runs the same operations in the same order as scalar code, and no product is fused with a sum. So
+//! results are bitwise identical on every machine, and records do not hold the instruction set.
 
 #[cfg(feature = "std")]
 use multiversion::multiversion;

@@ -167,7 +167,8 @@ pub struct ClockMapping {
     pub column: Option<String>,
     /// Unit of the column; `count` is a counter of samples. Not needed for Arrow timestamps and text.
     pub unit: Option<TimeUnit>,
-    /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time. With `midnight`, texts may be times of the day.
+    /// Origin of a column of numbers: unknown, 1970 UTC, midnight of the day of departure, or 1899-12-30 local time. With
+    /// `midnight`, texts may be times of the day.
     pub epoch: Epoch,
     /// The raw value at which a counter starts again at zero.
     pub wraps_at: Option<f64>,
@@ -175,7 +176,8 @@ pub struct ClockMapping {
     pub rate_hz: Option<f64>,
     /// Resolution of the clock, s: rows that share a timestamp are spread evenly.
     pub tick_s: Option<f64>,
-    /// How far timestamps may fall back and still be sorted, s. Default 1; without limit where a third of them falls and none is repeated.
+    /// How far timestamps may fall back and still be sorted, s. Default 1; without limit where a third of them falls and
+    /// none is repeated.
     pub max_back_s: Option<f64>,
     /// The longest pause of one flight, s; a log with a longer one is refused. Default 3600.
     pub max_gap_s: Option<f64>,

@@ -31,7 +31,7 @@ use crate::parquet::page_reader::{self, BoundedGroups, Pages};
 use crate::parquet::raw_footer::{self, Claims, Footer, caught, not_parquet};
 use crate::parquet::row_selection::{RowSelection, intersects};
 
-/// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
+/// Rows decoded at a time: few enough for the cache, many enough that the cost of a batch is small.
 const BATCH_ROWS: usize = 8192;
 
 /// Why a footer could not be read, from the first bytes of the file where those identify another format.
@@ -52,22 +52,22 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
     }
 }
 
-/// An open Parquet file, its footer read and nothing else.
+/// An open Parquet file, of which only the footer has been read.
 #[derive(Debug)]
 pub(crate) struct LogFile {
     path: PathBuf,
-    /// Columns and the texts that mark the rows of one flight; empty where the file holds no other.
+    /// Columns and the texts that mark the rows of one flight; empty if the file holds only one.
     pub(crate) flight_rows: Vec<(String, String)>,
     source: ByteSource,
     footer: ArrowReaderMetadata,
     footer_start: u64,
     claims: Claims,
-    /// The same footer, by which text columns are read as the codes of their dictionary; none where the reader refuses it.
+    /// The footer with which text columns are read as dictionary codes; `None` if the reader refuses it.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
-    /// The schema that Arrow's writers note in the footer, once it was asked for; none where it is missing or damaged.
+    /// The Arrow schema in the footer, decoded at its first use; `None` if it is missing or damaged.
     noted: OnceLock<Option<Schema>>,
     leaves: Vec<LeafColumn>,
-    /// Places of the leaves of each name.
+    /// Indices in `leaves`, by name.
     by_name: HashMap<String, Vec<usize>>,
 }
 
@@ -76,9 +76,9 @@ pub(crate) struct LogFile {
 pub(crate) struct Scan<'s> {
     /// Rows decoded at a time.
     pub(crate) batch_rows: usize,
-    /// Whether text that is stored as codes of a dictionary stays so.
+    /// Whether text that is stored as dictionary codes is returned as codes.
     pub(crate) as_codes: bool,
-    /// The row groups that are read, by their number; those left out must hold no requested row.
+    /// Whether a row group is read, by its number; a skipped one must hold no requested row.
     pub(crate) wants_group: &'s dyn Fn(usize) -> bool,
 }
 
@@ -115,7 +115,7 @@ impl LogFile {
         if opened.rows() == 0 { Err(ErrorKind::Empty) } else { Ok(opened) }
     }
 
-    /// The same file, of which the rows of one flight are meant.
+    /// The same file, restricted to the rows of one flight.
     pub(crate) fn of_flight(self, flight_rows: Vec<(String, String)>) -> Self {
         Self { flight_rows, ..self }
     }
@@ -168,12 +168,12 @@ impl LogFile {
         }))
     }
 
-    /// Whether a row holds a list of this leaf's samples; not where there is no such leaf.
+    /// Whether each row holds a list of this leaf's samples; false if there is no such leaf.
     pub(crate) fn is_listed(&self, name: &str) -> bool {
         self.leaf(name).is_ok_and(|leaf| leaf.is_listed)
     }
 
-    /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
+    /// The unit of a column of durations: Parquet has no such type, so Arrow's writers note the unit in the metadata.
     pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
         match self.noted_field(name)?.data_type() {
             DataType::Duration(unit) => Some(*unit),
@@ -186,13 +186,13 @@ impl LogFile {
         self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
     }
 
-    /// A column as Arrow's writers note it; found by its place, as a log may have ten thousand columns.
+    /// A column's field in the Arrow schema; found by index, as a log may have ten thousand columns.
     fn noted_field(&self, name: &str) -> Option<&Field> {
         let leaf = self.find(name).filter(|leaf| !leaf.is_field)?;
         let noted = || {
             self.metadata("ARROW:schema")?;
             let file = self.footer.metadata().file_metadata();
-            // The decoder of that note panics on some damage.
+            // The decoder of that schema panics on some damage.
             caught(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata())).ok()
         };
         self.noted.get_or_init(noted).as_ref()?.fields().get(leaf.root).map(Arc::as_ref)
@@ -204,7 +204,7 @@ impl LogFile {
         pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
     }
 
-    /// The same, or a field of a value that is JSON: `flight.tail` of `{"tail": "N1"}` under the key `flight`.
+    /// A value of that metadata, or a field of a JSON value: `flight.tail` of `{"tail": "N1"}` under the key `flight`.
     pub(crate) fn metadata_field(&self, key: &str) -> Option<String> {
         if let Some(text) = self.metadata(key) {
             return Some(text.to_owned());
@@ -213,7 +213,7 @@ impl LogFile {
         json_fields(self.metadata(key)?).remove(field)
     }
 
-    /// Names in that metadata with the keys of their values: the keys themselves, and the fields of values that are JSON.
+    /// Names in the key-value metadata, each with its key: the keys themselves, and the fields of values that are JSON.
     pub(crate) fn metadata_names(&self) -> Vec<(String, String)> {
         let pairs = self.footer.metadata().file_metadata().key_value_metadata();
         let names = |KeyValue { key, value }: &KeyValue| {
@@ -257,8 +257,7 @@ impl LogFile {
         Ok(())
     }
 
-    /// The least and the greatest text of a column in each row group, as far as its statistics hold them; both are
-    /// bounds, and the texts themselves where `is_exact`.
+    /// Bounds of the texts of a column in a row group, from its statistics; `None` if these do not hold them.
     pub(crate) fn text_bounds(&self, name: &str, group: usize) -> Option<TextBounds<'_>> {
         let leaf = self.find(name).filter(|leaf| leaf.kind == DataType::Utf8 && !leaf.is_listed)?;
         let statistics = self.chunk(group, leaf).statistics()?;
@@ -278,8 +277,8 @@ impl LogFile {
         })
     }
 
-    /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
-    /// of which nothing is wanted are not unpacked. Of a leaf whose rows hold lists all must be wanted.
+    /// Appends the numbers of a leaf, sample by sample; nulls and unwanted samples are NaN. Row groups and pages without
+    /// a wanted row are not decompressed. A leaf whose rows hold lists must be wanted as a whole.
     pub(crate) fn append_numbers(
         &self,
         name: &str,
@@ -370,14 +369,14 @@ impl LogFile {
             .map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
-    /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
+    /// Whether a chunk is a text column outside of structs, with dictionary codes as values.
     fn is_coded(&self, group: usize, leaf: &LeafColumn) -> bool {
         let is_code = |e: Encoding| matches!(e, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY);
         let has_dictionary = self.chunk(group, leaf).encodings().any(is_code);
         has_dictionary && self.footer.schema().field(leaf.root).data_type() == &DataType::Utf8
     }
 
-    /// The pages of some leaves, chunk by chunk, by their headers, which claim what can be.
+    /// The pages of the named leaves, chunk by chunk; an error for a header that claims what is impossible.
     fn all_pages(&self, names: &[&str]) -> Result<impl Iterator<Item = Result<Vec<Page>, Error>>, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         self.want(&leaves, self.groups())?;
@@ -386,7 +385,7 @@ impl LogFile {
         Ok(chunks.map(|(group, leaf)| self.pages(group, leaf)))
     }
 
-    /// Checks that the headers of a leaf's pages claim what can be, and the rows that are declared.
+    /// Checks that the headers of a leaf's pages claim only what is possible, and as many rows as are declared.
     pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
         self.all_pages(&[name])?.try_for_each(|pages| pages.map(drop))
     }
@@ -411,7 +410,7 @@ impl LogFile {
         usize::try_from(self.footer.metadata().row_group(group).num_rows()).unwrap_or(0)
     }
 
-    /// The pages of a chunk, none of which claims what cannot be.
+    /// The pages of a chunk; an error for a header that claims what is impossible.
     fn pages(&self, group: usize, leaf: &LeafColumn) -> Result<Vec<Page>, Error> {
         let rows = self.footer.metadata().row_group(group).num_rows();
         page_header::bounded(&self.source.file, self.chunk(group, leaf), rows)
@@ -487,18 +486,18 @@ pub(crate) struct TextBounds<'f> {
 }
 
 impl TextBounds<'_> {
-    /// Whether a text may be among them.
+    /// Whether the row group may hold a text.
     pub(crate) fn may_hold(&self, text: &str) -> bool {
         self.least <= text.as_bytes() && text.as_bytes() <= self.greatest
     }
 
-    /// The only text, where there is but one.
+    /// The text of the row group, if it has only one.
     pub(crate) fn only(&self) -> Option<&str> {
         if self.is_exact && self.least == self.greatest { std::str::from_utf8(self.least).ok() } else { None }
     }
 }
 
-/// A footer by which text columns of these names are read as codes of their dictionary.
+/// A footer with which the selected text columns are read as dictionary codes.
 pub(crate) fn with_codes(
     footer: &ArrowReaderMetadata,
     is_coded: impl Fn(&str) -> bool,
@@ -514,7 +513,7 @@ pub(crate) fn with_codes(
     ArrowReaderMetadata::try_new(Arc::clone(footer.metadata()), options)
 }
 
-/// Where a chunk's pages lie, as its footer has it.
+/// Byte range of a chunk's pages, from the footer.
 fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
     let (start, bytes) = chunk.byte_range();
     start..start.saturating_add(bytes)

@@ -193,8 +193,8 @@ impl Flights {
         self.rows[row].flight.flight_id.as_str() == flight_id
     }
 
-    /// What the table knows of a log: by its path, else by its tail and departure, else by its tail and flight id. An id that
-    /// several rows have is found by the departure alone, which may be that of the log's clock.
+    /// The fields that the table has for a log: found by its path, else by its tail and departure, else by its tail and
+    /// flight id. An id of several rows needs the departure, which may be that of the log's clock.
     pub fn facts(&self, path: &Path, said: &IdentityFields, departure: Option<Timestamp>) -> IdentityFields {
         let text = |fact: IdentityField| said.get(&fact).map(|t| t.trim());
         let by_identity = || {

@@ -1,9 +1,9 @@
 //! One clock for a log: which rows count, in which order, at which step, and where time breaks.
 //!
-//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out, unless
-//! the rate is declared and their number fits between their neighbours; rows out of order are sorted, and rows that
-//! repeat a stamp are left out, or spread evenly where the clock is declared to tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
-//! starts again. Rows that are in order pass untouched.
+//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
+//! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
+//! are left out, or spread evenly if `tick_s` is given. After a step of more than one and a half times the usual one,
+//! the filter starts again. Rows that are in order stay as they are.
 
 use std::ops::Range;
 

@@ -7,8 +7,8 @@ use std::ops::Range;
 const CHANGES: Range<usize> = 20..500;
 /// Least share of changes that come after the usual number of samples, or one more.
 const REGULAR_SHARE: f64 = 0.5;
-/// Least ratio of the median change to the 10 % quantile of the changes. A coarse sensor that follows a slow motion changes by
-/// one step of its resolution each time: ratio 1.
+/// Least ratio of the median change to the 10 % quantile of the changes. A coarse sensor that follows a slow motion changes
+/// by one step of its resolution each time: ratio 1.
 const UNLIKE: f64 = 2.0;
 /// Nothing is drawn over more of the channel's own steps than this.
 const LONGEST_STEPS: usize = 4;

@@ -245,7 +245,7 @@ fn every_layout_of_the_documentation_is_read() {
         } else {
             format!("[logs]\nfiles = [\"*.parquet\"]\n{logs}\n{example}")
         };
-        // Tables that the example does not change are those of the wide layout, without positions where rows or files name them.
+        // Tables that the example omits are those of the wide layout, without positions where rows or files name them.
         let named_elsewhere = ["position_column", "?<position>", "position ="];
         let is_named_elsewhere = named_elsewhere.iter().any(|word| example.contains(word));
         let left_out = wide.split("\n\n").filter(|table| {

@@ -32,8 +32,8 @@ fn a_slow_log_is_rejected_for_its_rate() {
     assert_eq!(filter(&channels, part).unwrap_err().code, "rate_too_low");
 }
 
-/// The screw's channel is left out of the configuration: δX is minus the motor position, and the screw that is always zero is
-/// no reason to reject the flight.
+/// The configuration has no screw channel: δX is minus the motor position, and a screw position that is always zero does
+/// not reject the flight.
 #[test]
 fn the_logs_of_a_locked_output_need_no_screw_position() {
     let screw = "[channel.screw_position]\ncolumn = \"screw_position_m\"\nunit = \"m\"\n";

@@ -379,8 +379,8 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// Adds what the store holds in addition to gaps: followed quantities, and wrong mappings. Returns the diagnostics of the
-    /// last months, which show them.
+    /// Adds what the store holds besides gaps: followed quantities, and wrong mappings. Returns the diagnostics of the last
+    /// months, which show them.
     fn add_diagnostics(&mut self, store: &Store, as_of: Timestamp) -> Result<RecentDiagnostics, Error> {
         let facts = UnitFacts { units: &self.units, limits: self.limits };
         self.followed = follow(&values::read(store, as_of)?, facts, as_of);

@@ -34,7 +34,7 @@ impl WorkSelection {
     }
 }
 
-/// The selected requests with the units of the open ones: closed requests last, the others by date until when and
+/// The selected requests with the units of the open ones: closed requests last, the others by due date and
 /// age. An open request has the state, reason and date of its unit's present assessment, not those of the last run.
 ///
 /// # Errors

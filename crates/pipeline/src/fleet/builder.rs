@@ -253,8 +253,8 @@ mod tests {
         histories.units.iter().map(of_unit).collect()
     }
 
-    /// Rows of the store and of an estimates table. The order of parts decides, not that of the workers, of whom there may be
-    /// more than parts or units; in other parts names have other codes.
+    /// Rows of the store and of an estimates table, in parts whose names have different dictionary codes. The order of the
+    /// parts decides, not that of the workers, which may outnumber parts and units.
     #[test]
     fn any_number_of_workers_and_parts_brings_together_what_each_row_is_by_itself() {
         let rows = rows();

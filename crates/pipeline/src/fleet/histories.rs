@@ -54,8 +54,8 @@ impl History {
         })
     }
 
-    /// Number of gaps by other settings of the estimate than the latest gap, the departure of the last of them, and the number
-    /// of all gaps; none where all are by the same.
+    /// Number of gaps with other estimator settings than the latest gap, the departure of the last of them, and the number
+    /// of all gaps; `None` if all have the same settings.
     pub(crate) fn other_settings(&self) -> Option<(usize, Timestamp, usize)> {
         self.settings.others()
     }

@@ -1,11 +1,11 @@
-//! Names of units, and where they were.
+//! Keys of units, and the positions in which they were installed.
 
 use records::Installation;
 
 /// Part number where known, and serial number.
 pub type UnitKey = (Option<String>, String);
 
-/// Position of a unit, as far as its rows hold it.
+/// Tail and position of a unit; `None` where its rows have none.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct TailPosition {
@@ -27,13 +27,13 @@ impl TailPosition {
     }
 }
 
-/// The number of a place among those of a unit, as they come.
+/// Index of a place among those of a unit; a new place is appended.
 pub(crate) fn place_number(
     places: &mut Vec<TailPosition>,
     tail_number: Option<&str>,
     position: Option<&str>,
 ) -> u32 {
-    // A unit sits where it sat in the row before, or in one of a handful of places.
+    // From the end: most rows have the place of the row before.
     let known = places.iter().rposition(|place| place.is(tail_number, position));
     let at = known.unwrap_or_else(|| {
         let owned = |name: Option<&str>| name.map(str::to_owned);

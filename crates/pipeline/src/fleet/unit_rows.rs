@@ -75,8 +75,8 @@ impl<R> Default for RowsByUnit<R> {
 }
 
 impl<R> RowsByUnit<R> {
-    /// Reads the rows of a table: `read` is given the number of a row, the rows of its unit, to which it adds, and the number
-    /// of its place.
+    /// Reads the rows of a table: `read` gets the number of a row, the rows of its unit, to which it adds, and the index of
+    /// its place.
     ///
     /// # Errors
     /// A row without a serial number, and the first error of `read`.

@@ -71,8 +71,8 @@ pub fn write_sample(folder: &Path, watch: &(dyn Fn(Event) + Sync)) -> Result<usi
     Ok(logs)
 }
 
-/// Flies every flight that has a log and writes logs, tables and `truth.parquet`. Returns the number of logs and the names of
-/// the tables.
+/// Simulates every flight that has a log, and writes logs, tables and `truth.parquet`. Returns the number of logs and the
+/// names of the tables.
 fn write_data(
     spec: &Spec,
     folder: &Path,

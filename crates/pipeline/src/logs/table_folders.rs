@@ -24,8 +24,8 @@ pub(crate) struct TableFolders {
     tables: BTreeMap<PathBuf, Option<BTreeMap<PathBuf, bool>>>,
 }
 
-/// Whether a file is a log: of no table, or of one that has it. An error where the table, or this file of it, cannot be used:
-/// the path at fault and why.
+/// Whether a file is a log: a file outside of any table, or a live file of a table. An error, with the path at fault, if
+/// the table or this file of it cannot be used.
 pub(crate) type IsLog = Result<bool, (PathBuf, Box<Diagnostic>)>;
 
 impl TableFolders {

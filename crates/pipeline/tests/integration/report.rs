@@ -131,7 +131,7 @@ fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, Trend
     assert!(shown.iter().map(|(_, expected)| expected).sum::<f64>() > 3.0, "{shown:?}");
 }
 
-/// The limit is reached by flying, and usage goes on after the last log: a report that is made later, from the same logs, has
+/// Only flying leads to the limit, and usage is taken to go on after the last log: a later report from the same logs has
 /// the same dates.
 #[test]
 fn a_due_date_does_not_move_with_the_day_on_which_the_report_is_made() {

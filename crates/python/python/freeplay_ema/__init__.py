@@ -341,7 +341,7 @@ def work(
     serial: str | None = None,
     part: str | None = None,
 ) -> Table:
-    """Work requests by the date until when, without closed ones unless asked: the rows of ``freeplay work list``."""
+    """Work requests by due date, without closed ones unless asked: the rows of ``freeplay work list``."""
     return _freeplay.work(load(config), status, [tail, serial, part])
 
 

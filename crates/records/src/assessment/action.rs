@@ -53,7 +53,7 @@ impl Action {
 const DUE_NOW: [&str; 3] = ["unconfirmed", "jumped", "changed"];
 
 impl TrendRow {
-    /// The row with its action and the date until when; `at_limit` is what its part asks for in state `act`.
+    /// The row with its action and due date; `at_limit` is what its part asks for in state `act`.
     ///
     /// A unit in `act`, and one whose gap jumped, is due at once; another in `plan` or `watch` before the earliest date on
     /// which it reaches its limit.
@@ -72,8 +72,8 @@ impl TrendRow {
         self
     }
 
-    /// The date until when, for readers: `now`, `28 Dec`, `348 FH` where no usage is known, `open` where a record is missing,
-    /// or nothing.
+    /// The due date as text: `now`, `28 Dec`, `348 FH` where no usage is known, `open` where a record is missing, or
+    /// nothing.
     pub fn due_text(&self) -> Option<String> {
         let is_now = self.due_utc.is_some_and(|due| due <= self.as_of_utc);
         match (self.action?, self.due_utc, self.crossing_hours_p05) {
@@ -115,7 +115,7 @@ impl TrendRow {
             && self.unexplained_change().is_some_and(fell)
     }
 
-    /// Order of urgency: by state, then by the date until when, then by the hours to the limit.
+    /// Order of urgency: by state, then by due date, then by the hours to the limit.
     pub fn urgency(&self) -> (u8, f64, f64, &str) {
         let rank = match state_rank(self.state) {
             NORMAL_RANK if self.action.is_some() => NORMAL_RANK - 1,

@@ -55,7 +55,7 @@ stored_row! {
         pub number: i64,
         /// The request, such as `W12`.
         pub request_id: String,
-        /// `opened`, `acknowledged`, `deferred`, `returned`, `moved`, `state_changed`, `reopened`, `removed`, `maintained` or `closed`.
+        /// What happened to the request.
         pub event: WorkEventKind,
         /// Part number of the unit.
         pub part_number: Option<String>,

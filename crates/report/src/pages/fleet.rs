@@ -21,7 +21,7 @@ use crate::stats::removal_forecast::removal_forecast;
 const ROWS: usize = 100;
 /// Maximum number of entries on the fleet page itself.
 const FEW: usize = 40;
-/// Least expected number of removals that a month is shown with.
+/// A month is shown only with at least this expected number of removals.
 const LEAST_REMOVALS: f64 = 0.05;
 
 #[derive(Template)]
@@ -111,7 +111,7 @@ fn heading(report: &Report) -> String {
     or_no_data(report.as_of_utc, |at| at.strftime("%a %-d %b %Y %H:%M UTC").to_string())
 }
 
-/// What the installed units ask for, counted.
+/// Number of installed units for each action, as text.
 fn counts(report: &Report) -> String {
     match counts_text(report.units.iter().map(|unit| &unit.row)) {
         text if text.is_empty() => "No unit is installed.".to_owned(),
@@ -176,7 +176,7 @@ fn map<'a>(report: &'a Report, tails: &[&'a str]) -> Map<'a> {
     Map { positions, rows }
 }
 
-/// Tails with the longest time without an estimate first.
+/// Tails, the one that is longest without an estimate first.
 fn data(report: &Report) -> Vec<&ReportTailRow> {
     let mut tails: Vec<&ReportTailRow> = report.tails.iter().collect();
     tails.sort_by_key(|t| (t.last_estimate_utc, &t.tail_number));
@@ -190,7 +190,7 @@ fn days_without(report: &Report, tail: &ReportTailRow) -> String {
     or_no_data(age, |days| format!("{days:.0}"))
 }
 
-/// Flights with a log, of those flown where a table has them.
+/// Number of flights with a log, and of all flights if the flights table has them.
 pub(crate) fn logged(tail: &ReportTailRow) -> String {
     match tail.flown {
         Some(flown) if flown >= tail.flights => {
@@ -200,7 +200,7 @@ pub(crate) fn logged(tail: &ReportTailRow) -> String {
     }
 }
 
-/// Forecasts whose 90 % interval contained the gap found later: lead, and how many of how many.
+/// For each lead time in days, how many forecasts there were, and how many had the later gap in their 90 % interval.
 fn forecast_check(report: &Report) -> Vec<(i64, String)> {
     let mut ages: BTreeMap<i64, (usize, usize)> = BTreeMap::new();
     for past in report.units.iter().flat_map(|u| &u.past_forecasts) {

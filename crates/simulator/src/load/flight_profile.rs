@@ -38,14 +38,14 @@ pub struct Profile {
     /// Rms of the pilot's moves over the stroke. Default 0.12.
     #[default(0.12)]
     pub stick_share: f64,
-    /// Load that a full deflection takes off at full dynamic pressure, over `load_n`. Default 0.3.
+    /// Load by which a full deflection reduces the load at full dynamic pressure, over `load_n`. Default 0.3.
     #[default(0.3)]
     pub hinge_share: f64,
     /// The load keeps one sign throughout: the gap cannot be seen. Default false.
     pub no_reversal: bool,
     /// Spectrum of the gusts; `gust_hz` is `V/2πL` in the turbulence forms. Default `low_pass`.
     pub gust_form: GustForm,
-    /// The load keeps one sign but for this many changes of side, at random times. Default none: many.
+    /// Number of changes of the load's sign, at random times. Default none: the profile decides.
     pub reversals: Option<u32>,
     /// Vibration of the load, in shares of `load_n`; as strong on ground as in flight. Default silent.
     pub buffet: Vibration,

@@ -56,8 +56,8 @@ impl Store {
         Ok(runs)
     }
 
-    /// Digest of the tables that the latest run wrote into all records; none where it has not ended. The latest one is the one
-    /// whose row was committed last: a clock may go back.
+    /// Digest of the tables that the latest run wrote into all records; `None` if this run has not ended. The latest run is
+    /// that whose row was committed last: a clock may go back.
     ///
     /// # Errors
     /// As [`Store::records`].

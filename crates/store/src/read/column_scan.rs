@@ -84,8 +84,8 @@ impl Store {
         self
     }
 
-    /// The same store, whose [scans](Store::scan_columns) read the largest gap along the stroke as the gap of these parts, where
-    /// the gap varies.
+    /// The same store, whose [scans](Store::scan_columns) return the largest gap along the stroke as the gap of these parts,
+    /// where the gap varies.
     #[must_use]
     pub fn by_largest_gap(mut self, parts: BTreeSet<String>) -> Self {
         self.parts_by_largest_gap = parts;
@@ -157,8 +157,8 @@ fn widened(wanted: &SchemaRef) -> SchemaRef {
 /// The columns that [`with_largest_gaps`] needs.
 const LARGEST: [&str; 3] = ["gap_largest_m", "gap_largest_se_m", "part_number"];
 
-/// Records whose `gap_m`, with its error and bounds, is the largest gap along the stroke: those of some parts in which the gap
-/// varies. Others stay as they are.
+/// Replaces `gap_m`, its error and its bounds by the largest gap along the stroke, in records of these parts in which the
+/// gap varies.
 fn with_largest_gaps(batch: RecordBatch, parts: &BTreeSet<String>) -> Result<RecordBatch, ArrowError> {
     let [Some(largest_m), Some(errors_m), Some(of_part)] = LARGEST.map(|name| batch.column_by_name(name))
     else {

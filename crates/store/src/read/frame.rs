@@ -1,6 +1,6 @@
-//! Order and groups of rows, by Polars.
+//! Sorts and groups rows with Polars.
 //!
-//! Only the columns that rows are ordered or grouped by become Polars columns. Polars returns the rows' numbers, and the
+//! Only the columns that rows are sorted or grouped by become Polars columns. Polars returns the rows' numbers, and the
 //! rows themselves remain in Arrow.
 
 use arrow::array::{ArrayRef, AsArray, RecordBatch};
@@ -12,13 +12,13 @@ use polars::prelude::{
 
 use crate::error::Error;
 
-/// The row's number among all rows of a frame.
+/// Column with the number of each row.
 const ROW: &str = "row";
 
-/// Some columns of batches of one schema; times are microseconds.
+/// The named columns of batches of one schema as a Polars frame; times are microseconds.
 ///
 /// # Errors
-/// [`Error::Arrow`] for a column that is not there, or cannot be a text.
+/// [`Error::Arrow`] for a column that is missing or cannot be converted to text.
 pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame, Error> {
     let height = batches.iter().map(RecordBatch::num_rows).sum();
     let columns = names.iter().map(|name| column(batches, name));
@@ -40,8 +40,8 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
     Ok(StringChunked::from_iter_options(name.into(), texts).into_column())
 }
 
-/// The rows of batches in one, ordered by some columns; rows that are equal in all of them keep their order. Only the
-/// last `last` where it is given.
+/// The rows of all batches, sorted by the columns of `order`; rows that are equal in these keep their order. If `last` is
+/// given, only so many rows from the end.
 ///
 /// # Errors
 /// As [`frame`].
@@ -78,7 +78,7 @@ pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize
     Ok(texts.zip(rows).filter_map(|(text, rows)| Some((text?.to_owned(), rows))).collect())
 }
 
-/// Number of distinct rows, by some columns.
+/// Number of distinct combinations of values in the named columns.
 ///
 /// # Errors
 /// [`Error::Frame`] when there is no such column.

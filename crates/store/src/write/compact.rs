@@ -1,4 +1,4 @@
-//! Compaction: many small files become few, sorted by tail, unit and departure, so that a question opens one.
+//! Compaction: many small files become few, sorted by tail, unit and departure, so that a query opens few of them.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,13 +14,13 @@ use crate::read::frame;
 use crate::read::scan::{self, Condition};
 use crate::write::writer::Writer;
 
-/// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.
+/// Rows of a full file: with fewer, a query opens more files; with more, replacing one flight copies more rows.
 const FILE_ROWS: usize = 100_000;
-/// Number of files that are written from the rows in memory. Each time those old files are read that may hold such rows: the
-/// file of a run holds rows of every tail, one that was compacted before those of few.
+/// Number of files that are written in one pass, which reads the old files that may hold their rows: a run's file holds
+/// rows of every tail, a compacted file those of few.
 const FILES_AT_ONCE: usize = 5;
 
-/// Age at which superseded files are deleted, so that a reader that began before may finish: Delta's default.
+/// Age at which superseded files are deleted, so that a reader that still uses them may finish: Delta's default.
 const KEPT: Duration = Duration::from_hours(7 * 24);
 
 /// What a compaction did.
@@ -34,11 +34,11 @@ pub struct Compaction {
     pub deleted: usize,
 }
 
-/// Number of files beyond those that the rows need at which a compaction pays.
+/// Number of superfluous files from which a compaction pays.
 const MANY_FILES: usize = 100;
 
 impl Store {
-    /// Whether compaction would spare many files: a table has a hundred more than twice what its rows fill.
+    /// Whether compaction pays: a table has over a hundred files more than twice the number that its rows fill.
     ///
     /// # Errors
     /// [`Error::Table`] when a table's log cannot be read.
@@ -85,7 +85,7 @@ impl Writer {
     }
 }
 
-/// Columns by which the rows of a compacted table are ordered; those of one value of the first lie together.
+/// Columns by which the rows of a compacted table are sorted; rows with one value of the first are written together.
 fn order(table: &Table) -> &'static [&'static str] {
     match table.name {
         "gaps" => &["tail_number", "serial_number", "departure_utc"],
@@ -96,7 +96,7 @@ fn order(table: &Table) -> &'static [&'static str] {
     }
 }
 
-/// The rows of a table in few files; nothing where it has few.
+/// The change that merges the files of a table; empty if they are few.
 fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Change<'a>, Error> {
     let order = order(table);
     let (slice_by, files, schema) = (order[0], snapshot.paths().collect::<Vec<_>>(), &table.schema);
@@ -132,7 +132,7 @@ fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Ch
     Ok(change)
 }
 
-/// Neighbouring values whose rows fill a file together.
+/// Neighbouring values of the first sort column, whose rows share a file.
 #[derive(Debug, PartialEq)]
 struct OutputRange {
     first: String,

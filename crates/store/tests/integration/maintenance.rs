@@ -33,7 +33,7 @@ fn a_sound_store_has_no_findings_and_is_counted() {
     assert_eq!(writer.store().verify(), []);
     let info = writer.store().info().unwrap();
     assert_eq!((info.records, info.flights, info.serials, info.tails, info.logs), (36, 12, 6, 2, 12));
-    // One file without rows since the beginning, so that engines always find one.
+    // A new table has a file without rows, so that other engines always find one.
     assert_eq!((info.files, info.version), (7, 6));
     assert_eq!((info.first_departure_utc, info.last_departure_utc), (Some(departure(0)), Some(departure(5))));
     assert_eq!(info.last_completed.unwrap().run_id, "b");
@@ -215,7 +215,7 @@ fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
     assert_eq!(writer.store().verify(), []);
 }
 
-/// Readers skip what they do not know, so a changed name removes a file's rows without an error.
+/// Delta readers skip actions that they do not know: a changed name would remove a file's rows without an error.
 #[test]
 fn a_changed_action_is_refused_by_readers_with_and_without_a_digest() {
     for has_digests in [true, false] {
@@ -255,7 +255,7 @@ fn statistics_that_do_not_cover_the_content_are_found_without_a_digest_and_lose_
     }
 }
 
-/// A table of records put back to an earlier state, under log records of the present one.
+/// The table of records is put back to an earlier state; the log records are those of the present state.
 #[test]
 fn log_records_are_compared_with_the_records() {
     let dir = filled().0;

@@ -15,7 +15,7 @@ const MAX_INFLATION: f64 = 8.0;
 /// Standard errors of a variance by the median of as many normal deviates, times the root of their number: two of 1.17 √2.
 const CERTAIN: f64 = 3.3;
 
-/// Among so few values a jump may pass for noise: where stated errors count, the factor of their variance is then at most this.
+/// With at most this many values, a jump may pass for noise: the factor of stated variances is then limited.
 const FEW: usize = 9;
 const MOST_OF_FEW: f64 = 4.0;
 

@@ -23,7 +23,7 @@ pub struct Observation {
     pub gap_m: Option<f64>,
     /// Its standard error, metres; `None` where nothing was stated.
     pub gap_se_m: Option<f64>,
-    /// Whether the record has a quality flag that makes the gap uncertain: such a record alone neither confirms nor clears anything.
+    /// Whether a quality flag makes the gap uncertain: such a record alone neither confirms nor clears anything.
     pub is_doubtful: bool,
 }
 

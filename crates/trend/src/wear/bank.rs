@@ -259,10 +259,10 @@ impl Candidate {
     }
 }
 
-/// The curves tried on a unit over `span_hours` of usage: of all laws those that are to be tried.
+/// The curves of the laws in `is_tried`, for a unit observed over `span_hours` of usage.
 ///
-/// A unit whose age at first sight is not known gets every age of the grid; onsets lie on a grid of starts within the observed usage.
-/// Later starts are handled by the forecast.
+/// A unit of unknown age at its first record gets every age of the grid; onsets lie on a grid of starts within the observed
+/// usage. The forecast handles later starts.
 pub(crate) fn candidates(
     known_age: Option<f64>,
     span_hours: f64,

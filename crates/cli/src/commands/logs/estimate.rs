@@ -47,7 +47,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
                 diagnostics.extend(of_log);
                 finished.push(path.clone());
             }
-            // Its trace and its plot would take as long again, so it is not among the finished ones.
+            // A log that was given up gets no trace and no plot: each would take as long again.
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
@@ -56,7 +56,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
         let log = |path: &PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
         finished.iter().map(log).collect()
     };
-    // A log that failed is reported already; it has no trace and no plot.
+    // The errors of a log were reported by its estimate: without a trace or a plot, it is skipped.
     if let Some(file) = &args.trace {
         let logs = logs()?;
         let trace =
@@ -87,11 +87,11 @@ fn estimate_log(
     part: Option<&PartNumber>,
 ) -> Result<Estimated, Diagnostic> {
     let (path, part) = (path.to_owned(), part.cloned());
-    let (of_log, installations) = (Arc::clone(config), Arc::clone(installations));
+    let (own_config, installations) = (Arc::clone(config), Arc::clone(installations));
     within_time_limit(&display_path(&path.clone()), config, move || {
         let mut diagnostics = Vec::new();
         let rows =
-            estimate::estimate(&path, &of_log, &installations, part.as_ref(), VERSION, &mut diagnostics);
+            estimate::estimate(&path, &own_config, &installations, part.as_ref(), VERSION, &mut diagnostics);
         Ok(rows.map(|rows| (rows, diagnostics)))
     })
 }

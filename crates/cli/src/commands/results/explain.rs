@@ -95,7 +95,7 @@ fn page(found: &Explanation, config: &Config) -> String {
         format!("{file} ({}), method {method}", short(&p.config_digest))
     } else {
         format!(
-            "others than today's in {file} ({}); what follows of the part is today's",
+            "not the present ones of {file} ({}); the part's values below are the present ones",
             short(&p.config_digest)
         )
     };

@@ -90,7 +90,7 @@ fn selected(query: &Query) -> [(&'static str, &Option<String>); 4] {
     ]
 }
 
-/// The selection: by options, by a word and a value, or by a value alone that a tail, serial number, flight or position has.
+/// The selection by options, by a word and a name, or by the name alone of a tail, serial number, flight or position.
 fn query_of(args: &QueryArgs, known: &KnownNames) -> Result<Query, Failure> {
     let mut query = Query {
         tail_number: args.tail.clone(),

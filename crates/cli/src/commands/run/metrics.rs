@@ -15,7 +15,7 @@ pub(crate) fn write(file: &Path, report: &RunSummary, code: Code) -> Result<(), 
     to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
 }
 
-/// After a run without a summary: its end and exit code, and the other values of the last run that had one.
+/// Writes times and exit code of a run that failed without a summary; other values stay those of the last summary.
 pub(crate) fn write_failed(file: &Path, started_utc: Timestamp, code: Code) -> Result<(), Failure> {
     const REPLACED: [&str; 3] =
         ["run_started_timestamp_seconds", "run_ended_timestamp_seconds", "run_exit_code"];
@@ -29,7 +29,7 @@ pub(crate) fn write_failed(file: &Path, started_utc: Timestamp, code: Code) -> R
     to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
 }
 
-/// Whether the file was written by the run that began then, or a later one.
+/// Whether the run that began at this time, or a later one, wrote the file.
 pub(crate) fn is_of(file: &Path, started_utc: Timestamp) -> bool {
     let ended = value_in(file, "freeplay_run_ended_timestamp_seconds ");
     ended.is_some_and(|ended| ended * 1e3 >= started_utc.as_millisecond() as f64)

@@ -145,8 +145,8 @@ fn enter(phase: &Mutex<Phase>, next: Phase) {
     *phase.lock().unwrap_or_else(PoisonError::into_inner) = next;
 }
 
-/// Answers the first signal within a fraction of a second: the logs in progress finish, and a run that has begun none ends.
-/// A listing that hangs could not be asked to end.
+/// Answers the first signal within a fraction of a second: logs in progress finish; a run that has begun none ends, even
+/// if its listing hangs.
 fn answer_interrupt(
     stop: &Arc<AtomicBool>,
     phase: &Arc<Mutex<Phase>>,
@@ -159,7 +159,7 @@ fn answer_interrupt(
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(POLL);
         }
-        // Held until the process ends: the run must not begin to store meanwhile.
+        // The lock is held until the process ends, so that the run cannot begin to store.
         let phase = phase.lock().unwrap_or_else(PoisonError::into_inner);
         match *phase {
             Phase::Searching => {
@@ -178,12 +178,12 @@ fn answer_interrupt(
     });
 }
 
-/// Whether any unit of the store is in a state or worse, updated by this run or not.
+/// Whether any unit of the store has this state or a worse one, even if this run did not update the unit.
 fn is_reached(report: &RunSummary, least: State) -> bool {
     State::ALL.iter().any(|state| *state >= least && report.states.contains_key(state.as_str()))
 }
 
-/// Exit code of a finished run: that of its record, or the state of a unit where the record has none.
+/// Exit code of a finished run; if it is complete, a reached state comes before alerts that were not sent.
 fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
     match report.end(stopped) {
         RunEnd::Interrupted => Code::Interrupted,

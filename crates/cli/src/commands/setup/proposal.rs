@@ -1,5 +1,4 @@
-//! The mapping that `init --from` proposes: what a sample of the logs of a folder offers, how sure that is, and what logs
-//! of another layout hold.
+//! Proposes a mapping for `init --from` from a sample of the logs of a folder. A comment on each line says how sure it is.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -16,16 +15,16 @@ use crate::exit::Failure;
 use crate::output::escape;
 use crate::table::count;
 
-/// Logs that are looked at, at most.
+/// Maximum number of logs from which a mapping is inferred.
 const MOST_SAMPLES: usize = 60;
 
-/// Logs that are read for their tail numbers, at most.
+/// Maximum number of logs that are searched for tails and positions.
 const MOST_LOGS: usize = 5000;
 
-/// More kinds of files than these are tails or days, not groups.
+/// Maximum number of channel groups: more kinds of files are tails or days.
 const MOST_GROUPS: usize = 6;
 
-/// The part number of a proposal: no log names one.
+/// Placeholder for the part number, which no log contains.
 const PART: &str = "PART-NUMBER";
 
 /// Head of a proposed installations table.
@@ -36,7 +35,7 @@ const INSTALLATIONS_HEAD: &str = "\
 tail_number,position,part_number,serial_number,installed_utc,removed_utc
 ";
 
-/// Values of a part that turns, before anything is known of it; those of a part that pushes are in the template.
+/// Placeholder values of a rotary part; the template has those of a linear part.
 const ROTARY_PART: &str = r#"
 kind = "rotary"           # loads are torques, and both positions are angles
 stiffness_nm_per_rad = 2.0e4
@@ -55,12 +54,12 @@ bandwidth_hz = 10.0       # bandwidth of the backlash random walk
 
 "#;
 
-/// Logs that offer the same.
+/// Logs from which the same mapping is inferred.
 struct Variant {
     offer: InferredMapping,
-    /// The first of them.
+    /// The first of these logs.
     log: PathBuf,
-    /// How many of those that were looked at.
+    /// Number of these logs in the sample.
     logs: usize,
 }
 
@@ -73,7 +72,7 @@ impl Variant {
         !Role::NEEDED.iter().any(|role| self.lacks(*role))
     }
 
-    /// What a mapping can express: everything but what differs from log to log.
+    /// The inferred mapping without what differs from log to log, for comparison.
     fn mapped(&self) -> InferredMapping {
         InferredMapping {
             positions: BTreeSet::new(),
@@ -92,13 +91,13 @@ impl Variant {
     }
 }
 
-/// What a name ends in, before its ending and without digits: `loads` of `0413_loads.parquet`.
+/// Last word of a file's name, if it has no digit: `loads` of `0413_loads.parquet`.
 fn last_word(log: &Path) -> Option<&str> {
     let word = log.file_stem()?.to_str()?.rsplit(|c: char| !c.is_alphanumeric()).next()?;
     (!word.is_empty() && !word.contains(|c: char| c.is_ascii_digit())).then_some(word)
 }
 
-/// The first and the last log of each folder, tail and kind, evenly thinned.
+/// The first and the last log of each folder, tail and kind of file; every n-th of them if they are too many.
 fn sampled(logs: &[PathBuf]) -> Vec<PathBuf> {
     let mut ends: BTreeMap<_, (&PathBuf, &PathBuf)> = BTreeMap::new();
     for log in logs {
@@ -109,10 +108,10 @@ fn sampled(logs: &[PathBuf]) -> Vec<PathBuf> {
     all.iter().step_by(all.len().div_ceil(MOST_SAMPLES).max(1)).map(|log| (*log).clone()).collect()
 }
 
-/// What a sample of the logs offers, the most complete and most frequent first.
+/// The different mappings that are inferred from a sample of logs, the most complete and most frequent first.
 ///
 /// # Errors
-/// Why the first log cannot be read, where none can.
+/// If no log can be read: the error of the first.
 fn variants(sample: Vec<PathBuf>) -> Result<Vec<Variant>, Failure> {
     let (mut found, mut failed): (Vec<Variant>, _) = (Vec::new(), None);
     for log in sample {
@@ -142,7 +141,7 @@ fn variants(sample: Vec<PathBuf>) -> Result<Vec<Variant>, Failure> {
     }
 }
 
-/// How the kind of a file shows in its path: a folder below the given one, or the end of its name.
+/// Where a path names the kind of file: in the first folder below the given one, or at the end of the file's name.
 #[derive(Clone, Copy)]
 enum Kind {
     Folder,
@@ -160,7 +159,7 @@ impl Kind {
         Some(name.to_owned())
     }
 
-    /// The files of a kind, from the folder of all.
+    /// Pattern of the files of a kind, relative to the folder of all logs.
     fn pattern(self, kind: &str) -> String {
         match self {
             Self::Folder => format!("{kind}/**/*.parquet"),
@@ -172,7 +171,7 @@ impl Kind {
 /// Files that hold some channels of a flight.
 struct Group {
     offer: InferredMapping,
-    /// Its files, from the folder of all.
+    /// Pattern of its files, relative to the folder of all logs.
     files: String,
     roles: Vec<Role>,
 }
@@ -184,7 +183,7 @@ pub(crate) struct Proposal {
     looked_at: usize,
     /// The usual layout.
     main: Variant,
-    /// The main logs, from the folder of all.
+    /// Pattern of the main logs, relative to the folder of all logs.
     files: String,
     groups: BTreeMap<String, Group>,
     /// Layouts of single tails.
@@ -219,7 +218,7 @@ impl Proposal {
         Ok(proposal)
     }
 
-    /// Covers another layout: by an override where it is that of tails of its own, else by alternatives of the channels.
+    /// Covers another layout: by an override if only other tails have it, else by alternatives of the channels.
     fn add(&mut self, variant: Variant) {
         let (main, tails) = (&mut self.main, &variant.offer.tails);
         if !variant.is_whole() || variant.offer.layout != main.offer.layout {
@@ -319,7 +318,7 @@ impl Proposal {
         )
     }
 
-    /// What differs on some tails.
+    /// Override for tails whose logs differ from the main ones.
     fn of_tails(&self, variant: &Variant) -> String {
         let tails: Vec<String> = variant.offer.tails.iter().map(|tail| quoted(tail)).collect();
         let mut text =
@@ -444,7 +443,7 @@ fn usual(role: Role) -> Unit {
     units.iter().find(|(of, _)| *of == role).map_or(Unit::Celsius, |(_, unit)| *unit)
 }
 
-/// Files whose channels lie in kinds of files, each with a part of them: a main log and groups.
+/// Main log and groups, if each kind of file has only some of the channels.
 fn group(folder: &Path, found: &[Variant], kind: Kind) -> Option<(Variant, String, BTreeMap<String, Group>)> {
     let mut kinds: BTreeMap<String, &Variant> = BTreeMap::new();
     for variant in found {
@@ -467,7 +466,7 @@ fn group(folder: &Path, found: &[Variant], kind: Kind) -> Option<(Variant, Strin
     Some((main, kind.pattern(name), groups))
 }
 
-/// Adds the sources of a flight's identity in other logs.
+/// Adds the sources of a flight's identity that only other logs have.
 fn unite(offer: &mut InferredMapping, other: &InferredMapping) {
     let sources = [
         (&mut offer.metadata, &other.metadata),
@@ -492,12 +491,12 @@ fn tail_of(log: &Path, offer: &InferredMapping) -> Option<String> {
     folder_of(log, offer, IdentityField::TailNumber).or_else(|| path_tail(log))
 }
 
-/// The value of a folder `name=value` that names a fact.
+/// The value of the folder `name=value` that holds a field of the identity.
 fn folder_of(log: &Path, offer: &InferredMapping, fact: IdentityField) -> Option<String> {
     folder_value(log, offer.folders.get(&fact)?)
 }
 
-/// A folder as it is named from another one; as it is where they share no root.
+/// Path of a folder relative to another one; an absolute path stays absolute.
 fn relative(folder: &Path, from: &Path) -> Result<PathBuf, Failure> {
     if folder.is_absolute() {
         return Ok(folder.to_owned());

@@ -21,7 +21,7 @@ pub(crate) fn alerts(
     output: &Output,
 ) -> Result<Code, Failure> {
     let mut found = store.alerts()?;
-    // A change without a message has one row; the states of a baseline are no messages.
+    // Rows without a channel: a change is listed unless its messages are; the states of a baseline are not listed.
     let messages: BTreeSet<String> =
         found.iter().filter(|row| !row.channel.is_empty()).map(|row| row.alert_id.clone()).collect();
     found
@@ -33,7 +33,7 @@ pub(crate) fn alerts(
     Ok(Code::Success)
 }
 
-/// Takes back the unsent messages of a channel, and makes them due in another one if it is given.
+/// Drops the unsent messages of a channel; if another channel is given, the next run sends them through that one.
 ///
 /// # Errors
 /// If the store cannot be read or written, the other channel is not configured, or no message is unsent.

@@ -15,7 +15,7 @@ pub(crate) const GAP: usize = 1;
 pub(crate) const FORCE: usize = 2;
 /// s·c, the size of c: its coefficient is half the difference of the compliances of both flanks.
 pub(crate) const SIDE_FORCE: usize = 3;
-/// ∂c/∂F_d, whose coefficient is what F_d lacks, over K. Gap and wind-up end before this column.
+/// ∂c/∂F_d: its coefficient is the error of F_d over K. The columns before this one are gap and wind-up.
 pub(crate) const DRY: usize = 4;
 /// ∂c/∂η over the 95 % load.
 pub(crate) const SHARE: usize = 5;
@@ -34,9 +34,9 @@ pub(crate) const PLACE: usize = 12;
 /// Errors periodic in position: sine and cosine.
 pub(crate) const PERIODIC: usize = 15;
 
-/// Forces over the 95 % load below which flanks may be soft.
+/// Share of the 95 % load below which flanks may be soft.
 pub(crate) const FIRM_SHARE: f64 = 0.12;
-/// Blocks before one that must keep its flank and firmness; one after it must as well.
+/// So many blocks before a block, and one after it, must press the same flank as firmly.
 const BEFORE: usize = 2;
 
 /// The mean of some blocks in contact on one flank.
@@ -46,7 +46,7 @@ pub(crate) struct DesignRow<const N: usize> {
     pub(crate) x: [f64; N],
     /// δX, m.
     pub(crate) y_m: f64,
-    /// How many blocks.
+    /// Number of blocks.
     pub(crate) blocks: f64,
     /// Rows of one stretch are taken as dependent.
     pub(crate) stretch: u32,
@@ -55,9 +55,9 @@ pub(crate) struct DesignRow<const N: usize> {
 /// All rows.
 #[derive(Debug, Default)]
 pub(crate) struct DesignMatrix {
-    /// Rows beyond the share of the load below which flanks may be soft.
+    /// Rows with a force above [`FIRM_SHARE`] of the 95 % load.
     pub(crate) firm: Vec<DesignRow<COLUMNS>>,
-    /// Rows below it.
+    /// Rows with a smaller force.
     pub(crate) light: Vec<DesignRow<COLUMNS>>,
 }
 
@@ -71,7 +71,7 @@ impl BlockMeans {
         let most = ((scaling.row_s / self.period_s).round() as usize).max(6);
         let firm = Vec::with_capacity(self.len() / most);
         let (mut design, most) = (DesignMatrix { firm, light: Vec::new() }, most as f64);
-        // Of the lower and the upper flank, lightly and firmly touched.
+        // Open rows of the lower and the upper flank under light load, then of both under firm load.
         let mut open = [DesignRow::ZERO; 4];
         let firm_n = FIRM_SHARE * scaling.load_n;
         let (mut stretch, mut last) = (0, (0, 0));
@@ -84,7 +84,7 @@ impl BlockMeans {
                     open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
                     stretch = here;
                 }
-                // Two touches share a row where the first leaves half of it free.
+                // A second touch shares the row of the first if that leaves half of it free.
                 let full = if last == (kind, k.wrapping_sub(1)) { most } else { 0.5 * most };
                 last = (kind, k);
                 if open[kind].blocks >= full {
@@ -158,7 +158,7 @@ impl DesignMatrix {
     }
 }
 
-/// Blocks of the less pressed flank in some rows, times `each`: 1 to count them, their length to have the time in contact, s.
+/// Number of blocks on the less pressed flank, times `each`: with a block's length, the time in contact, s.
 pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>, each: f64) -> f64 {
     let (mut upper, mut lower) = (0.0, 0.0);
     for row in rows {
@@ -167,8 +167,8 @@ pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>
     f64::min(upper, lower)
 }
 
-/// The flank that a block and those around it press, and whether they do so firmly, as a number from 2; none where they
-/// do not keep it.
+/// Kind of contact of a block: 0 lower, 1 upper flank, plus 2 if pressed firmly; `None` if the blocks around it do not
+/// keep it.
 #[inline]
 fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
     let here_n = around[BEFORE].force_n;

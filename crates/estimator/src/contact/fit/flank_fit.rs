@@ -235,12 +235,12 @@ fn gap_and_error_m(
     let sigma = difference_m.abs() / (error_m + 5e-8);
     let weight = sigma * sigma / (sigma * sigma + 2.0);
     let (windup_m, FrictionState { stiffness_n_per_m, friction, .. }) = (scaling.windup_m(), line.state);
-    // The weights of the parts of the error, and of the exponents of its growth, are fitted by maximum likelihood (Student's t
-    // with five degrees of freedom) to 2,800 simulated flights of all classes, then widened until nearly every class holds
-    // 80 % of its 90 % intervals. The weight of the bend is so large that a bent load cell counts.
+    // The weights of the parts of the error, and the exponents of its growth, are fitted by maximum likelihood (Student's
+    // t with five degrees of freedom) to 2,800 simulated flights of all classes, then widened until nearly every class
+    // holds 80 % of its 90 % intervals. The weight of the bend is so large that a bent load cell counts.
     //
-    // What hangs on the choice between both fits, and the bend that a load cell may have: a cell that is nonlinear by 3 % of
-    // its range bends flanks by 1 % of the wind-up, and flanks that bend by more are soft.
+    // Errors by the choice between both fits, and by the bend of a load cell: a cell that is nonlinear by 3 % of its range
+    // bends flanks by 1 % of the wind-up, and flanks that bend by more are soft.
     let choice = 2.6 * (1.0 - weight);
     let bend = 3.0 / (1.0 + (difference_m / (0.012 * windup_m)).powi(2));
     let vibration_m = friction.lost_share * vibration_n / stiffness_n_per_m;
@@ -303,10 +303,9 @@ fn unexplained_m(blocks: &mut BlockMeans, scaling: &Scaling, fit: &FlankFit) -> 
     let noise_m = span_m(design.firm.iter().map(|row| line.residual_m(row)).collect());
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
-    // A quarter more is allowed. Over some 300 simulated flights that show their gap, travel exceeded what is expected by 3 % at
-    // most, with positions
-    // that freeze for seconds by 15 %; over the flights that were given a wrong gap before, by 50 % and more. Of 3,000 sound
-    // flights of the study twelve are refused for it.
+    // Travel may exceed the expected one by a quarter. Over some 300 simulated flights that show their gap, it did so by
+    // 3 % at most, with positions that freeze for seconds by 15 %; flights with a wrong gap exceeded it by 50 % and more.
+    // Twelve of 3,000 sound flights of the study are rejected for it.
     if seen_m - blurred_m > 0.25 * expected_m { seen_m - expected_m } else { 0.0 }
 }
 

@@ -79,7 +79,7 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
         SIDE_FORCE => GaussianPrior::zero(0.05 * windup_m),
         FORCE_DRIFT => GaussianPrior::zero(0.03 * windup_m),
-        // Dry friction over the 95 % load, the share of load lost, and the excess of friction at rest: most likely and spread.
+        // Most likely value and spread of the dry friction over the 95 % load, lost share, and excess friction at rest.
         DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
         STRIBECK => lack((0.0, 0.3), state.stribeck),

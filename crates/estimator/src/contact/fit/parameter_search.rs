@@ -13,8 +13,9 @@ use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
 use crate::contact::stats::spread;
 
-/// First and last step of the load zero over the 95 % load; steps are halved in between.
+/// First and last step of the search for the load zero, as shares of the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
+
 /// The best candidate.
 #[derive(Debug)]
 pub(crate) struct SearchResult {
@@ -31,7 +32,7 @@ pub(crate) struct SearchResult {
 pub(crate) struct ParameterSearch<'a> {
     blocks: &'a mut BlockMeans,
     scaling: &'a Scaling,
-    /// δX of each block less all that does not depend on the force in the coupling, m.
+    /// δX of each block minus the fitted terms that do not depend on the force in the coupling, m.
     linear_m: Vec<f64>,
     /// Scale of the residuals, m.
     scale_m: f64,
@@ -52,11 +53,11 @@ impl<'a> ParameterSearch<'a> {
     /// The best parameters of a flight.
     ///
     /// # Errors
-    /// As [`search`], when no start leads anywhere.
+    /// The last rejection, if [`search`] fails from every start.
     pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
         let mut best = self.best_start()?;
         self.improve_zero(&mut best);
-        // Bristles about as compliant as the coupling, then about as the best of these.
+        // First bristles about as compliant as the coupling, then about as compliant as the best of these.
         let compliance_m_per_n = best.found.state.stiffness_n_per_m.recip();
         if self.try_bristles(&mut best, &[0.3, 1.0, 3.0], compliance_m_per_n) {
             let found_m_per_n = best.found.at.bristle_m_per_n;
@@ -64,7 +65,7 @@ impl<'a> ParameterSearch<'a> {
         }
         let gap_m = best.found.fit.beta[GAP];
         let (mut total, mut squares) = (0.0, 0.0);
-        // A mean misfit that is larger by 0.01 counts e⁻¹.
+        // A candidate whose misfit is larger by 0.01 has the weight e⁻¹.
         for (misfit, other_m) in &self.tried {
             let weight = (-(misfit - best.misfit).max(0.0) / 0.01).exp();
             total += weight;
@@ -82,7 +83,7 @@ impl<'a> ParameterSearch<'a> {
     fn best_start(&mut self) -> Result<Candidate, Rejection> {
         let mut found = Vec::new();
         let mut rejection = Rejection::TooShort;
-        // Dry friction over the 95 % load, and lost share: usual ones, and heavy ones.
+        // Dry friction as a share of the 95 % load, and lost share of the load: usual friction, then heavy friction.
         for (dry, lost_share) in [(0.02, 0.03), (0.10, 0.12)] {
             let state = FrictionState {
                 stiffness_n_per_m: self.scaling.stiffness_n_per_m,
@@ -107,7 +108,7 @@ impl<'a> ParameterSearch<'a> {
         judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).ok_or(rejection)
     }
 
-    /// Iterates from a state; blocks, couplings and linear parts are those of the result.
+    /// Iterates from a state; afterwards, blocks, couplings and linear parts are those of the result.
     fn search(&mut self, state: FrictionState, iterations: usize) -> Result<GaussNewtonResult, Rejection> {
         let found = search(self.blocks, self.scaling, state, iterations, 1)?;
         self.take_linear_parts(&found);
@@ -122,7 +123,7 @@ impl<'a> ParameterSearch<'a> {
             .extend((0..blocks.len()).map(|k| blocks.without_slow_parts_m(scaling, k, beta) - beta[ORIGIN]));
     }
 
-    /// Iterates once from a state, and keeps the result where it fits better than the best; whether it does.
+    /// Iterates once from a state. True if the result fits better than the best one, which it then replaces.
     fn improve(&mut self, best: &mut Candidate, state: FrictionState) -> bool {
         let Ok(found) = self.search(state, 1) else { return false };
         let misfit = self.misfit(&found, found.at.load_zero_n);
@@ -139,12 +140,12 @@ impl<'a> ParameterSearch<'a> {
         Candidate { found, misfit }
     }
 
-    /// A pattern search for the zero of the load cell. In contact it merges with δX₀; it shows where the flank is left.
+    /// Pattern search for the zero of the load cell. In contact, it acts as δX₀ does; it shows where contact ends.
     fn improve_zero(&mut self, best: &mut Candidate) {
         self.prepare(&best.found);
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
         let mut step_n = ZERO_STEPS.0 * self.scaling.load_n;
-        // A misfit that falls on and on, as without any load, has no minimum: a hundred first steps reach four times the load.
+        // Without load, the misfit may fall without end: a hundred first steps reach four times the 95 % load.
         for _ in 0..100 {
             if step_n <= ZERO_STEPS.1 * self.scaling.load_n {
                 break;
@@ -179,7 +180,7 @@ impl<'a> ParameterSearch<'a> {
         if curvature > 0.0 { error_n.clamp(least_n, self.scaling.load_n) } else { self.scaling.load_n }
     }
 
-    /// Tries bristles whose compliances are some factors times one, m/N; true where one of them is better.
+    /// Tries bristles with each factor times one compliance, m/N. True if one of them fits better.
     fn try_bristles(&mut self, best: &mut Candidate, factors: &[f64], of_m_per_n: f64) -> bool {
         let mut is_better = false;
         for factor in factors {
@@ -213,16 +214,16 @@ impl<'a> ParameterSearch<'a> {
         self.misfit(found, load_zero_n)
     }
 
-    /// Takes a fit's delays off the channels, and its linear parts off δX: what no load zero changes.
+    /// Removes a fit's delays from the channels and its linear parts from δX; neither depends on the load zero.
     fn prepare(&mut self, found: &GaussNewtonResult) {
         self.blocks.apply_delays(&found.at);
         self.take_linear_parts(found);
     }
 
-    /// What a fit with another load zero leaves of δX in every complete block, m.
+    /// Passes the residual of each complete block, m, to `take`, for a fit with another load zero.
     fn each_residual(&self, found: &GaussNewtonResult, load_zero_n: f64, mut take: impl FnMut(f64)) {
         let beta = &found.fit.beta;
-        // In contact a zero is an offset of δX.
+        // In contact, a load zero is an offset of δX.
         let shift_m = (load_zero_n - found.at.load_zero_n) * beta[FORCE] * self.scaling.per_load;
         for (k, (linear_m, coupling)) in self.linear_m.iter().zip(&self.blocks.couplings).enumerate() {
             let inside_m = if coupling.force_n == 0.0 { coupling.relative_m } else { 0.0 };

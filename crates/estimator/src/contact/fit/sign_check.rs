@@ -45,8 +45,8 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     let [_, side_m, load_m, slip_m, speed_m, place_m] = found.beta;
     let [side_se_m, load_se_m, place_se_m] =
         [1, 2, 5].map(|column| found.standard_error_m(&[(column, 1.0)], &rows));
-    // Two positions of one screw have a slope of one. Slopes that differ by 1 % are another lead or unit, and less than 60 µm
-    // at the ends of the travel may be the transducer's own error.
+    // Two positions of one screw have a slope of one. A slope that differs by 1 % means another lead or unit; a difference
+    // of less than 60 µm at the ends of the travel may be the transducer's own error.
     if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * scaling.place_m.1).max(60e-6) {
         return Err(Rejection::PositionRatio);
     }

@@ -10,9 +10,9 @@ use crate::contact::friction::friction_model::{Coupling, CouplingParams, Drive, 
 /// Parts of a segment that are integrated side by side.
 const LANES: usize = 8;
 
-/// Integrates the coupling of every block over all segments under one set of parameters: eight parts of a segment in parallel
-/// lanes, each from an arbitrary state; then from the true start of each part until the sequential integration meets what
-/// the lane found.
+/// Integrates the coupling of every block over all segments under one set of parameters: eight parts of a segment in
+/// parallel lanes, each from an arbitrary state; then each part from its true start, until this sequential integration
+/// meets the lane's result.
 pub(crate) fn integrate(blocks: &mut BlockMeans, state: &FrictionState, motor_sense: f64) {
     let mut found = std::mem::take(&mut blocks.couplings);
     found.resize(blocks.len(), Coupling::UNKNOWN);
