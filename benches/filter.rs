@@ -16,9 +16,9 @@ use estimator::contact::{self, PartPrior};
 use estimator::{Filter, GainSchedule, Samples, Stream, StreamingGap, gap, midrange};
 use made_flight::{STEP_S, channels};
 
-/// Positions, loads and S of so many samples stay in the second cache.
+/// Number of samples whose positions, loads and S fit into the second-level cache.
 const SAMPLES: usize = 16_384;
-/// Columns of so many do not stay in any.
+/// Number of samples whose columns fit into no cache.
 const OUT_OF_CACHE: usize = 2_097_152;
 const COUNTS: [usize; 3] = [512, SAMPLES, OUT_OF_CACHE];
 /// The gain settles in hundreds of steps.

@@ -1,5 +1,5 @@
-//! The commit that is built, for `freeplay --version`: from the variable `FREEPLAY_COMMIT`, else from git, else from
-//! the note that `cargo package` leaves in a crate. Without any of them there is none, and the build goes on.
+//! Finds the commit for `freeplay --version`: in the variable `FREEPLAY_COMMIT`, else in git, else in the note that
+//! `cargo package` leaves in a crate. Without any of them, the version names no commit.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! Inputs that would end a run, take files of others away, or run something: each is named, and the rest goes on.
+//! Inputs that would end a run, delete other files, or execute a program: the run names each, and processes all others.
 
 mod corpus;
 mod operations;

@@ -43,7 +43,7 @@ pub struct ParamComparison {
     pub identified: f64,
     /// Standard uncertainty of `identified`, where it is known.
     pub uncertainty: Option<f64>,
-    /// As configured; none where the noise model asks for no such level.
+    /// The configured value; `None` if the noise model has no such level.
     pub configured: Option<f64>,
 }
 

@@ -4,10 +4,10 @@ use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
-/// Creates a file in the place of what an earlier process left there. A link of that name is replaced, not followed.
+/// Creates a file, and replaces one that an earlier process left. A link of that name is replaced, not followed.
 ///
 /// # Errors
-/// When what is there cannot be removed, or another process creates it at the same time.
+/// If an old file cannot be removed, or another process creates the file at the same time.
 pub fn create_fresh(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

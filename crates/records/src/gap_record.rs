@@ -58,7 +58,7 @@ stored_row! {
     /// It holds no identity: an unidentified log gives the same numbers.
     #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
     pub struct GapEstimate {
-        /// `estimated`, `refused`.
+        /// `estimated`, `refused` or, after `store forget`, `withdrawn`.
         pub status: Status,
         /// Code of the rejection, or of the most severe flag.
         pub reason: Option<String>,

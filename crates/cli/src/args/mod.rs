@@ -82,7 +82,7 @@ pub(crate) struct Global {
     /// Print only results and errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// Verbose output; -vv for debug.
+    /// Show every diagnostic and every checked log in full.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
     /// Disable progress output.

@@ -45,7 +45,7 @@ pub(crate) enum StoreCommand {
         /// Let the next run send the unconfirmed messages of this alert again.
         #[arg(long, value_name = "ID")]
         resend: Option<String>,
-        /// Take back the unsent messages of this channel, e.g. of one that is no longer configured.
+        /// Discard the unsent messages of this channel, e.g. of one that is no longer configured.
         #[arg(long, value_name = "CHANNEL", conflicts_with = "resend")]
         drop: Option<String>,
         /// With `--drop`: let the next run send them through this channel.

@@ -33,7 +33,7 @@ pub struct Touch {
     pub force_n: f64,
     /// Mean δX with drift, skew, transducer error and wrong friction taken off, m.
     pub dx_m: f64,
-    /// How far the fit believed it, from 0 to 1; none where the load was too small for a straight flank.
+    /// Weight of the row in the fit, from 0 to 1; `None` if its load was too small for a straight flank.
     pub trust: Option<f64>,
 }
 

@@ -9,8 +9,8 @@ use crate::model::{NoiseCovariances, NoiseModel, not_negative};
 
 /// The covariance has settled when it changes by less than this share of itself in a step.
 const SETTLED: f64 = 1e-15;
-/// Rounding may keep it from that; then it has settled when it came no closer in so many steps, and is at
-/// least this close.
+/// Rounding may keep the covariance from settling so far. It has then settled after this number of steps without a
+/// smaller change, if its change is below this share.
 const STALLED: (usize, f64) = (100, 1e-9);
 /// Steps within which a sound tuning settles many times over.
 const SETTLING_STEPS: usize = 200_000;

@@ -37,7 +37,7 @@ pub(crate) struct NisBlocks {
 }
 
 impl NisBlocks {
-    /// No sample yet, of a flight of so many samples.
+    /// Empty blocks for a flight of `samples` samples.
     pub(crate) fn new(samples: usize) -> Self {
         let full = (samples / MIN_BLOCKS).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
         Self { full, blocks: 0.0, sum_q: 0.0, measured: 0, q_q: 0.0, q_n: 0.0, n_n: 0.0, open: (0.0, 0) }

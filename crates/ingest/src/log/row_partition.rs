@@ -57,9 +57,9 @@ pub(crate) struct Partition {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Rows that will be asked for, and by which positions.
+    /// Rows that will be read, and the positions that will read them.
     announced: BTreeMap<Rows, BTreeSet<String>>,
-    /// Leaves that will be asked for.
+    /// Leaves that will be read.
     leaves: BTreeSet<String>,
     gathered: HashMap<GatheredKey, Arc<Vec<ArrayRef>>>,
 }

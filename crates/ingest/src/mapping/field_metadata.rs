@@ -44,7 +44,7 @@ impl FieldMetadata {
         Ok((of.scale, of.offset))
     }
 
-    /// Whether all that is noted here agrees with what is known of the column.
+    /// Checks that scale, offset and unit in the metadata agree with those of the mapping.
     pub(crate) fn check(&self, column: &str, known: &Self) -> Result<(), ErrorKind> {
         let differs = |noted: f64, known: f64| {
             ((noted - known).abs() > 1e-9 * known.abs()).then(|| (noted.to_string(), known.to_string()))

@@ -101,7 +101,7 @@ fn list_values(array: &ArrayRef) -> (ArrayRef, Vec<usize>) {
     (values.slice(offsets[0] as usize, lengths.iter().sum()), lengths)
 }
 
-/// Values for each outer row, when each of its inner rows holds so many.
+/// Number of values of each outer row, from the number of values of each inner row.
 fn lengths_per_outer_row(outer: Option<Vec<usize>>, inner: &[usize]) -> Vec<usize> {
     let Some(outer) = outer else { return inner.to_vec() };
     let mut rest = inner.iter();

@@ -67,7 +67,7 @@ pub fn trim_ascii_fast(text: &str) -> &str {
 }
 
 impl TableBatch {
-    /// Rows from memory, so many others before them; `name` stands for their file in diagnostics.
+    /// Rows from memory, after `before` other rows of the table; diagnostics show `name` as their file.
     pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
         let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
         Self { file: name.to_owned(), header, batch, names: ColumnAliases::new(), before }

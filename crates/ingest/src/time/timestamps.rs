@@ -148,8 +148,8 @@ impl<'a> TimestampParser<'a> {
         self.seconds.push(second);
     }
 
-    /// Ticks since the first one in seconds. A counter that starts again only ever goes on: a fall by more than half its
-    /// range is a turn.
+    /// Ticks since the first one, in seconds. A counter never runs backwards: a fall by more than half of its range is a
+    /// wrap.
     fn second_of(&mut self, mut ticks: f64) -> f64 {
         if let Some(range) = self.ticks.wraps_at {
             if ticks - self.before < -0.5 * range {

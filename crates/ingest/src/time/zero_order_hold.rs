@@ -1,9 +1,9 @@
-//! A load that is recorded more slowly than the positions stands until the next one comes.
+//! Holds a load that is recorded more slowly than the positions until its next value.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A load is held over so many of its own steps, or so many seconds if that is more.
+/// Number of its own steps, or seconds if these are longer, over which a load is held.
 const HOLD_STEPS: usize = 4;
 const HOLD_S: f64 = 0.2;
 

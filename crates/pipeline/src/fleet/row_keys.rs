@@ -64,7 +64,7 @@ pub(crate) enum TextColumn {
 }
 
 impl TextColumn {
-    /// Those of a column under one of its names; all none where there is no such column.
+    /// The texts of the column that has one of these names; all missing if there is no such column.
     pub(crate) fn of(chunk: &TableBatch, names: &[&str]) -> Result<Self, ingest::Error> {
         let column = chunk.find(names);
         let coded = column.and_then(|column| chunk.dictionary_column(column));

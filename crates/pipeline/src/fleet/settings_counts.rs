@@ -24,8 +24,8 @@ impl SettingsCounts {
         others.0.iter().for_each(|(settings, gaps, latest_us)| self.add(settings, *gaps, *latest_us));
     }
 
-    /// Number of gaps by other settings than the latest gap, the departure of the last of them, and the number of all gaps;
-    /// none where all are by the same.
+    /// Number of gaps with other settings than the latest gap, the departure of the last of them, and the number of all
+    /// gaps; `None` if all have the same settings.
     pub(crate) fn others(&self) -> Option<(usize, Timestamp, usize)> {
         let latest_us = self.0.iter().map(|(_, _, us)| *us).max()?;
         let others = || self.0.iter().filter(|(_, _, us)| *us < latest_us);

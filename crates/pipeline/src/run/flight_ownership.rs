@@ -328,7 +328,7 @@ impl<'a> OwnershipLedger<'a> {
         found
     }
 
-    /// Neither a log nor those that may be other pieces of its flight have records, but for those that are stored.
+    /// Refuses a log and those that may be other pieces of its flight: they get no new records; stored ones stay.
     fn refuse_pieces(
         &mut self,
         account: LogRecord,

@@ -238,8 +238,8 @@ impl RunInputs {
         ProcessedLog::in_error(account, diagnostic)
     }
 
-    /// The records that are known of this flight's content under these settings: its own, those of a log that
-    /// is gone, whose place it takes, or none, when another existing log owns them.
+    /// Numbers of records that are stored for this log's content and these settings: its own, or those of a deleted log
+    /// that it replaces; none if another existing log owns them.
     pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
         let digests = plan::digests(account)?;
         if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {

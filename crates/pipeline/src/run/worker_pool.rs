@@ -348,8 +348,8 @@ mod tests {
         }
     }
 
-    /// Every sound log of a run is finished beside 20 that never end and use their processor: the largest, or some of
-    /// the largest and of the smallest. Logs of a share that is gone end the run.
+    /// A run finishes every sound log next to 20 that never end and keep a processor busy: the largest, or some of the
+    /// largest and of the smallest. Logs of a share that is gone end the run.
     #[test]
     fn logs_that_never_end_keep_no_other_log_from_its_turn() {
         let cases: [fn(usize) -> bool; 2] = [|log| log < 20, |log| !(10..40).contains(&log)];

@@ -126,7 +126,7 @@ fn level_at_end(sound: &[Record]) -> Option<Level> {
     (1..=most).rev().find_map(|count| explained(&sound[sound.len() - count..]))
 }
 
-/// The level by all of some records, but for one of five or more; none where nothing explains them.
+/// The level by the line through these records, or through all but one of five or more; `None` if no line explains them.
 fn explained(records: &[Record]) -> Option<Level> {
     let level = |line: Line, count: usize| {
         let last = records[records.len() - 1];

@@ -100,7 +100,7 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
     (is_large && (is_each || (is_steep && (line.explains() || is_even())))).then_some(line)
 }
 
-/// The records without those, one in five at most, that lie far from the line of the others; none where none does.
+/// The records without outliers, which lie far from the line of the others, at most one in five; `None` without outliers.
 fn without_outliers(records: &[Record]) -> Option<Vec<Record>> {
     // One that lies far from the line of the others lies half as far from the line of all.
     let (line, last) = (Line::fit(records, false)?, records.last()?);

@@ -121,7 +121,7 @@ pub(crate) fn check_both_sides(
 }
 
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
-/// load zero and delays, drift and transducer error taken off. None where the filter gives none.
+/// load zero and delays, drift and transducer error taken off. `None` if the filter fails.
 ///
 /// One outlying stretch of S moves the mid-range: of the whole flight, where it is short, and of its excerpt the nearer
 /// value to the gap is taken. Mass and damping of the screw move it by less than 0.1 %: those of a mode of 400 Hz serve.

@@ -28,7 +28,7 @@ pub(crate) struct GaussianPrior {
 impl GaussianPrior {
     pub(crate) const NONE: Self = Self::zero(f64::INFINITY);
 
-    /// Zero but for a spread, m.
+    /// A prior with mean zero and this standard deviation, m.
     pub(crate) const fn zero(sd: f64) -> Self {
         Self { mean: 0.0, sd }
     }
@@ -173,8 +173,8 @@ impl<const N: usize> RobustFit<N> {
         row.y_m - dot(&self.beta, &row.x)
     }
 
-    /// A coefficient refitted with the weights of this fit: over all rows whose column `by` is at least `least` in
-    /// size, and with one group of them left out in turn. None where too little remains.
+    /// A coefficient refitted with the weights of this fit: over all rows whose column `by` is at least `least` in size,
+    /// and with each group of them left out in turn. `None` if too few rows remain.
     pub(crate) fn leave_one_out(
         &self,
         column: usize,

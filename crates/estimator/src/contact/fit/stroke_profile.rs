@@ -39,7 +39,7 @@ pub(crate) fn stroke_profile(
     }
     let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
     let known = gauss_newton::priors(scaling, &line.at);
-    // The gap, and the transducer's error, at a knot spread by so much about what the whole stroke has.
+    // Spread of the gap, and of the transducer's error, at a knot about their values for the whole stroke, m.
     let priors: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
         0..COLUMNS => known[column],
         _ if column < COLUMNS + KNOTS => GaussianPrior::zero(60e-6),

@@ -1,8 +1,8 @@
 //! Bookkeeping: which unit flew, and how many hours, joined to stored records from the operator's tables.
 //!
-//! A gap belongs to a tail, a position and a departure. The serial number that was there and the hours that it had are
-//! corrected later, often after the log is gone. So every reader of the store joins them here, and each run writes them into
-//! the columns that other programs read.
+//! A gap belongs to a tail, a position and a departure. The unit's serial number and hours may be corrected later, often
+//! after its log was deleted. So every reader of the store joins them here, and each run writes them into the columns that
+//! other programs read.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
