@@ -1,4 +1,4 @@
-//! Addresses of HTTP, and what became of a document that was sent to one.
+//! HTTP addresses, and the outcome of a post to one.
 
 use url::Url;
 
@@ -7,16 +7,16 @@ use url::Url;
 pub enum Posted {
     /// The receiver answered with this status.
     Answered(u16),
-    /// No connection was made: nothing was received.
+    /// No connection was made: the receiver has nothing.
     NotSent(String),
-    /// No whole answer: the receiver may have the document.
+    /// No complete answer: the receiver may have the document.
     Unknown(String),
 }
 
 /// Checks an address of HTTP.
 ///
 /// # Errors
-/// Why it is none, without the address, which may hold a secret.
+/// If it is not one; the message omits the address, which may hold a secret.
 pub fn check_url(text: &str) -> Result<(), String> {
     parse(text).map(drop)
 }

@@ -1,4 +1,4 @@
-//! In the place of the clients of buckets and of HTTP, for a build without the feature `cloud`.
+//! Replaces the clients of buckets and of HTTP in a build without the feature `cloud`.
 
 use std::time::Duration;
 

@@ -4,11 +4,11 @@ use super::codes::QualityFlag;
 use super::fit::scaling::Scaling;
 use super::types::ContactEstimate;
 
-/// Standard errors a gap must exceed to count as seen.
+/// Number of standard errors that a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
 /// Load over friction below which friction dominates the relative position.
 const HEAVY: f64 = 3.0;
-/// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
+/// A gap under this share of the wind-up at the 95 % load is smaller than the errors of the model.
 const DETECTION_SHARE: f64 = 0.01;
 /// Largest relative standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
@@ -42,8 +42,8 @@ pub(crate) fn flags(
 
 /// Whether the published statistic at the fitted parameters agrees with the gap as far as its own errors go.
 ///
-/// That statistic reads friction as backlash, about twice F_f/K, a gap of zero as the unknown force over K, and under
-/// vibration of the load up to a third too little.
+/// That statistic takes friction for backlash, about twice F_f/K, gives the unknown force over K for a gap of zero, and is
+/// up to a third too low under vibration of the load.
 fn agrees_with_midrange(found: &ContactEstimate, unknown_force_n: f64) -> bool {
     let Some(midrange_m) = found.midrange_at_fit_m else { return true };
     let larger_m = midrange_m.abs().max(found.gap_m.abs());

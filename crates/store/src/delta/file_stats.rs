@@ -20,7 +20,7 @@ const LISTED_UNITS: usize = 256;
 /// not know.
 const UNITS: (&str, &str) = ("serial_number", "freeplaySerials");
 
-/// A file's statistics as read from the log. What is not known is left out, and never prunes.
+/// A file's statistics as read from the log. Unknown values are missing, and exclude no file.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct Stats {
@@ -33,7 +33,7 @@ pub(crate) struct Stats {
 }
 
 impl Stats {
-    /// Statistics that cannot be understood are no statistics.
+    /// Statistics that cannot be parsed count as missing.
     pub(crate) fn parse(text: Option<&str>) -> Self {
         text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
     }

@@ -1,8 +1,7 @@
-//! Where a store lies: a folder, or a prefix of a bucket of which copies lie in a folder of this process.
+//! Location of a store: a folder, or a prefix of a bucket, whose files are copied to a folder of this process.
 //!
-//! Files go by the same path in both: for a bucket it is where the copy lies once the file was
-//! [brought](Location::fetch). Data files never change under their names, so a copy is as good as the object; it is
-//! compared with its digest like any file.
+//! Files have local paths in both: for a bucket, the path of the copy once the file was [fetched](Location::fetch). Data
+//! files never change under their names, so a copy is as good as the object; it is compared with its digest like any file.
 
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -24,7 +23,7 @@ use crate::error::Error;
 /// A store's or a table's location.
 #[derive(Debug, Clone)]
 pub(crate) struct Location {
-    /// The folder itself, or where copies lie.
+    /// The folder itself, or the folder of the copies.
     dir: PathBuf,
     bucket: Option<BucketLocation>,
     runtime: Arc<RuntimeHandle>,
@@ -34,7 +33,7 @@ pub(crate) struct Location {
 struct BucketLocation {
     address: Address,
     client: Client,
-    /// Deleted with the last who reads from it.
+    /// Deleted when the last location that uses it is dropped.
     _copies: Arc<tempfile::TempDir>,
 }
 
@@ -46,8 +45,8 @@ pub(crate) struct Entry {
     pub(crate) written: SystemTime,
 }
 
-/// What runs Delta's asynchronous library: threads of our own, which a process has that was forked from one with
-/// another store, or those that serve the bucket's connections.
+/// Runtime of Delta's asynchronous library: an own thread for a folder, so that a forked process that opens a store has
+/// one too; for a bucket, the threads that serve its connections.
 #[derive(Debug)]
 enum RuntimeHandle {
     Own(Runtime),
@@ -130,7 +129,7 @@ impl Location {
         durable_fs::create_folder(&self.dir).map_err(Error::io(&self.dir, "created"))
     }
 
-    /// Makes the names of new files last; a bucket's do when their writing returns.
+    /// Makes the names of new files durable; in a bucket, they are once the write returns.
     pub(crate) fn sync(&self) -> Result<(), Error> {
         if self.is_bucket() {
             return Ok(());
@@ -235,7 +234,7 @@ impl Location {
         }
     }
 
-    /// The files right here, in the order of names.
+    /// The files of this folder itself, in the order of names.
     pub(crate) fn entries(&self) -> Result<Vec<Entry>, Error> {
         let Some(bucket) = &self.bucket else {
             let found = durable_fs::entries(&self.dir).map_err(Error::io(&self.dir, "read"))?;

@@ -57,7 +57,7 @@ pub(crate) struct Table {
 pub(crate) struct Change<'a> {
     pub(crate) add: Vec<Add>,
     pub(crate) remove: Vec<&'a DataFile>,
-    /// Whether the same rows only lie elsewhere afterwards.
+    /// True for compaction: rows are moved, not changed.
     pub(crate) rearranges: bool,
     /// The table's new description.
     pub(crate) describes: Option<Action>,
@@ -77,7 +77,7 @@ impl Table {
         move |source| Error::Table { table, verb, source: Box::new(source) }
     }
 
-    /// Makes the table with the lowest protocol there is: no feature of Delta is needed to read it.
+    /// Creates the table with the lowest protocol version: no feature of Delta is needed to read it.
     ///
     /// Its first commit brings a file without rows: an engine that is handed the list of files, as DuckDB
     /// is, fails on an empty one.

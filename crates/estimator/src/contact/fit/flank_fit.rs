@@ -56,7 +56,7 @@ pub(crate) struct FlankFit {
     pub(crate) is_soft: bool,
     /// Travel that neither gap nor wind-up accounts for, m: a part of the error of the gap and of the loop.
     pub(crate) unexplained_m: f64,
-    /// What it comes from: the fit of the whole flight with its rows, and what the search found.
+    /// The fit of the whole flight with its rows, and the result of the search.
     pub(crate) search: SearchResult,
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let windup_m = scaling.windup_m();
     let [squares, _, count] = second_differences(workspace.whole.load_n.iter().copied());
     let vibration_n = (squares / count.max(1.0)).sqrt();
-    // A load that turns between two samples, and residuals by which it has mixed both flanks beyond use.
+    // The load reverses between samples, and the residuals show that blocks mix both flanks.
     if vibration_n > 0.3 * scaling.load_n && search.scale_m > 0.16 * windup_m {
         return Err(Rejection::RateTooLow);
     }
@@ -191,7 +191,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     Ok(SearchResult { line, ..best })
 }
 
-/// Whether errors that repeat with the position are there for certain, and matter: 0.2 µm do.
+/// Whether errors that repeat with the position are significant and larger than 0.2 µm.
 fn is_periodic(found: &GaussNewtonResult) -> bool {
     [PERIODIC, PERIODIC + 1].into_iter().any(|column| {
         let size_m = found.fit.beta[column].abs();
@@ -201,10 +201,10 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
 
 /// The gap and its standard error, m, and by how many errors the fit of higher loads differs.
 ///
-/// The error is made of the jackknife error; of the candidates, those of the parameter search and both fits as far as their
-/// difference is significant and no softer flank than a load cell may show; and of what no flight averages out: a share of
-/// the wind-up, and friction between two samples that the load's slow part does not show. It grows with few changes of the
-/// flank, with heavy friction, and with a load cell at its end.
+/// The error has three parts: the jackknife error; the spread of the candidates, which are those of the parameter search
+/// and both fits as far as their difference is significant and no softer flank than a load cell may show; and what no
+/// flight averages out: a share of the wind-up, and friction between two samples that the load's slow part does not show.
+/// It grows with few changes of the flank, with heavy friction, and with a clipped load cell.
 fn gap_and_error_m(
     search: &SearchResult,
     profile: Option<&StrokeProfile>,
@@ -257,13 +257,13 @@ fn gap_and_error_m(
             let candidates_m = (0.45 * search.spread_m).hypot(weight * difference_m * choice.hypot(bend));
             (line.fit.beta[GAP] + weight * difference_m, jackknife_m, candidates_m)
         },
-        // What one gap for the whole stroke leaves unexplained is explained now.
+        // The profile explains what one gap for the whole stroke could not.
         |profile| (profile.mean_m.0, profile.mean_m.1, 0.0),
     );
     ((gap_m, (0.8 * jackknife_m).hypot(candidates_m).hypot(floor_m) * growth), sigma)
 }
 
-/// Rows of even numbers of correlation blocks, in order of time.
+/// Groups of about equally many rows, in order of time; no stretch is divided.
 fn groups(rows: &[DesignRow<COLUMNS>]) -> Vec<Range<usize>> {
     let mut groups = Vec::with_capacity(GROUPS);
     let mut first = 0;
@@ -288,8 +288,7 @@ fn jackknife_error_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// By how much δX travels further than gap and wind-up do, from the 5 % to the 95 % quantile, m; 0 where noise may explain
-/// it. A screw that friction holds within its gap, or a load that is another actuator's, leaves travel over that no flank
-/// accounts for.
+/// it. The cause may be a screw that friction holds within its gap, or the load of another actuator.
 fn unexplained_m(blocks: &mut BlockMeans, scaling: &Scaling, fit: &FlankFit) -> f64 {
     let GaussNewtonResult { design, fit: line, at, .. } = &fit.search.line;
     blocks.apply_delays(at);
@@ -301,7 +300,7 @@ fn unexplained_m(blocks: &mut BlockMeans, scaling: &Scaling, fit: &FlankFit) -> 
         rows.map(|row| (row.y_m - fit.other_m(&row), dot(&line.beta[..DRY], &row.x[..DRY]))).unzip();
     let (seen_m, expected_m) = (span_m(seen_m), span_m(expected_m));
     let noise_m = span_m(design.firm.iter().map(|row| line.residual_m(row)).collect());
-    // A bad fit leaves noise enough to explain anything: it may explain only so much.
+    // A bad fit leaves noise enough to explain anything, so noise counts up to half of the expected travel.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
     // Travel may exceed the expected one by a quarter. Over some 300 simulated flights that show their gap, it did so by
     // 3 % at most, with positions that freeze for seconds by 15 %; flights with a wrong gap exceeded it by 50 % and more.

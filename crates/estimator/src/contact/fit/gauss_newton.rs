@@ -23,7 +23,7 @@ pub(crate) struct GaussNewtonResult {
     pub(crate) fit: RobustFit<COLUMNS>,
     /// Parameters of the design's rows.
     pub(crate) at: FrictionState,
-    /// Parameters that the fit asks for.
+    /// Parameters that the fit leads to.
     pub(crate) state: FrictionState,
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn search(
     }
 }
 
-/// The reason of a flight whose less pressed flank is pressed for a time, s.
+/// Rejects a flight whose less pressed flank is pressed for too short a time, s.
 pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     if least_s < MIN_CONTACT_S {
         Err(Rejection::NoLoadReversal)
@@ -65,7 +65,7 @@ pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     }
 }
 
-/// What each coefficient is believed to be before its flight is seen, m.
+/// Priors of the coefficients, before the flight is seen, m.
 pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
     let windup_m = scaling.windup_m();
     let here_m = scaling.load_n / state.stiffness_n_per_m;
@@ -99,7 +99,7 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
     })
 }
 
-/// The state that a fit asks for, within the bounds of a sensible iteration.
+/// The state that a fit leads to, within the bounds of a sensible iteration.
 fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> FrictionState {
     let beta = &fit.beta;
     let windup_m = scaling.windup_m();

@@ -1,4 +1,4 @@
-//! Robust regression with Gaussian priors, and standard errors that know residuals to be dependent.
+//! Robust regression with Gaussian priors, and standard errors for dependent residuals.
 
 use std::ops::Range;
 
@@ -10,18 +10,18 @@ use crate::contact::stats::spread;
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
-/// Beyond this many they lose all of it: a frozen channel is no noise.
+/// Residuals beyond this many lose all of it: a frozen channel is no noise.
 const WILD: f64 = 10.0;
 /// Rounds of reweighting of a fit of the whole flight.
 pub(crate) const REWEIGHTINGS: usize = 3;
 /// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
 const LEAST_SPREAD_M: f64 = 1e-12;
 
-/// What a coefficient is believed to be, m.
+/// Gaussian prior of a coefficient, m.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GaussianPrior {
     pub(crate) mean: f64,
-    /// Infinite where nothing is believed.
+    /// Infinite without prior knowledge.
     pub(crate) sd: f64,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct RobustFit<const N: usize> {
     priors: [GaussianPrior; N],
 }
 
-/// Reweighted least squares: `rounds` rounds from even weights; none where there are too few rows.
+/// Reweighted least squares: `rounds` rounds from even weights; `None` for too few rows.
 ///
 /// The weight of a prior is the variance of residuals over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would outweigh it.
@@ -122,10 +122,10 @@ fn squares_of_stretches<const N: usize>(
     (total + sum * sum, stretches)
 }
 
-/// Rows that stay in the first cache while every column takes them in.
+/// Number of rows that stay in the first-level cache while all columns add them.
 const CHUNK: usize = 64;
 
-/// Σ w x xᵀ and Σ w x y: whole columns, since what is above the diagonal comes for nothing.
+/// Σ w x xᵀ and Σ w x y: whole columns, since vectors compute the part above the diagonal at no cost.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn normal_equations<const N: usize>(
     rows: &[DesignRow<N>],
@@ -203,7 +203,7 @@ impl<const N: usize> RobustFit<N> {
         Some((whole, parts?))
     }
 
-    /// How far each row was believed, from 0 to 1: its weight over the weight that it would have with a small residual.
+    /// Trust in each row, from 0 to 1: its weight over the weight that it would have with a small residual.
     pub(crate) fn trusts(&self, rows: &[DesignRow<N>]) -> impl Iterator<Item = f64> {
         let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)

@@ -1,6 +1,6 @@
 //! Quasi-static stick–slip model of the force in the coupling (equation 1, corrected).
 //!
-//! The screw slips when the force on it exceeds the friction level and is held below. While it is held, bristles of
+//! The screw slips when the force on it exceeds the friction level; otherwise it is held. While it is held, bristles of
 //! compliance a bend under the friction force (pre-sliding displacement; Dahl 1968, Canudas de Wit et al. 1995).
 //! One step, with w the anchor of the bristles relative to the motor and F the load less the zero of its cell:
 //!
@@ -10,8 +10,8 @@
 //! c ← clamp(c, F − F_f, F + F_f)                the screw slips as far as the friction level asks
 //! F_f = (F_d + η·|F|)·(1 + p·e^−(v/v_s)²)       v_s = 3 mm/s (Stribeck effect)
 //! ```
-//! A moving screw has c = F − F_f·sgn Ẋ₂, a resting one keeps its c, and a flexing one (load changes, motor at rest)
-//! shows the loop that the sign of the motor's speed cannot show.
+//! A moving screw has c = F − F_f·sgn Ẋ₂, and a resting one keeps its c. When the load changes while the motor rests, c
+//! follows a loop that a model by the sign of the motor's speed would miss.
 
 /// Dry friction of the screw and the share of the load that is lost (equation 1).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -47,7 +47,7 @@ pub(crate) struct FrictionState {
     pub(crate) skew_s: f64,
 }
 
-/// The coupling at one block: its force, the derivatives of the force by the parameters of friction, and its position.
+/// The coupling at one block: its force, the derivatives of the force by the friction parameters, and its position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Coupling {
     /// c, N; NaN where a channel is missing.
