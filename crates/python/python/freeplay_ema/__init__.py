@@ -3,7 +3,7 @@
 The functions read the same ``pipeline.toml`` as the command ``freeplay`` and return bitwise identical rows.
 Tables come in and go out through Arrow's PyCapsule interface: hand a :class:`Table` to ``pyarrow.table``,
 ``polars.DataFrame``, ``pandas.DataFrame.from_arrow`` or DuckDB, and hand any of theirs back. Work is done without
-the interpreter's lock. What is wrong is raised as :class:`FreeplayError`, with the command's code, text and remedy.
+the interpreter's lock. Errors are raised as :class:`FreeplayError`, with the command's code, text and remedy.
 
 The examples start from the folder of the repository, whose ``sample-data`` holds simulated flights.
 """
@@ -154,7 +154,7 @@ def estimate_arrays(
 
 
 def trace(log: Path, config: Settings = _USUAL, *, part: str | None = None) -> Table:
-    """What the filter saw of a log, sample by sample: inputs, the backlash ``s_m``, innovation and its variance.
+    """Input and output of the filter for each sample of a log: the backlash ``s_m``, innovation and its variance.
 
     >>> import freeplay_ema as fp
     >>> log = "sample-data/logs/N412FP/20260828T005251Z_N412FP-0017.parquet"
@@ -183,7 +183,7 @@ def trend(
     ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date. ``statistics``
     has no effect: the classic statistics are no longer computed. ``limit_m`` is the removal
     limit in m for parts without one in the configuration; where no configuration is named and there is no
-    ``pipeline.toml``, ``estimates`` are judged by it alone.
+    ``pipeline.toml``, it is the only limit.
 
     >>> import freeplay_ema as fp, glob, pyarrow as pa
     >>> estimates = fp.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
@@ -207,7 +207,7 @@ def records(
     until: Instant | None = None,
     last: int | None = None,
 ) -> Table:
-    """Stored records that fit, by departure, tail, flight and position.
+    """Selected records of the store, in order of departure, tail, flight and position.
 
     >>> import freeplay_ema as fp
     >>> summary = fp.run()
