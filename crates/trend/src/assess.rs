@@ -131,7 +131,7 @@ fn by_line(rise: &Rise, settings: &Settings, elapsed_hours: f64) -> Assessment {
 /// The part of an assessment that the mixture of wear laws gives.
 fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
     let ratio = fit.prior.hours_per_usage(unit.history.data.flights);
-    // A rise that was taken off for the law is still there.
+    // The laws were fitted without the rise of a step; the unit still has that rise, so its limit is nearer.
     let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
     let settings = &Settings { limit_m, ..*settings };
     let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);

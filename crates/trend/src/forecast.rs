@@ -35,7 +35,7 @@ pub struct Forecast {
 
 /// Past levels and forecast of an assessment: the level through each segment's flights by a fixed-interval smoother
 /// (Rauch, Tung and Striebel 1965, <https://doi.org/10.2514/3.3166>), m, and the 5, 50 and 95 % quantiles of the gap, m,
-/// after more `hours`, flight hours, from the same mixture and as much wider as the crossing.
+/// after more `hours`, flight hours, from the same mixture and widened as the crossing is.
 ///
 /// Empty ahead for a unit whose records neither a wear law nor a line explains.
 ///
@@ -64,7 +64,7 @@ pub fn forecast(
     let after = |hours: f64| {
         let quantiles_m = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
         let [p05_m, m, p95_m] = quantiles_m.map(|gap_m| gap_m + unit.history.undone_m.max(0.0));
-        // As much wider as a crossing's interval.
+        // The interval is widened as that of a crossing is.
         let widened =
             |bound_m: f64| if hours > 0.0 { m + prior.interval_width * (bound_m - m) } else { bound_m };
         // The upper edge meets the limit no later than the line through the last records.

@@ -86,8 +86,8 @@ fn read_fleet<'a>(
 ) -> Arc<[History<'a>]> {
     let uninformative = FleetPrior::uninformative(limit_m);
     let units = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
-    // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
-    // their first hour on lead to a fleet prior without wear.
+    // The unit hours at the first flight are not used: with a few units whose wear began late, curves from their first
+    // hour on would give a fleet prior without wear.
     executor.map(&units, |unit| History::read(*unit, None, &uninformative)).into()
 }
 
@@ -135,7 +135,7 @@ struct AxisPrior<'a> {
 }
 
 impl<'a> AxisPrior<'a> {
-    /// Nothing along an axis without usage.
+    /// `None` for an axis without usage.
     fn on_axis(
         histories: &Arc<[History<'a>]>,
         axis: UsageAxis,

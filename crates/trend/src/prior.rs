@@ -11,9 +11,9 @@ use crate::wear::{AgeAssumption, Component};
 /// The gap of a new unit as a share of the limit, while nothing is known.
 const NEW_SHARE: f64 = 0.2;
 
-/// What is assumed of the measurement and of the wear while nothing is known, shares of the limit: the spread of
-/// a new gap, variance of the level per hour (of the limit's square), and the spread
-/// of what an installation adds. Every length of this crate is a share of the limit: results do not depend on its unit.
+/// Assumptions while nothing is known, shares of the limit: the spread of a new gap, variance of the level per hour (of
+/// the limit's square), and the spread of what an installation adds. Every length of this crate is a share of the limit,
+/// so that results do not depend on its unit.
 const NEW_SPREAD: f64 = 0.05;
 const DRIFT_PER_HOUR: f64 = 1e-8;
 const BIAS_SPREAD: f64 = 0.015;
@@ -139,8 +139,8 @@ impl FleetPrior {
         Self { axis, hours_per_unit, ..Self::uninformative(self.limit_m()) }
     }
 
-    /// Prior of a unit that wears by some rate, m per flight hour, from a first gap: lives around that of the rate, any
-    /// law. All laws run on the usage that such a life is worth, since the bank's grids are those of usual lives.
+    /// Prior of a unit that wears at this rate, m per flight hour, from a first gap: lives around the one by the rate, any
+    /// law. Usage is scaled to a usual life, since the bank's grids are made for usual lives.
     pub(crate) fn of_fast_wear(&self, m_per_hour: f64, first_m: f64) -> Self {
         let prior = Self::uninformative(self.limit_m());
         let life_hours = prior.span_m / m_per_hour;

@@ -7,8 +7,8 @@ use crate::math::{SD_OVER_MAD, median};
 /// Flights of a batch whose means show a scatter that neighbours share.
 const BATCH: usize = 8;
 
-/// Batches that the assumption of the inflation counts for, and its largest value: beyond it, what neighbours share is a
-/// change, not scatter.
+/// Number of batches that the assumed inflation counts for, and the largest inflation: beyond it, what neighbours share
+/// is a change, not scatter.
 const PRIOR_BATCHES: f64 = 5.0;
 const MAX_INFLATION: f64 = 8.0;
 
@@ -19,7 +19,7 @@ const CERTAIN: f64 = 3.3;
 const FEW: usize = 9;
 const MOST_OF_FEW: f64 = 4.0;
 
-/// Second differences give the variance where it is less than this share of that by first ones: there the rate changes.
+/// If second differences give less than this share of the variance by first ones, the rate changes, and they count.
 const CHANGING_RATE: f64 = 0.7;
 
 /// Neighbours on each side by which an outlier is judged, and how many of them must agree with it.
@@ -29,14 +29,14 @@ const AGREEING: usize = 2;
 /// Neighbours on each side that show the rate of fast wear.
 const RATE_NEIGHBOURS: usize = 5;
 
-/// What is assumed of standard errors.
+/// Bounds of standard errors, and their value where none is stated.
 pub(crate) struct Assumed {
-    /// The least and the largest.
+    /// Least and largest error.
     pub(crate) least: f64,
     pub(crate) largest: f64,
-    /// The error where not one is stated.
+    /// The error where none is stated.
     pub(crate) unstated: f64,
-    /// Differences that the stated errors count for.
+    /// Number of differences that the stated errors count for.
     pub(crate) differences: f64,
 }
 
@@ -61,7 +61,7 @@ impl Noise {
         let typical = median(known).unwrap_or(assumed.unstated);
         let error = |stated: &f64| {
             let error = if is_stated(stated) { stated.max(0.5 * typical) } else { typical };
-            // No panic where a limit that cannot be makes the least error the larger one.
+            // Not `clamp`, which panics if an implausible limit makes the least error the larger one.
             error.min(assumed.largest).max(assumed.least)
         };
         let mut errors: Vec<f64> = stated.iter().map(error).collect();
@@ -71,7 +71,7 @@ impl Noise {
     }
 
     /// Whether each value agrees with at least two of its nearest neighbours, as it is or along the rate around it: it
-    /// differs by at most so many standard deviations.
+    /// differs by at most `sds` standard deviations.
     ///
     /// The flights after a step agree with each other from the third on.
     pub(crate) fn are_sound(&self, values: &[f64], sds: f64) -> Vec<bool> {
@@ -103,7 +103,7 @@ pub(crate) fn inflation(values: &[f64], errors: &[f64], usual: f64) -> f64 {
     ((seen * found + PRIOR_BATCHES * usual) / (seen + PRIOR_BATCHES)).clamp(1.0, MAX_INFLATION)
 }
 
-/// The same as far as it is beyond the chance of a few batches.
+/// The inflation as far as chance in a few batches does not explain it.
 pub(crate) fn certain_inflation(values: &[f64], errors: &[f64]) -> f64 {
     let (means, errors) = batches(values, errors);
     let (found, seen) = (successive(&means, &errors).unwrap_or(0.0), comparisons(&means));

@@ -35,7 +35,7 @@ const LOCATE: usize = 10;
 /// Fewest estimates on either side of a located step.
 const LEAST_SIDE: usize = 3;
 
-/// Spread of the wear rates that a slope is drawn to zero by, shares of the limit per hour.
+/// Spread of wear rates about zero in the prior of a slope, shares of the limit per hour.
 const RATE_SPREAD: f64 = 5e-4;
 
 /// Variance of the wear per wear between the middles of both sides, a share of the limit: wear comes in
@@ -58,7 +58,7 @@ pub(crate) struct StepChange {
 /// Places searched at once: far more than a window reaches, so that the search grows with the history's length alone.
 const BLOCK: usize = 480;
 
-/// All steps of a history, by place: in each block the largest first, then what it left on either side.
+/// All steps of a history, by place: in each block the largest first, then those on either side of it.
 pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepChange> {
     let sums = PrefixSums::new(estimates, limit_m);
     let mut found: Vec<StepChange> = Vec::new();
@@ -110,7 +110,7 @@ const LARGEST_BIAS: f64 = 0.08;
 struct PrefixSums {
     sums: Vec<[f64; 6]>,
     usages: Vec<f64>,
-    /// What a slope is drawn to zero by, h²/m².
+    /// Information of the prior that draws a slope to zero, h²/m².
     slope_information: f64,
     /// Variance of the wear per metre of wear, metres.
     wear_noise_m: f64,

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! e(y − A F) = e(y) − A e(F)        innovations are linear
-//! −2 ln L(A) = Σ e²/s = Syy − 2 A Sfy + A² Sff   (+ what no regress changes)
+//! −2 ln L(A) = Σ e²/s = Syy − 2 A Sfy + A² Sff   (+ terms without A)
 //! ```
 
 use crate::data::bins::Bin;

@@ -87,7 +87,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     finish(&second, components(&second, &bank, THOROUGH))
 }
 
-/// The posterior; none where the gaps are so far from every curve that no likelihood is a number.
+/// The posterior; `None` if the gaps are so far from every curve that no likelihood is a number.
 fn finish(fit: &SegmentFit<'_>, mut components: Vec<Component>) -> Option<Posterior> {
     let log_sum = normalise(&mut components);
     (!components.is_empty()).then(|| Posterior {

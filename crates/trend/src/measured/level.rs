@@ -24,7 +24,7 @@ pub struct Level {
     pub se_m: f64,
     /// Number of records that it rests on.
     pub records: usize,
-    /// The same with outliers among them, counted from the last.
+    /// Number of records from the first of these to the last one, outliers included.
     pub(crate) window: usize,
     pub(crate) period: u32,
     slope_m_per_hour: f64,

@@ -123,7 +123,7 @@ fn jump_at(
     let (first, records) = (&sound[from], sound.len() - from);
     let error_m = before.se_m.hypot(after_se_m.min(first.error_m)).max(first.error_m);
     let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
-    // A fall from one installation or maintenance to the next is what both are for.
+    // Between two periods only a rise is a jump: a new installation or maintenance may lower the gap.
     let sign = if before.period == first.period { (after_m - before.gap_m).signum() } else { 1.0 };
     let is_left = sign * (present.gap_m - before.gap_m) > LEFT * least_m;
     let is_jump = |from_m: f64| sign * (after_m - from_m) > least_m;

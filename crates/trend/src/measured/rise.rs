@@ -79,7 +79,7 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
             rise.p05_hours = rise.p05_hours.min(p05_hours);
         }
     }
-    // What has sped up may speed up more.
+    // Wear that has accelerated may accelerate more.
     found.map(|rise| Rise {
         p05_hours: rise.p05_hours * (rise.m_per_hour / steepest).clamp(SPED_UP, 1.0),
         ..rise

@@ -92,7 +92,7 @@ pub struct QuantityChanges {
 pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChanges> {
     let (all, stated): (Vec<f64>, Vec<f64>) = values.iter().map(|v| (v.value, v.se)).unzip();
     let (least, largest) = (least_scatter, f64::MAX);
-    // A stated error leaves out what differs from flight to flight: it counts for nothing.
+    // Stated errors do not contain the scatter from flight to flight, so they count for nothing.
     let noise = Noise::of(&all, &stated, &Assumed { least, largest, unstated: least, differences: 0.0 });
     let weighted = values.iter().zip(&noise.errors).zip(noise.are_sound(&all, AGREEMENT_SDS));
     let sound = weighted.filter(|(_, is_sound)| *is_sound).map(|((value, error), _)| (*value, *error));

@@ -1,7 +1,7 @@
 //! Fitted quantities other than the gap, followed flight by flight: stiffness, friction, delays, load zero.
 //!
-//! [`covariates`] takes off what temperature and load level explain, [`common_curve`] what all units of a part share
-//! (the season, for one), and [`changes`] fits steps and a drift to what is left.
+//! [`covariates`] removes the effect of temperature and load level, [`common_curve`] what all units of a part share, such
+//! as the season, and [`changes`] fits steps and a drift to the rest.
 
 pub mod changes;
 pub mod common_curve;

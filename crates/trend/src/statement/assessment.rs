@@ -23,9 +23,9 @@ pub struct Assessment {
     pub latest: Option<Record>,
     /// Spread of what an installation adds to every gap measured in it, metres: not a part of the level's error.
     pub installation_sd_m: f64,
-    /// Its growth now.
+    /// Growth of the level now.
     pub rate: Option<Rate>,
-    /// Does it wear?
+    /// Whether the unit wears.
     pub wear: WearStatus,
     /// Probability that the gap has grown by 2 % of the limit or more since it was new here, or reset.
     pub growth_probability: Option<f64>,
@@ -39,7 +39,7 @@ pub struct Assessment {
     pub method: Option<ForecastMethod>,
     /// Flight hours since the last flight, at the unit's own rate.
     pub elapsed_hours: f64,
-    /// Probability that it is met before the next check ([`crate::Settings::check_interval_hours`]).
+    /// Probability that the act limit is met before the next check ([`crate::Settings::check_interval_hours`]).
     pub check_probability: Option<f64>,
     /// Probability that the gap is at or above the limit on the date of the assessment: by the measured level with what
     /// its installation adds, or by the forecast with the usage since, whichever is more.

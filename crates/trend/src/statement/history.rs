@@ -12,7 +12,7 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 /// damage.
 const MAX_RIGGING_STEP: f64 = 0.15;
 
-/// Flights from a change of installation within which a step is the books' own.
+/// Number of flights around a change of installation within which a step belongs to that change.
 pub(crate) const RECORD_FLIGHTS: usize = 3;
 
 /// What a unit's flights show, apart from wear.
@@ -27,7 +27,7 @@ pub(crate) struct History<'a> {
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
     starts: Vec<SegmentStart>,
-    /// What has been taken off the last estimates, metres. The forecast adds a rise again: only the law is without it.
+    /// Offset that was removed from the last estimates, metres. The forecast adds a rise again: only the law is without it.
     pub(crate) undone_m: f64,
     /// Usage at the last flight.
     pub(crate) now: f64,
