@@ -21,7 +21,7 @@ const CUTS: [f64; 3] = [0.3, 0.5, 0.75];
 /// Estimates below which a history is not cut.
 const FEWEST: usize = 40;
 
-/// Flights of the running median by which a limit counts as met.
+/// Number of flights of the running median that decides whether a limit counts as met.
 const WINDOW: usize = 21;
 
 records::row! {

@@ -69,7 +69,7 @@ impl UnitChange {
     }
 }
 
-/// What a run knows of its own changes.
+/// Changes that a run reports.
 #[derive(Debug, Clone, Copy)]
 pub struct RunFacts<'a> {
     /// The run.

@@ -95,7 +95,7 @@ impl<'a> Limits<'a> {
         let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(self.scale_m));
         let watch_m = self.part(part).and_then(|part| part.settings.watch_m).unwrap_or(base.watch_m);
         trend::Settings {
-            // A part's own may lie above a limit that is everybody's.
+            // The part's own watch limit may lie above the common act limit.
             watch_m: watch_m.min(base.limit_m),
             planning_horizon_hours: of.planning_horizon_hours,
             horizon_hours: of.horizon_hours,

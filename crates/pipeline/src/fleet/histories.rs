@@ -40,7 +40,7 @@ impl History {
         self.places.iter().filter_map(|place| place.tail_number.as_deref())
     }
 
-    /// Those that departed at or before a time.
+    /// The flights that departed at or before a time.
     pub(crate) fn until(&self, as_of: Timestamp) -> &[FlightRow] {
         &self.flights[..self.flights.partition_point(|f| f.departure_utc() <= as_of)]
     }
@@ -60,7 +60,7 @@ impl History {
         self.settings.others()
     }
 
-    /// The one that departed then.
+    /// The flight that departed at this time.
     pub(crate) fn at(&self, departure_utc: Timestamp) -> Option<&FlightRow> {
         let first = self.flights.partition_point(|f| f.departure_utc() < departure_utc);
         self.flights.get(first).filter(|f| f.departure_utc() == departure_utc)

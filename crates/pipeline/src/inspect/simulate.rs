@@ -110,7 +110,7 @@ fn tables(plan: &Plan, spec: &Spec) -> Vec<(&'static str, String)> {
     tables.into_iter().filter(|(_, is_there, _)| *is_there).map(|(name, _, table)| (name, table)).collect()
 }
 
-/// Flies one flight and writes its log: a column for each channel of each actuator.
+/// Simulates one flight and writes its log: a column for each channel of each actuator.
 fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
     let planned = &plan.flights[index];
     let flight = plan.simulate_flight(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;

@@ -33,7 +33,7 @@ pub struct DiscoveredLogs {
     pub(crate) seen: SeenObjects,
 }
 
-/// A log and the name that it goes by.
+/// A log and its name in records.
 pub type NamedLog = (LogFiles, String);
 
 /// Every log that fits the patterns, by the shown name of its first file.

@@ -19,7 +19,7 @@ pub(crate) const AS_FILES: MatchOptions = MatchOptions {
     require_literal_leading_dot: false,
 };
 
-/// What fits a pattern, and what could not be listed or was passed over.
+/// Files that match a pattern, and paths that could not be listed or were skipped.
 #[derive(Debug, Default)]
 pub(crate) struct LocalFiles {
     /// Paths that fit.

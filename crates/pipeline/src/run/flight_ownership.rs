@@ -75,7 +75,7 @@ pub(crate) struct OwnershipLedger<'a> {
     pub(crate) renamed: BTreeMap<String, String>,
 }
 
-/// What becomes of a record that another log holds too.
+/// What to do with a record that another log has too.
 enum Claim {
     /// The new record counts.
     Takes,
@@ -247,7 +247,7 @@ impl<'a> OwnershipLedger<'a> {
         Ok(held)
     }
 
-    /// What becomes of a record of a log where another log's record of the same flight is held.
+    /// What to do with a record of a log if the record of the same flight by another log is held.
     fn claim(
         &self,
         account: &LogRecord,

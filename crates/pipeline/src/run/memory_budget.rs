@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// 36 million samples, rounded up.
 const BYTES_PER_SAMPLE: u64 = 40;
 
-/// So many bytes may be in use at a time.
+/// Budget of bytes in use at a time.
 #[derive(Debug)]
 pub(crate) struct MemoryBudget {
     limit_bytes: u64,

@@ -386,7 +386,7 @@ impl WorkerContext<'_> {
         for done in actuators.par_iter().with_max_len(1).map(process_log).collect::<Vec<_>>() {
             match done {
                 Ok(record) => records.push(record),
-                // What is wrong with the whole log is told once, and not for each actuator.
+                // An error of the whole log is reported once, not for each actuator.
                 Err(diagnostic) if diagnostics.contains(&diagnostic) => {}
                 Err(diagnostic) => diagnostics.push(diagnostic),
             }

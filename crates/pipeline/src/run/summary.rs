@@ -347,7 +347,7 @@ impl RunSummary {
         logs.len()
     }
 
-    /// Those of the logs in error whose other actuators are stored.
+    /// Number of failed logs whose other actuators are stored.
     pub fn logs_in_part(&self) -> usize {
         self.logs.values().filter(|log| !log.records.is_empty() && !log.diagnostics.is_empty()).count()
     }

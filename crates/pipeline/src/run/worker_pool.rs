@@ -33,7 +33,7 @@ const MAX_ABANDONED_IN_A_ROW: usize = 16;
 /// Logs that pass their limit in one run at most: what their threads hold is free only when the process ends.
 const MAX_LATE: usize = 256;
 
-/// What does one log, by its index in the plan.
+/// Processes one log, by its index in the plan.
 pub(crate) type ProcessLog = dyn Fn(usize, &MemoryBudget, &StepCount) -> ProcessedLog + Send + Sync;
 
 /// How many steps of a log (its opening, an actuator) threads are at just now.

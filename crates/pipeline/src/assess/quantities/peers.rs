@@ -45,7 +45,7 @@ struct Deviation<'a> {
     share: f64,
 }
 
-/// What differs of the selected units, in words: tails first, then units.
+/// Differences of the selected units from their peers, in words: tails first, then units.
 pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> bool) -> Vec<String> {
     let (mut tails, mut units, mut named) = (Vec::new(), Vec::new(), BTreeSet::new());
     for quantity in COMPARED {

@@ -16,7 +16,7 @@ use crate::fleet::histories::{History, TailPosition, UnitKey};
 /// Units by name: their flights, and the same by usage with their maintenance.
 pub(crate) type Units<'a> = std::collections::BTreeMap<&'a UnitKey, (&'a History, Series)>;
 
-/// What is known of units in addition to the values.
+/// Facts about a unit in addition to the values.
 #[derive(Clone, Copy)]
 pub(crate) struct UnitFacts<'a> {
     pub(crate) units: &'a Units<'a>,

@@ -45,7 +45,7 @@ impl InspectionRow {
         (trend::quantity::median(gaps), count)
     }
 
-    /// What it measured, in words, and what the estimates before it read where they contradict it.
+    /// The measured play, in words, and the estimates before the inspection if they contradict it.
     pub(crate) fn statement(&self, records: &[FlightRow]) -> (String, bool) {
         let day = self.date_utc.strftime("%Y-%m-%d");
         let measured = format!("the hangar check of {day} measured {:.1} µm", self.play_m * 1e6);

@@ -73,7 +73,7 @@ impl MovedFlights {
     }
 }
 
-/// How many flights of which place went from which unit to which.
+/// Number of flights of a place that went from one unit to another.
 impl std::fmt::Display for MovedFlights {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { tail_number, position, part_number, serial_number, flights, .. } = self;
