@@ -182,43 +182,6 @@ fn a_unit_is_where_the_table_has_it_now() {
     assert_eq!((&removed["state"], &removed["removed_utc"]), (&Value::Null, &"2026-11-15T00:00:00Z".into()));
 }
 
-#[test]
-fn another_limit_is_told_as_the_cause_of_a_state() {
-    let fleet = TestFleet::processed();
-    fleet.configure("limit_m = 150e-6", "limit_m = 1500e-6");
-    fleet.configure("watch_m = 110e-6", "watch_m = 20e-6");
-    let summary = run(&fleet);
-    let changed = summary["changed"].as_array().unwrap();
-    assert!(!changed.is_empty(), "{summary}");
-    for change in changed {
-        assert_eq!(change["cause"], "limit", "{change}");
-        let because = change["because"].as_str().unwrap();
-        assert!(
-            because.contains("limit_m changed from 150 µm to 1500 µm (pipeline.toml line 38)"),
-            "{because}"
-        );
-    }
-}
-
-/// The inbox of a night: one path, another flight each time. And two configurations that share a store.
-#[test]
-fn a_path_that_comes_back_with_another_flight_adds_a_flight() {
-    let fleet = TestFleet::sample();
-    let logs = fleet.logs();
-    fleet.configure("sample-data/logs/**/*.parquet", "inbox/*.parquet");
-    std::fs::create_dir(fleet.path("inbox")).unwrap();
-    for (night, log) in logs.iter().take(3).enumerate() {
-        std::fs::copy(log, fleet.path("inbox/N412FP.parquet")).unwrap();
-        fleet.run_ok(&["run"]);
-        assert_eq!(records_with(&fleet, "N412FP"), 4 * (night + 1));
-    }
-    let other = fleet.read("pipeline.toml").replace("inbox/*.parquet", "sample-data/logs/N413FP/*.parquet");
-    std::fs::write(fleet.path("other.toml"), other).unwrap();
-    fleet.run_ok(&["--config", "other.toml", "run"]);
-    fleet.run_ok(&["run"]);
-    assert_eq!((records_with(&fleet, "N412FP"), records_with(&fleet, "N413FP")), (12, 40));
-}
-
 /// The same samples under another departure are the same flight: it moves, and is not there twice.
 #[test]
 fn a_corrected_departure_moves_a_flight() {

@@ -252,21 +252,6 @@ fn a_closed_pipe_ends_quietly() {
     assert!(output.status.success());
 }
 
-/// A second run stops, naming who holds the store.
-#[test]
-fn a_held_store_is_code_3() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--limit", "1"]);
-    let lock = std::fs::File::options().write(true).open(fleet.path("results/lock")).unwrap();
-    lock.lock().unwrap();
-    let result = fleet.freeplay(&["run"]);
-    assert_eq!(result.code, Some(3), "{result:?}");
-    assert!(result.err.contains("error[store_held]"), "{}", result.err);
-    assert_eq!(fleet.freeplay(&["query", "tail", "N412FP"]).code, Some(0), "readers need not wait");
-    drop(lock);
-    fleet.run_ok(&["run"]);
-}
-
 #[test]
 fn estimates_of_another_program_are_assessed_and_an_assessment_sees_nothing_later() {
     let fleet = TestFleet::sample();
@@ -329,36 +314,6 @@ fn a_table_made_elsewhere_is_judged_without_a_configuration() {
     // A configuration that is named must be there.
     let named = fleet.freeplay(&["trend", "--estimates", "history.csv", "--config", "fleet.toml"]);
     assert_eq!(named.code, Some(2), "{named:?}");
-}
-
-/// A part's own limit goes before everybody's.
-#[test]
-fn a_limit_for_all_parts_serves_those_that_state_none() {
-    let fleet = TestFleet::sample();
-    fleet.configure("limit_m = 150e-6\nwatch_m = 110e-6\n", "");
-    fleet.configure("[trend]\n", "[trend]\nlimit_m = 200e-6\n");
-    fleet.run_ok(&["run"]);
-    let rows = fleet.rows(&["trend"]);
-    for row in &rows {
-        let own = if row["part_number"] == "EMA-27-1060" { 180e-6 } else { 200e-6 };
-        assert_eq!(row["limit_m"].as_f64(), Some(own), "{row}");
-        for name in ["growth_probability", "wear_law_probability", "check_probability"] {
-            assert!((0.0..=1.0).contains(&row[name].as_f64().unwrap()), "{name} of {row}");
-        }
-    }
-    assert_eq!(rows.len(), 12);
-}
-
-/// Torques in N·m and angles are of a part that turns.
-#[test]
-fn a_proposal_for_torques_has_a_rotary_part() {
-    let fleet = TestFleet::empty();
-    let spec = "tails = [\"N1\"]\nflights_per_tail = 1\n[profile]\nduration_s = 10.0\n[[parts]]\npart_number = \"EMA\"\nreference_radius_m = 0.1\n[[positions]]\nposition = \"rudder\"\npart_number = \"EMA\"\n";
-    std::fs::write(fleet.path("spec.toml"), spec).unwrap();
-    fleet.run_ok(&["simulate", "spec.toml", "--output", "a"]);
-    fleet.run_ok(&["init", "new-fleet", "--from", "a/logs"]);
-    let proposed = fleet.read("new-fleet/pipeline.toml");
-    assert!(proposed.contains("kind = \"rotary\"") && proposed.contains("unit = \"N.m\""), "{proposed}");
 }
 
 /// What a planner needs is there at 80 columns, no line is longer, and no word is cut: unit, state, date, reason and how

@@ -130,6 +130,16 @@ impl TestFleet {
         CommandResult::of(&mut self.command(args))
     }
 
+    /// The command, with its arguments as one line, under a limit of the shell such as `-v 1048576`, KiB. The GNU allocator
+    /// otherwise reserves 64 MiB of address space for each thread.
+    pub(crate) fn limited(&self, limit: &str, args: &str) -> CommandResult {
+        let script = format!("ulimit {limit} && exec \"$0\" {args}");
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).current_dir(self.folder.path());
+        command.env("MALLOC_ARENA_MAX", "2").env_remove("FREEPLAY_CONFIG").stdin(std::process::Stdio::null());
+        CommandResult::of(&mut command)
+    }
+
     /// Runs a command that must end well.
     pub(crate) fn run_ok(&self, args: &[&str]) -> String {
         let result = self.freeplay(args);

@@ -14,59 +14,9 @@ fn rows(serial: &str, gaps_um: &[f64]) -> String {
     gaps_um.iter().enumerate().map(row).collect()
 }
 
-/// The trend of each unit at a date, with a limit of 150 µm.
-fn trend(units: &[(&str, Vec<f64>)], as_of: &[&str]) -> Vec<Value> {
-    let fleet = TestFleet::empty();
-    let header = "serial_number,departure_utc,gap_m,gap_se_m,flight_hours\n".to_owned();
-    let table: String = std::iter::once(header).chain(units.iter().map(|(s, gaps)| rows(s, gaps))).collect();
-    std::fs::write(fleet.path("history.csv"), table).unwrap();
-    assess(&fleet, as_of)
-}
-
 /// The trend of the table in a folder, with a limit of 150 µm.
 fn assess(fleet: &TestFleet, as_of: &[&str]) -> Vec<Value> {
     fleet.rows(&[&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"], as_of].concat())
-}
-
-#[test]
-fn a_unit_measured_above_its_limit_says_so() {
-    let rise =
-        |from: i32| (0..30_i32).map(|k| 70.0 + 20.0 * f64::from(k - from).max(0.0)).collect::<Vec<_>>();
-    let units = [
-        ("1-one-above", [vec![70.0; 20], vec![190.0]].concat()),
-        ("2-three-above", [vec![70.0; 12], vec![250.0; 3]].concat()),
-        ("3-two-in-all", vec![180.0; 2]),
-        ("4-rise", rise(23)),
-        ("5-hours-from-it", rise(26)),
-        ("6-calm", vec![70.0; 30]),
-    ];
-    let expected = [
-        ("plan", Some("inspect")),
-        ("act", Some("replace")),
-        ("act", Some("replace")),
-        ("act", Some("replace")),
-        ("plan", Some("inspect")),
-        ("normal", None),
-    ];
-    for ((serial, gaps), expected) in units.into_iter().zip(expected) {
-        let day = format!("2026-01-{:02}T12:00:00Z", gaps.len());
-        let row = trend(&[(serial, gaps.clone())], &["--as-of", &day]).swap_remove(0);
-        let gap_um = row["gap_m"].as_f64().unwrap() * 1e6;
-        assert!((gap_um - gaps[gaps.len() - 1]).abs() < 2.0, "{serial}: {gap_um}");
-        assert_eq!((row["state"].as_str().unwrap(), row["action"].as_str()), expected, "{serial}");
-        assert_eq!(row["latest_utc"].as_str().unwrap()[..10], day[..10], "{row}");
-    }
-}
-
-#[test]
-fn a_silent_unit_is_unassessed_and_one_above_its_limit_stays_so() {
-    let units = [("calm", vec![70.0; 20]), ("above", [vec![70.0; 18], vec![190.0; 2]].concat())];
-    let rows = trend(&units, &["--as-of", "2026-03-20T00:00:00Z"]);
-    let state =
-        |serial: &str| rows.iter().find(|row| row["serial_number"] == serial).unwrap()["state"].clone();
-    assert_eq!((state("calm"), state("above")), ("unassessed".into(), "act".into()));
-    // Without `--as-of`, units are assessed now, long after these flights.
-    assert!(trend(&units, &[]).iter().all(|row| row["state"] != "normal"), "{rows:?}");
 }
 
 #[test]
@@ -115,18 +65,4 @@ fn neither_a_flag_nor_a_step_of_the_whole_tail_hides_records_above_the_limit() {
         assert_eq!(reason.contains("the actuators of T77 changed together"), !is_doubted, "{reason}");
     }
     assert_eq!(found.len(), 5);
-}
-
-/// All gaps exceed the lowered limits: the run finds every unit due, and ends with the exit code of `--fail-on`.
-#[test]
-fn a_lowered_limit_makes_every_unit_of_the_logs_due() {
-    let fleet = TestFleet::sample();
-    for (limit, watch) in [("150e-6", "110e-6"), ("180e-6", "135e-6")] {
-        fleet.configure(&format!("limit_m = {limit}\nwatch_m = {watch}"), "limit_m = 20e-6\nwatch_m = 10e-6");
-    }
-    let run = fleet.freeplay(&["run", "--quiet", "--fail-on", "act"]);
-    let found = fleet.rows(&["trend"]);
-    let states: Vec<&str> = found.iter().map(|row| row["state"].as_str().unwrap()).collect();
-    assert_eq!((states.len(), run.code), (12, Some(4)), "{run:?}");
-    assert!(states.iter().all(|state| *state == "act"), "{states:?}");
 }

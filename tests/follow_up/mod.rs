@@ -22,4 +22,3 @@ const SHORT_HORIZON: &str = "planning_horizon_hours = 1.0";
 
 mod alerts;
 mod same_story;
-mod work;

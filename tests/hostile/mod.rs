@@ -1,20 +1,30 @@
 //! Inputs that would end a run, delete other files, or execute a program: the run names each, and processes all others.
 
-mod corpus;
 mod operations;
 
-use std::process::Stdio;
+use crate::harness::{TestFleet, copy, facts, top, write_log};
 
-use crate::harness::{CommandResult, TestFleet, facts, write_log};
+/// The files of `tests/data/hostile`: name, code of the error, and a part of its text.
+const HOSTILE: [[&str; 3]; 15] = [
+    ["brotli", "decode_failed", "8006 bytes"],
+    ["children", "not_parquet", "claims"],
+    ["dictionary_texts", "decode_failed", "2147483647 values"],
+    ["dictionary_values", "decode_failed", "2147483647 values"],
+    ["field_zero", "not_parquet", "an offset below zero"],
+    ["group_rows", "not_parquet", "claim 7 rows"],
+    ["gzip", "decode_failed", "8006 bytes"],
+    ["long_text", "decode_failed", "a text of 250000 bytes"],
+    ["lz4", "decode_failed", "8006 bytes"],
+    ["nested", "beyond_limit", "groups inside each other"],
+    ["null_runs", "beyond_limit", "`run.max_rows`"],
+    ["page_bytes", "decode_failed", "claims 2147483647 bytes"],
+    ["page_rows", "decode_failed", "1000 values where 100000 are declared"],
+    ["row_groups", "not_parquet", "claims"],
+    ["schema_elements", "not_parquet", "claims"],
+];
 
-/// The command under a limit of its address space, KiB. The GNU allocator otherwise reserves 64 MiB of it per thread.
-fn limited(fleet: &TestFleet, args: &str, kib: u64) -> CommandResult {
-    let script = format!("ulimit -v {kib} && exec \"$0\" {args}");
-    let mut command = std::process::Command::new("sh");
-    command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).current_dir(fleet.path("."));
-    command.env("MALLOC_ARENA_MAX", "2").env_remove("FREEPLAY_CONFIG");
-    CommandResult::of(command.stdin(Stdio::null()))
-}
+/// A limit of 1 GiB of address space.
+const LIMIT: &str = "-v 1048576";
 
 /// Each hostile log twice, under names that sort before and after those of the thirty sound ones, under 1 GiB.
 #[test]
@@ -23,19 +33,14 @@ fn a_night_with_hostile_logs_stores_all_sound_ones() {
     sound.run_ok(&["run", "-q"]);
     let fleet = TestFleet::sample();
     for folder in ["000", "zzz"] {
-        let folder = fleet.path(&format!("sample-data/logs/{folder}"));
-        std::fs::create_dir(&folder).unwrap();
-        for hostile in corpus::all() {
-            std::fs::write(folder.join(format!("{}.parquet", hostile.name)), hostile.bytes).unwrap();
-        }
+        copy(&top().join("tests/data/hostile"), &fleet.path(&format!("sample-data/logs/{folder}")));
     }
     for command in ["check -v --limit 100", "run -v --jobs 2"] {
-        let result = limited(&fleet, command, 1 << 20);
+        let result = fleet.limited(LIMIT, command);
         assert_eq!(result.code, Some(1), "{command}: {}", result.err);
-        for hostile in corpus::all() {
-            let code = format!("error[{}]", hostile.code);
-            let is_named = result.err.contains(hostile.says) && result.err.contains(&code);
-            assert!(is_named, "{} is not named: {}", hostile.name, result.err);
+        for [name, code, says] in HOSTILE {
+            let is_named = result.err.contains(says) && result.err.contains(&format!("error[{code}]"));
+            assert!(is_named, "{name} is not named: {}", result.err);
         }
         assert!(!result.err.contains("panicked"), "{}", result.err);
     }
@@ -47,14 +52,14 @@ fn a_night_with_hostile_logs_stores_all_sound_ones() {
 fn hostile_tables_are_refused_with_code_2() {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/installations.csv", "table.parquet");
-    for hostile in corpus::all() {
-        std::fs::write(fleet.path("table.parquet"), hostile.bytes).unwrap();
-        let result = limited(&fleet, "run", 1 << 20);
-        assert_eq!(result.code, Some(2), "{}: {}", hostile.name, result.err);
-        assert!(!result.err.contains("panic"), "{}: {}", hostile.name, result.err);
+    for [name, code, says] in HOSTILE {
+        let file = top().join(format!("tests/data/hostile/{name}.parquet"));
+        std::fs::copy(file, fleet.path("table.parquet")).unwrap();
+        let result = fleet.limited(LIMIT, "run");
+        assert_eq!(result.code, Some(2), "{name}: {}", result.err);
+        assert!(!result.err.contains("panic"), "{name}: {}", result.err);
         // A footer is read in the same way, whatever it is of.
-        let is_named = hostile.code != "not_parquet" || result.err.contains(hostile.says);
-        assert!(is_named, "{}: {}", hostile.name, result.err);
+        assert!(code != "not_parquet" || result.err.contains(says), "{name}: {}", result.err);
     }
     // CSV: columns, rows and names beyond what any table has, each with a short answer.
     let sound = fleet.read("sample-data/installations.csv");
@@ -67,23 +72,10 @@ fn hostile_tables_are_refused_with_code_2() {
         (format!("{sound}N412FP,{name},EMA-27-1040,1,2026-01-01,,,\n"), "a position of 1000000 bytes"),
     ] {
         std::fs::write(fleet.path("table.csv"), text).unwrap();
-        let result = limited(&fleet, "run", 1 << 20);
+        let result = fleet.limited(LIMIT, "run");
         assert!(result.code == Some(2) && result.err.contains(says), "{says}: {}", result.err);
         assert!(result.err.len() < 5000, "{says}: {} bytes", result.err.len());
     }
-}
-
-#[cfg(unix)]
-#[test]
-fn a_link_in_the_place_of_the_lock_is_refused_and_its_target_stays() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "-q"]);
-    let target = fleet.path("target");
-    std::fs::write(&target, "years").unwrap();
-    std::fs::remove_file(fleet.path("results/lock")).unwrap();
-    std::os::unix::fs::symlink(&target, fleet.path("results/lock")).unwrap();
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(3));
-    assert_eq!(std::fs::read_to_string(&target).unwrap(), "years");
 }
 
 /// Two logs of one flight, and a file of someone else where a normalized log would be.
@@ -125,27 +117,6 @@ fn a_stored_flight_is_not_displaced_by_a_later_claim() {
     let redone = fleet.freeplay(&["run", "--redo"]);
     assert_eq!(redone.code, Some(1), "{redone:?}");
     assert_eq!(fleet.exported(), before);
-}
-
-/// A supplier's folder whose logs may be of one tail only; a key that comes later finds what was stored before.
-#[test]
-fn a_log_in_a_folder_of_other_tails_is_an_error_until_its_tail_is_allowed() {
-    let fleet = TestFleet::sample();
-    fleet.configure("[logs]", "[logs]\ntails = { \"*/N412FP/*0003*\" = [\"N41[34]FP\"] }");
-    let failed = fleet.freeplay(&["run"]);
-    assert_eq!(failed.code, Some(1), "{failed:?}");
-    assert!(
-        failed.err.contains("error[tail_not_allowed]") && failed.err.contains("N412FP"),
-        "{}",
-        failed.err
-    );
-    assert!(failed.out.contains("116 records of 29 flights"), "{}", failed.out);
-    fleet.configure("N41[34]FP", "N41?FP");
-    assert!(fleet.run_ok(&["run"]).contains("4 records of 1 flight"));
-    fleet.configure("N41?FP", "N999*");
-    let failed = fleet.freeplay(&["run"]);
-    assert_eq!(failed.code, Some(1), "{failed:?}");
-    assert!(failed.out.contains("4 stored records of logs that failed now stay"), "{}", failed.out);
 }
 
 /// A pipe, folders that hold links to each other, and two names that differ in bytes that are no text, among the logs.

@@ -31,22 +31,6 @@ fn a_failed_run_writes_its_code_and_keeps_when_one_last_completed() {
     assert_eq!(metric(&fleet, "logs_found"), Some(30.0), "values of the last run that had some");
 }
 
-/// The rule `FreeplayLogsInError` fires, and the exit code stays 1, until the log is repaired or acknowledged.
-#[test]
-fn a_failed_log_is_reported_every_night_until_it_is_acknowledged() {
-    let fleet = TestFleet::sample();
-    std::fs::write(&fleet.logs()[0], "broken").unwrap();
-    let run = ["run", "--metrics", "freeplay.prom"];
-    for standing in [0.0, 1.0, 1.0] {
-        let result = fleet.freeplay(&run);
-        assert_eq!(result.code, Some(1), "{result:?}");
-        assert_eq!(metric(&fleet, "logs_still_failed"), Some(standing));
-    }
-    fleet.configure("[logs]", "[logs]\nacknowledged_errors = [\"sample-data/logs/N412FP/*0001.parquet\"]");
-    fleet.run_ok(&run);
-    assert_eq!(metric(&fleet, "logs_still_failed"), Some(0.0));
-}
-
 /// All is stored when the summary cannot be written: `/dev/full` is a disk without space.
 #[cfg(target_os = "linux")]
 #[test]

@@ -87,15 +87,6 @@ fn the_sample_fleet_is_made_anywhere_and_is_the_same_again() {
     assert_eq!(made.freeplay(&["init", "--sample", "--from", "demo"]).code, Some(2));
 }
 
-/// The serial that changed tails keeps its history, although the logs hold no serial numbers.
-#[test]
-fn a_swapped_serial_keeps_its_history_across_tails() {
-    let fleet = TestFleet::processed();
-    fleet.run_ok(&["query", "serial", "1060-0008", "--format", "parquet", "--output", "unit.parquet"]);
-    let tails = Table::read(&fleet.path("unit.parquet")).texts("tail_number");
-    assert_eq!(tails, [["N412FP"; 5], ["N413FP"; 5]].concat());
-}
-
 #[test]
 fn a_simulated_fleet_is_the_same_again_from_its_seed() {
     let fleet = TestFleet::empty();

@@ -40,28 +40,3 @@ fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
     }
     assert_eq!(summaries[0], summaries[1]);
 }
-
-/// The screw channel of one aircraft is 4 ms late from some flight on: the run reports it, and the gap stays.
-#[test]
-fn a_recorder_change_is_distinguished_from_wear() {
-    let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
-    std::fs::create_dir_all(fleet.path("sample-data/late")).unwrap();
-    for log in &fleet.logs_of("N412FP")[6..] {
-        std::fs::rename(log, fleet.path("sample-data/late").join(log.file_name().unwrap())).unwrap();
-    }
-    assert!(!fleet.run_ok(&["run"]).contains("not wear"));
-    // Read with a latency of −4 ms, those logs are what a recorder that is 4 ms late would have written.
-    fleet.configure("sample-data/logs/N412FP/*.parquet", "sample-data/late/*.parquet");
-    fleet.configure(
-        "column = \"{position}_screw_mm\"",
-        "column = \"{position}_screw_mm\"\nlatency_s = -0.004",
-    );
-    let account = fleet.run_ok(&["run"]);
-    assert!(
-        account.contains(
-            "recorder    N412FP all of aileron_left, aileron_right, elevator_left, elevator_right: delay"
-        ),
-        "{account}"
-    );
-}

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
-use crate::runs::injected_faults::{few, few_records};
+use crate::harness::{TestFleet, print_line, wait_until};
 
 /// Sends an interrupt to a process.
 #[cfg(unix)]
@@ -95,30 +94,6 @@ pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
     stored_records(&fleet.path("results")).unwrap()
 }
 
-/// A file that may not grow: the write fails at some byte, the run reports it with code 3, and what was stored
-/// before stays whole. With room again the next run finishes.
-#[cfg(unix)]
-#[test]
-fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
-    let mut failed = 0;
-    for blocks in spread(&[0, 1, 2, 4, 6, 8, 12, 16, 24, 32], 3) {
-        let fleet = few();
-        let program = env!("CARGO_BIN_EXE_freeplay");
-        // Blocks of 512 bytes: the limit takes effect inside data files and inside the table's log.
-        let limited = format!("ulimit -f {blocks}; exec '{program}' run --jobs 1");
-        let mut limit = std::process::Command::new("sh");
-        limit.args(["-c", &limited]).current_dir(fleet.path("")).env_remove("FREEPLAY_CONFIG");
-        let result = CommandResult::of(&mut limit);
-        assert!(matches!(result.code, Some(0 | 3)), "{blocks} blocks: {result:?}");
-        failed += usize::from(result.code == Some(3));
-        assert!(result.code != Some(3) || result.err.contains("error["), "{blocks} blocks: {result:?}");
-        whole_flights(&fleet);
-        fleet.run_ok(&["run"]);
-        assert_eq!(fleet.exported(), few_records(), "{blocks} blocks");
-    }
-    assert!(failed > 1, "the limit struck {failed} times only");
-}
-
 /// Two runs at once: one works, the other names it or waits; nothing is done twice.
 #[test]
 fn two_runs_at_once_store_each_flight_once() {
@@ -162,4 +137,24 @@ fn a_run_that_waits_can_be_interrupted() {
     let metrics = fleet.read("freeplay.prom");
     assert!(metrics.contains("\nfreeplay_run_exit_code 130\n"), "{metrics}");
     drop(held);
+}
+
+/// A command waits for a run that holds the store, and a run for a command.
+#[test]
+fn decisions_during_a_run_are_all_kept() {
+    let fleet = TestFleet::processed();
+    let decisions: Vec<_> = (0..4)
+        .map(|n| {
+            let by = format!("person {n}");
+            fleet.command(&["work", "acknowledge", "W1", "--by", &by]).spawn().unwrap()
+        })
+        .collect();
+    let run = fleet.command(&["run", "--quiet", "--redo", "--wait", "60s"]).output().unwrap();
+    assert_eq!(run.status.code(), Some(0), "{run:?}");
+    for mut decision in decisions {
+        assert_eq!(decision.wait().unwrap().code(), Some(0));
+    }
+    let events = std::fs::read_dir(fleet.path("results/work")).unwrap().count();
+    assert!(events >= 6, "one file for the run, and one for each decision: {events}");
+    assert!(fleet.run_ok(&["store", "verify"]).contains("OK"));
 }

@@ -22,49 +22,34 @@ fn records(fleet: &TestFleet) -> usize {
 }
 
 #[test]
-fn a_killed_run_has_the_status_of_each_of_its_logs() {
+fn a_killed_run_has_the_status_of_each_of_its_logs_and_the_next_run_does_the_rest() {
     let fleet = killed();
     let stored = records(&fleet);
-    let runs = fleet.json(&["store", "runs"]);
-    let run = &runs[0];
-    let figure = |name: &str| run[name].as_i64().unwrap();
-    assert_eq!((run["ended"].as_str(), &run["exit_code"]), (Some("killed"), &Value::Null));
-    assert_eq!(figure("found"), 30);
-    assert_eq!(figure("done") + figure("not_reached"), 30);
+    let killed = fleet.json(&["store", "runs"])[0].clone();
+    let figure = |name: &str| killed[name].as_i64().unwrap();
+    assert_eq!((killed["ended"].as_str(), &killed["exit_code"]), (Some("killed"), &Value::Null));
+    assert_eq!((figure("found"), figure("done") + figure("not_reached")), (30, 30));
     assert_eq!(figure("estimated") + figure("refused"), stored as i64);
-    assert!(figure("not_reached") > 0, "{run}");
-
-    let logs = fleet.json(&["store", "runs", "--run", "last"]);
-    let logs = logs.as_array().unwrap();
-    assert_eq!(logs.len(), 30, "every log has a class");
+    assert!(figure("not_reached") > 0, "{killed}");
+    let logs = fleet.rows(&["store", "runs", "--run", "last"]);
     let with = |class: &str| logs.iter().filter(|log| log["class"] == class).count() as i64;
-    assert_eq!(with("not_reached"), figure("not_reached"));
+    assert_eq!((logs.len(), with("not_reached")), (30, figure("not_reached")), "every log has a class");
     assert_eq!(with("done") + with("refused") + with("unaccounted") + with("error"), figure("done"));
-
     let output = fleet.run_ok(&["store", "info"]);
     let left = format!("{} not processed; `freeplay run` processes them", figure("not_reached"));
     assert!(output.contains("did not exit cleanly") && output.contains(&left), "{output}");
-    assert_eq!(fleet.json(&["store", "info"])["last_run"]["ended"], "killed");
-}
 
-#[test]
-fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
-    let fleet = killed();
-    let before = fleet.json(&["store", "runs"])[0].clone();
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
-    let line = format!("did not finish: {} log", before["done"]);
+    let line = format!("did not finish: {} log", killed["done"]);
     assert!(result.out.contains(&line), "{line} is not in {}", result.out);
     let runs = fleet.json(&["store", "runs"]);
     let same = ["run_id", "ended", "done", "estimated", "refused", "errors", "not_reached"];
-    assert!(same.iter().all(|name| runs[0][name] == before[name]), "{runs:#} was {before:#}");
+    assert!(same.iter().all(|name| runs[0][name] == killed[name]), "{runs:#} was {killed:#}");
     assert_eq!(
         (runs[1]["ended"].as_str(), &runs[1]["not_reached"]),
         (Some("logs in error"), &Value::from(0))
     );
-    let first = before["run_id"].as_str().unwrap();
-    let logs = fleet.json(&["store", "runs", "--run", first]);
-    assert_eq!(logs.as_array().unwrap().len(), 30, "its account stays");
     let result = fleet.freeplay(&["run"]);
     assert!(!result.out.contains("did not finish"), "it is reported once: {}", result.out);
     assert_eq!(records(&fleet), 116, "29 sound logs of four actuators");

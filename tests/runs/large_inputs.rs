@@ -1,19 +1,9 @@
 //! Tables and configurations far larger than any fleet's: memory and time stay in proportion to their size.
 
 use std::fmt::Write as _;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::harness::{CommandResult, TestFleet};
-
-/// Runs `check` on one log with a limit on its heap.
-fn check_with_heap(fleet: &TestFleet, limit_kib: usize) -> CommandResult {
-    let logs = fleet.logs();
-    let script = format!("ulimit -d {limit_kib}; exec \"$0\" check \"$1\"");
-    let mut command = Command::new("sh");
-    command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).arg(&logs[0]);
-    CommandResult::of(command.current_dir(fleet.path("")))
-}
+use crate::harness::TestFleet;
 
 /// 120,000 installations took 240 MB when each cell, and each position's list, had memory of its own.
 #[cfg(target_os = "linux")]
@@ -28,7 +18,7 @@ fn an_installations_table_of_many_rows_takes_memory_in_proportion_to_its_text() 
             .unwrap();
     }
     std::fs::write(&table, text).unwrap();
-    let found = check_with_heap(&fleet, 150_000);
+    let found = fleet.limited("-d 150000", &format!("check {}", fleet.logs()[0].display()));
     assert_eq!(found.code, Some(0), "{found:?}");
 }
 

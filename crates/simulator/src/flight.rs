@@ -13,30 +13,7 @@ use crate::sensors::sensor::Sensors;
 /// The integrator's step, seconds.
 const STEP_S: f64 = 1e-4;
 
-/// What an estimator should do with a log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ExpectedOutcome {
-    /// The gap can be seen.
-    Estimate,
-    /// It cannot: the load keeps one sign.
-    Refuse,
-}
-
-impl ExpectedOutcome {
-    pub(crate) fn of(profile: &Profile) -> Self {
-        if profile.is_one_sided() { Self::Refuse } else { Self::Estimate }
-    }
-
-    /// The word used in truth tables.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Estimate => "estimate",
-            Self::Refuse => "refuse",
-        }
-    }
-}
-
-/// A log as recorded, and the truth behind it.
+/// A log as recorded, and the true gap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flight {
     /// The recorder's stamps, seconds from the start of the log.
@@ -49,12 +26,6 @@ pub struct Flight {
     pub load_n: Vec<f64>,
     /// The true gap, metres: its mean over the time of the log.
     pub gap_m: f64,
-    /// The true stiffness of a flank, N/m.
-    pub stiffness_n_per_m: f64,
-    /// τ in `screw_logged(t) = X_screw(t − τ)` against the motor channel, seconds.
-    pub skew_s: f64,
-    /// Whether the gap can be seen at all.
-    pub expected: ExpectedOutcome,
 }
 
 /// Simulates one actuator over one flight and records it. Equal arguments give bitwise identical logs.
@@ -76,9 +47,6 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
         screw_m: sensors.screw.read_log(screw, profile, seed, "screw"),
         load_n: sensors.load.read_log(load, profile, seed, "load"),
         gap_m,
-        stiffness_n_per_m: plant.contact.stiffness_n_per_m,
-        skew_s: sensors.skew_s(),
-        expected: ExpectedOutcome::of(profile),
     })
 }
 

@@ -23,15 +23,15 @@ mod sensors;
 pub use error::Error;
 pub use fleet::fleet_events::{FaultKind, LogFault, Place, PlayCheck, Replacement, Reshim, Swap};
 pub use fleet::fleet_plan_types::{
-    ActuatorLog, ActuatorTruth, ChannelUnit, Inspection, Installation, LogState, Maintenance, Plan,
-    PlannedFlight, SimulatedFlight,
+    ActuatorLog, ChannelUnit, Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
+    SimulatedFlight,
 };
 pub use fleet::fleet_spec::{
     Aircraft, MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
 };
 pub use fleet::planted_change::PlantedChange;
 pub use fleet::wear::WearLaw;
-pub use flight::{ExpectedOutcome, Flight, simulate};
+pub use flight::{Flight, simulate};
 pub use load::flight_profile::Profile;
 pub use load::turbulence::GustForm;
 pub use load::vibration::{Line, Vibration};

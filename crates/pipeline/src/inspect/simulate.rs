@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use records::Diagnostic;
 use serde_json::{Map, Value, json};
 use simulator::{
-    ActuatorLog, ChannelUnit, LogState, MotorLogFormat, Plan, PlannedFlight, ScrewLogUnit, Spec,
+    ActuatorLog, ChannelUnit, FaultKind, MotorLogFormat, Plan, PlannedActuator, PlannedFlight, ScrewLogUnit,
+    Spec,
 };
 
 use crate::error::Error;
@@ -80,8 +81,7 @@ fn write_data(
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<(usize, Vec<&'static str>), Error> {
     let plan = Plan::new(spec).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
-    let logged: Vec<usize> =
-        (0..plan.flights.len()).filter(|&index| plan.flights[index].log != LogState::Absent).collect();
+    let logged: Vec<usize> = (0..plan.flights.len()).filter(|&index| plan.flights[index].has_log).collect();
     watch(Event::Planned { logs: logged.len(), bytes: 0 });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     pool.install(|| {
@@ -119,13 +119,14 @@ fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Erro
         columns.extend(channels(actuator));
     }
     let name = log_name(planned);
-    let logs = folder.join(if planned.log == LogState::Truncated { "arrives-later" } else { "logs" });
+    let is_truncated = planned.log_fault == Some(FaultKind::Truncated);
+    let logs = folder.join(if is_truncated { "arrives-later" } else { "logs" });
     let file = logs.join(&name);
     write_parquet(&file, &columns, &facts(planned))?;
-    match planned.log {
-        LogState::Duplicate => copy(&file)?,
-        LogState::Truncated => truncate(&file)?,
-        LogState::Sound | LogState::Absent => {}
+    match planned.log_fault {
+        Some(FaultKind::Duplicate) => copy(&file)?,
+        Some(FaultKind::Truncated) => truncate(&file)?,
+        None => {}
     }
     Ok(name)
 }
@@ -227,26 +228,27 @@ fn inspections(plan: &Plan) -> String {
 /// The contract's columns of a truth table: actuators of the flights whose logs are whole.
 fn truth(plan: &Plan) -> Vec<(String, Column)> {
     let all = || {
-        let whole = |flight: &&PlannedFlight| matches!(flight.log, LogState::Sound | LogState::Duplicate);
+        let whole =
+            |flight: &&PlannedFlight| flight.has_log && flight.log_fault != Some(FaultKind::Truncated);
         let flights = plan.flights.iter().filter(whole);
         flights.flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)))
     };
-    let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| {
+    let text = |of: &dyn Fn(&PlannedFlight, &PlannedActuator) -> String| {
         Column::Text(all().map(|(f, a)| of(f, a)).collect())
     };
-    let real =
-        |of: &dyn Fn(&simulator::ActuatorTruth) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
+    let real = |of: &dyn Fn(&PlannedActuator) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
+    let expected = |a: &PlannedActuator| if a.profile.is_one_sided() { "refuse" } else { "estimate" };
     [
         ("tail_number", text(&|f, _| f.tail_number.clone())),
         ("flight_id", text(&|f, _| f.flight_id.clone())),
         ("position", text(&|_, a| a.position.clone())),
-        ("part_number", text(&|_, a| a.part_number.clone())),
+        ("part_number", text(&|_, a| plan.parts[a.part].part_number.clone())),
         ("serial_number", text(&|_, a| a.serial_number.clone())),
         ("departure_utc", Column::Instant(all().map(|(f, _)| instant(f.departure_us)).collect())),
-        ("gap_m", real(&|a| a.gap_m)),
-        ("stiffness_n_per_m", real(&|a| a.stiffness_n_per_m)),
-        ("skew_s", real(&|a| a.skew_s)),
-        ("expected", text(&|_, a| a.expected.as_str().to_owned())),
+        ("gap_m", real(&|a| a.plant.contact.gap_m)),
+        ("stiffness_n_per_m", real(&|a| a.plant.contact.stiffness_n_per_m)),
+        ("skew_s", real(&|a| a.sensors.skew_s())),
+        ("expected", text(&|_, a| expected(a).to_owned())),
     ]
     .map(|(name, column)| (name.to_owned(), column))
     .into()

@@ -7,9 +7,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::error::Error;
-use crate::fleet::fleet_plan_types::{
-    ActuatorLog, ActuatorTruth, Assignment, ChannelUnit, Plan, PlannedFlight, SimulatedFlight,
-};
+use crate::fleet::fleet_plan_types::{ActuatorLog, ChannelUnit, Plan, PlannedActuator, SimulatedFlight};
 use crate::fleet::fleet_planner::Planner;
 use crate::fleet::fleet_spec::{MotorLogFormat, Part, ScrewLogUnit, Spec};
 use crate::flight::simulate;
@@ -32,27 +30,17 @@ impl Plan {
     pub fn simulate_flight(&self, flight_index: usize) -> Result<SimulatedFlight, Error> {
         let missing = Error::NoSuchFlight { index: flight_index, flights: self.flights.len() };
         let flight = self.flights.get(flight_index).ok_or(missing)?;
-        let pairs = flight.actuators.iter().zip(&flight.assignments);
-        let actuators =
-            pairs.map(|(truth, task)| self.record(flight, truth, task)).collect::<Result<_, _>>()?;
-        let first = &flight.assignments[0];
-        let rate_hz = first.profile.sample_rate_hz;
-        Ok(SimulatedFlight {
-            step_s: 1.0 / rate_hz,
-            time_s: first.sensors.clock.stamps(first.profile.samples(), rate_hz, flight.seed),
-            actuators,
-        })
+        let record = |actuator| self.record(flight.seed, actuator);
+        let actuators = flight.actuators.iter().map(record).collect::<Result<_, _>>()?;
+        let PlannedActuator { profile, sensors, .. } = &flight.actuators[0];
+        let time_s = sensors.clock.stamps(profile.samples(), profile.sample_rate_hz, flight.seed);
+        Ok(SimulatedFlight { time_s, actuators })
     }
 
-    fn record(
-        &self,
-        flight: &PlannedFlight,
-        truth: &ActuatorTruth,
-        task: &Assignment,
-    ) -> Result<ActuatorLog, Error> {
-        let seed = derive_seed(flight.seed, &[&truth.position]);
-        let log = simulate(&task.plant, &task.profile, &task.sensors, seed)?;
-        let part = &self.parts[task.part];
+    fn record(&self, flight_seed: u64, actuator: &PlannedActuator) -> Result<ActuatorLog, Error> {
+        let PlannedActuator { position, plant, profile, sensors, .. } = actuator;
+        let log = simulate(plant, profile, sensors, derive_seed(flight_seed, &[position]))?;
+        let part = &self.parts[actuator.part];
         let (motor, motor_unit) = motor_as_logged(log.motor_m, part);
         let (mut screw, mut load) = (log.screw_m, log.load_n);
         let (screw_unit, load_unit) = match (part.reference_radius_m, part.screw_log) {
@@ -67,8 +55,7 @@ impl Plan {
                 (ChannelUnit::Micrometre, ChannelUnit::Newton)
             }
         };
-        let position = truth.position.clone();
-        Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit })
+        Ok(ActuatorLog { position: position.clone(), motor, motor_unit, screw, screw_unit, load, load_unit })
     }
 }
 

@@ -1,7 +1,7 @@
 //! A fleet's calendar with its truth, and the log of one flight.
 
+use crate::fleet::fleet_events::FaultKind;
 use crate::fleet::fleet_spec::Part;
-use crate::flight::ExpectedOutcome;
 use crate::load::flight_profile::Profile;
 use crate::plant::actuator_plant::Plant;
 use crate::sensors::sensor::Sensors;
@@ -55,38 +55,23 @@ pub struct Inspection {
     pub force_n: f64,
 }
 
-/// Whether a flight has a log, and how the file arrives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LogState {
-    /// No log.
-    Absent,
-    /// As recorded.
-    Sound,
-    /// As recorded, and a second time under another name.
-    Duplicate,
-    /// Only the beginning of the file.
-    Truncated,
-}
-
-/// What is true of one actuator in one flight.
+/// One actuator in one flight: its unit, and everything needed to fly it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ActuatorTruth {
+pub struct PlannedActuator {
     /// The place.
     pub position: String,
-    /// The design.
-    pub part_number: String,
+    /// Index of the design in the plan's parts.
+    pub part: usize,
     /// The unit.
     pub serial_number: String,
     /// The unit's age after the flight, hours.
     pub unit_hours: f64,
-    /// The gap, with the wear of this flight, metres.
-    pub gap_m: f64,
-    /// Stiffness of a flank, N/m.
-    pub stiffness_n_per_m: f64,
-    /// τ in `screw_logged(t) = X_screw(t − τ)` against the motor channel, seconds.
-    pub skew_s: f64,
-    /// Whether the gap can be seen.
-    pub expected: ExpectedOutcome,
+    /// The actuator, with the gap that the wear of this flight leaves.
+    pub plant: Plant,
+    /// Commands and loads.
+    pub profile: Profile,
+    /// The sensors that read it.
+    pub sensors: Sensors,
 }
 
 /// One flight of the calendar.
@@ -103,21 +88,12 @@ pub struct PlannedFlight {
     /// The tail's meter after the flight, hours.
     pub tail_hours_end: f64,
     /// Whether it has a log.
-    pub log: LogState,
-    /// The truth of each actuator, in the spec's order of positions.
-    pub actuators: Vec<ActuatorTruth>,
+    pub has_log: bool,
+    /// What happens to the file of that log.
+    pub log_fault: Option<FaultKind>,
+    /// The actuators, in the spec's order of positions.
+    pub actuators: Vec<PlannedActuator>,
     pub(crate) seed: u64,
-    pub(crate) assignments: Vec<Assignment>,
-}
-
-/// Everything needed to fly one actuator.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Assignment {
-    pub(crate) plant: Plant,
-    pub(crate) profile: Profile,
-    pub(crate) sensors: Sensors,
-    /// Index into the plan's parts.
-    pub(crate) part: usize,
 }
 
 /// The unit of a logged channel.
@@ -157,8 +133,6 @@ pub struct ActuatorLog {
 /// The log of one flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedFlight {
-    /// The declared step, seconds.
-    pub step_s: f64,
     /// The stamps, seconds from departure; even unless the clock is not.
     pub time_s: Vec<f64>,
     /// The actuators, in the spec's order of positions.

@@ -7,15 +7,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::Error;
-use crate::fleet::fleet_events::FaultKind;
+use crate::fleet::fleet_events::LogFault;
 use crate::fleet::fleet_plan_types::{
-    ActuatorTruth, Assignment, Inspection, Installation, LogState, Maintenance, Plan, PlannedFlight,
+    Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
 };
 use crate::fleet::fleet_roster::{FleetUnit, fleet_units, seat};
 use crate::fleet::fleet_spec::{Position, Spec};
 use crate::fleet::planted_change::ActuatorFlight;
 use crate::fleet::wear;
-use crate::flight::ExpectedOutcome;
 use crate::seeded_streams::{derive_seed, seeded_rng};
 
 const HOUR_US: f64 = 3.6e9;
@@ -144,20 +143,12 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// One flight of each group has a log.
-    fn log_state(&self, number: usize, tail: &str) -> LogState {
+    /// Which of the tail's logs a flight has, counted from 1: one flight of each group has one.
+    fn log_number(&self, number: usize, tail: &str) -> Option<usize> {
         let (size, log) = (self.spec.flights_per_log, (number - 1) / self.spec.flights_per_log + 1);
         let size = size.min(self.spec.flights_per_tail - (log - 1) * size);
         let logged = seeded_rng(self.spec.seed, &["logged", tail, &log.to_string()]).random_range(0..size);
-        if (number - 1) % self.spec.flights_per_log != logged {
-            return LogState::Absent;
-        }
-        let fault = self.spec.log_faults.iter().find(|fault| fault.tail == tail && fault.log == log);
-        match fault.map(|fault| fault.fault) {
-            None => LogState::Sound,
-            Some(FaultKind::Duplicate) => LogState::Duplicate,
-            Some(FaultKind::Truncated) => LogState::Truncated,
-        }
+        ((number - 1) % self.spec.flights_per_log == logged).then_some(log)
     }
 
     fn install(&mut self, seat: usize, installed_us: i64) {
@@ -185,8 +176,10 @@ impl<'a> Planner<'a> {
         let departure_us = self.slot_us(number) + self.departure_us(flight_hours, &mut rng);
         self.tail_hours[tail] += flight_hours;
         let seats = tail * spec.positions.len()..(tail + 1) * spec.positions.len();
-        let (actuators, assignments) =
-            seats.map(|seat| self.plan_actuator(seat, number, &flight_id, flight_hours)).unzip();
+        let actuators =
+            seats.map(|seat| self.plan_actuator(seat, number, &flight_id, flight_hours)).collect();
+        let log = self.log_number(number, name);
+        let is_meant = |fault: &&LogFault| fault.tail == *name && Some(fault.log) == log;
         self.plan.flights.push(PlannedFlight {
             tail_number: name.clone(),
             seed: derive_seed(spec.seed, &["log", &flight_id]),
@@ -194,9 +187,9 @@ impl<'a> Planner<'a> {
             departure_us,
             flight_hours,
             tail_hours_end: self.tail_hours[tail],
-            log: self.log_state(number, name),
+            has_log: log.is_some(),
+            log_fault: spec.log_faults.iter().find(is_meant).map(|fault| fault.fault),
             actuators,
-            assignments,
         });
     }
 
@@ -214,31 +207,6 @@ impl<'a> Planner<'a> {
         ((hours * 3600.0) as i64) * (HOUR_US as i64 / 3600)
     }
 
-    /// Applies the wear of the flight and assigns plant, profile and sensors.
-    fn plan_actuator(
-        &mut self,
-        seat: usize,
-        number: usize,
-        flight_id: &str,
-        flight_hours: f64,
-    ) -> (ActuatorTruth, Assignment) {
-        let index = self.unit_at[seat];
-        self.wear(index, flight_hours);
-        let assignment = self.assignment(seat, number, flight_id);
-        let unit = &self.units[index];
-        let truth = ActuatorTruth {
-            position: self.place(seat).1.position.clone(),
-            part_number: self.spec.parts[unit.part].part_number.clone(),
-            serial_number: unit.serial_number.clone(),
-            unit_hours: unit.age_hours,
-            gap_m: unit.gap_m,
-            stiffness_n_per_m: assignment.plant.contact.stiffness_n_per_m,
-            skew_s: assignment.sensors.skew_s(),
-            expected: ExpectedOutcome::of(&assignment.profile),
-        };
-        (truth, assignment)
-    }
-
     fn wear(&mut self, index: usize, flight_hours: f64) {
         let unit = &mut self.units[index];
         let scatter_m = self.spec.parts[unit.part].wear_scatter_m;
@@ -248,7 +216,15 @@ impl<'a> Planner<'a> {
         unit.gap_m += wear::step_m(growth_m, scatter_m, &mut self.wear[index]);
     }
 
-    fn assignment(&self, seat: usize, number: usize, flight_id: &str) -> Assignment {
+    /// Applies the wear of the flight and draws plant, profile and sensors.
+    fn plan_actuator(
+        &mut self,
+        seat: usize,
+        number: usize,
+        flight_id: &str,
+        flight_hours: f64,
+    ) -> PlannedActuator {
+        self.wear(self.unit_at[seat], flight_hours);
         let (spec, unit) = (self.spec, &self.units[self.unit_at[seat]]);
         let (spread, (tail, place)) = (&spec.spread, self.place(seat));
         let mut of_place = seeded_rng(spec.seed, &["place", tail, &place.position]);
@@ -281,7 +257,15 @@ impl<'a> Planner<'a> {
         };
         spec.changes.iter().for_each(|change| change.apply(&flight, &mut plant, &mut sensors));
         profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
-        Assignment { plant, profile, sensors, part: unit.part }
+        PlannedActuator {
+            position: place.position.clone(),
+            part: unit.part,
+            serial_number: unit.serial_number.clone(),
+            unit_hours: unit.age_hours,
+            plant,
+            profile,
+            sensors,
+        }
     }
 }
 

@@ -65,7 +65,7 @@ impl Profile {
     }
 
     /// Whether the load touches one flank only, so that the gap cannot be seen.
-    pub(crate) fn is_one_sided(&self) -> bool {
+    pub fn is_one_sided(&self) -> bool {
         self.no_reversal || self.reversals == Some(0)
     }
 

@@ -1,6 +1,6 @@
 //! A planned fleet: books that balance, and flights that do not depend on the order of asking.
 
-use simulator::{Error, ExpectedOutcome, LogState, Plan, PlannedFlight, PlantedChange, SAMPLE_SPEC, Spec};
+use simulator::{Error, FaultKind, Plan, PlannedFlight, PlantedChange, SAMPLE_SPEC, Spec};
 
 fn sample() -> Spec {
     toml::from_str(SAMPLE_SPEC).unwrap()
@@ -83,8 +83,8 @@ fn no_gap_ever_heals() {
     let mut gaps = std::collections::BTreeMap::new();
     let mut smaller = Vec::new();
     for truth in plan.flights.iter().flat_map(|flight| &flight.actuators) {
-        let before = gaps.insert(&truth.serial_number, truth.gap_m).unwrap_or(0.0);
-        if truth.gap_m < before {
+        let before = gaps.insert(&truth.serial_number, truth.plant.contact.gap_m).unwrap_or(0.0);
+        if truth.plant.contact.gap_m < before {
             smaller.push(truth.serial_number.as_str());
         }
     }
@@ -162,15 +162,16 @@ fn mistakes_are_named() {
 fn the_sample_fleet_is_what_its_description_promises() {
     let plan = Plan::new(&sample()).unwrap();
     let rows = || plan.flights.iter().flat_map(|f| f.actuators.iter().map(move |t| (f, t)));
-    assert!(rows().all(|(_, truth)| truth.expected == ExpectedOutcome::Estimate));
+    assert!(rows().all(|(_, truth)| !truth.profile.is_one_sided()));
     let of_tail = |flight: &&PlannedFlight| flight.tail_number == "N412FP";
     let hours: f64 = plan.flights.iter().filter(of_tail).map(|flight| flight.flight_hours).sum();
     assert!((6.0..9.0).contains(&(hours / 84.0)), "{hours} h in 84 days");
-    let with = |state| plan.flights.iter().filter(|flight| flight.log == state).count();
-    assert_eq!([LogState::Sound, LogState::Duplicate, LogState::Truncated].map(with), [40, 1, 1]);
+    let with =
+        |fault| plan.flights.iter().filter(|flight| flight.has_log && flight.log_fault == fault).count();
+    assert_eq!([None, Some(FaultKind::Duplicate), Some(FaultKind::Truncated)].map(with), [40, 1, 1]);
     let history = |serial: &str| -> Vec<(&str, f64)> {
         let of_unit = rows().filter(|(_, truth)| truth.serial_number == serial);
-        of_unit.map(|(flight, truth)| (flight.tail_number.as_str(), truth.gap_m)).collect()
+        of_unit.map(|(flight, truth)| (flight.tail_number.as_str(), truth.plant.contact.gap_m)).collect()
     };
     for (serial, before, after) in [("1060-0008", "N412FP", "N413FP"), ("1060-0012", "N413FP", "N412FP")] {
         let tails: Vec<&str> = history(serial).into_iter().map(|(tail, _)| tail).collect();
@@ -223,23 +224,26 @@ fn events_happen_before_the_flight_that_they_name() {
     let of = |tail: &str| plan.flights.iter().filter(|f| f.tail_number == tail).collect::<Vec<_>>();
     let (a, b) = (of("A"), of("B"));
     assert_eq!(b[1].actuators[0].serial_number, "S10003");
-    assert_eq!((b[2].actuators[0].serial_number.as_str(), b[2].actuators[0].gap_m), ("SPARE", 40e-6));
+    assert_eq!(
+        (b[2].actuators[0].serial_number.as_str(), b[2].actuators[0].plant.contact.gap_m),
+        ("SPARE", 40e-6)
+    );
     let stays: Vec<_> = plan.installations.iter().filter(|s| s.serial_number.starts_with("S10003")).collect();
     assert_eq!(
         stays[0].removed_us,
         plan.installations.iter().find(|s| s.serial_number == "SPARE").map(|s| s.installed_us)
     );
-    let before_m = a[2].actuators[1].gap_m;
-    assert_eq!(a[3].actuators[1].gap_m, 20e-6);
+    let before_m = a[2].actuators[1].plant.contact.gap_m;
+    assert_eq!(a[3].actuators[1].plant.contact.gap_m, 20e-6);
     assert_eq!(plan.maintenance[0].serial_number, "S10002");
     // The reading is that of the gap before the shim, to a micrometre.
     assert!((plan.inspections[0].play_m - before_m - 5e-6).abs() <= 0.5e-6);
     for flights in [&a, &b] {
         for pair in flights.chunks(2) {
-            assert_eq!(pair.iter().filter(|flight| flight.log != LogState::Absent).count(), 1);
+            assert_eq!(pair.iter().filter(|flight| flight.has_log).count(), 1);
         }
     }
-    assert_eq!(b.iter().filter(|flight| flight.log == LogState::Truncated).count(), 1);
+    assert_eq!(b.iter().filter(|flight| flight.log_fault == Some(FaultKind::Truncated)).count(), 1);
     let late =
         planned(&events.replacen("before_flight = 4", "before_flight = 7", 1)).unwrap_err().to_string();
     assert!(late.starts_with("`before_flight of a re-shim` is 7"), "{late}");
@@ -286,8 +290,8 @@ fn a_planted_change_shows_on_the_actuators_that_it_names_and_from_its_flight_on(
         let is_moved = is.tail_number == "B" && (is.flight_id.ends_with('3') || is.flight_id.ends_with('4'));
         for (was, is) in was.actuators.iter().zip(&is.actuators) {
             let skew_s = if is_moved { 1e-3 } else { 0.0 };
-            assert!((is.skew_s - was.skew_s - skew_s).abs() < 1e-12);
-            let ratio = is.stiffness_n_per_m / was.stiffness_n_per_m;
+            assert!((is.sensors.skew_s() - was.sensors.skew_s() - skew_s).abs() < 1e-12);
+            let ratio = is.plant.contact.stiffness_n_per_m / was.plant.contact.stiffness_n_per_m;
             if is.serial_number == "S10001" {
                 drift.push(ratio);
             } else {

@@ -1,6 +1,6 @@
 //! One simulated flight: repeatable, loaded as specified, and sampled at its timestamps.
 
-use simulator::{Channel, ExpectedOutcome, Friction, Plant, Profile, Sensors, Vibration, simulate};
+use simulator::{Channel, Friction, Plant, Profile, Sensors, Vibration, simulate};
 
 fn short() -> Profile {
     Profile { duration_s: 30.0, sample_rate_hz: 100.0, ..Profile::default() }
@@ -31,16 +31,14 @@ fn the_load_reverses_many_times_and_exceeds_its_scale_in_a_twentieth_of_the_crui
 }
 
 #[test]
-fn a_flight_without_reversal_keeps_the_sign_of_its_load_and_is_expected_to_be_refused() {
-    let once = Profile { reversals: Some(1), ..short() };
-    let flight = simulate(&Plant::default(), &once, &Sensors::default(), 9).unwrap();
-    assert_eq!(flight.expected, ExpectedOutcome::Estimate);
+fn a_flight_without_reversal_keeps_the_sign_of_its_load() {
+    assert!(!Profile { reversals: Some(1), ..short() }.is_one_sided());
     for seed in 0..5 {
         let reversals = (seed > 2).then_some(0);
         let profile = Profile { no_reversal: seed < 3, reversals, ..short() };
         let flight = simulate(&Plant::default(), &profile, &Sensors::default(), seed).unwrap();
         assert!(flight.load_n.iter().all(|f| *f * flight.load_n[0] > 0.0));
-        assert_eq!(flight.expected, ExpectedOutcome::Refuse);
+        assert!(profile.is_one_sided());
     }
 }
 
@@ -64,7 +62,6 @@ fn a_delay_is_a_delay_to_a_fraction_of_a_sample() {
         simulate(&Plant::default(), &Profile { sample_rate_hz, ..short() }, &sensors, 4).unwrap()
     };
     let (prompt, late) = (fly(1000.0, 0.0), fly(250.0, 1e-3));
-    assert_eq!(late.skew_s, 1e-3);
     for k in 1..late.screw_m.len() {
         assert!((late.screw_m[k] - prompt.screw_m[4 * k - 1]).abs() < 1e-12);
         assert!((late.motor_m[k] - prompt.motor_m[4 * k]).abs() < 1e-12);
@@ -90,47 +87,6 @@ fn buffet_adds_its_rms_to_the_load_and_vibration_to_the_motor() {
     let profile = Profile { motor_vibration: Vibration::band(20.0, 60.0, 10e-6), ..short() };
     let motor_m = simulate(&held, &profile, &Sensors::perfect(), 9).unwrap().motor_m;
     assert!((rms(&motor_m, &vec![0.0; motor_m.len()]) / 10e-6 - 1.0).abs() < 0.05);
-}
-
-/// Keys of load spectrum, sensors, friction and flanks as a spec writes them.
-#[test]
-fn every_new_key_is_read_from_a_spec() {
-    let text = r#"
-        gust_form = "von_karman"
-        reversals = 3
-        buffet = { low_hz = 8.0, high_hz = 40.0, rms = 0.1, lines = [{ frequency_hz = 17.0, amplitude = 0.05 }] }
-        motor_vibration = { rms = 5e-6 }
-        rest_share = 0.5
-    "#;
-    let profile: Profile = toml::from_str(text).unwrap();
-    assert!(profile.check().is_ok() && profile.reversals == Some(3) && !profile.buffet.is_silent());
-    assert_eq!(toml::from_str::<Profile>(&toml::to_string(&profile).unwrap()).unwrap(), profile);
-    let text = r#"
-        hysteresis = 30.0
-        hysteresis_length = 800.0
-        lag_s = 0.01
-        box_average = true
-        rate_hz = 50.0
-        coloured_rms = 20.0
-        coloured_form = "flicker"
-        periodic = [{ amplitude = 1e-6, period = 5e-3 }]
-    "#;
-    let channel: Channel = toml::from_str(text).unwrap();
-    assert_eq!(toml::from_str::<Channel>(&toml::to_string(&channel).unwrap()).unwrap(), channel);
-    let text = r"
-        friction_law = { lu_gre = { travel_m = 5e-6, ratio = 1.4, speed_m_per_s = 2e-3, damping_n_s_per_m = 500.0 } }
-        screw_friction = { dry_n = 100.0, load_share = 0.03, viscous_n_s_per_m = 1e3, backdriven_load_share = 0.01, asymmetry = 0.1, grease_n = 50.0, cold_factor = 2.0 }
-        [contact]
-        law = { toe = { share = 0.3, depth_m = 10e-6 } }
-        lower_law = { hertz = { share = 0.5, reference_m = 80e-6 } }
-        lower_stiffness_factor = 1.2
-        stiffness_drift = 0.05
-        gap_drift = 0.2
-        stiffness_phase_factors = [1.0, 1.0, 0.97, 1.0, 1.02, 1.0]
-    ";
-    let plant: Plant = toml::from_str(text).unwrap();
-    assert!(plant.check().is_ok());
-    assert_eq!(toml::from_str::<Plant>(&toml::to_string(&plant).unwrap()).unwrap(), plant);
 }
 
 /// While the load is large the coupling is closed, and all that stands between δX − F/K and half a gap
