@@ -158,30 +158,6 @@ fn a_misread_hour_meter_moves_no_usage_and_is_named() {
     assert!(slip["reason"].as_str().unwrap().contains("1 hour-meter readings that contradict"), "{slip}");
 }
 
-/// The table says where a unit is, and not its last log.
-#[test]
-fn a_unit_is_where_the_table_has_it_now() {
-    let fleet = TestFleet::processed();
-    fleet.edit(TABLE, |table| {
-        let out = "1040-0013,2026-09-07T00:00:00Z,2026-11-15T00:00:00Z,";
-        let moved = table.replace("1040-0013,2026-09-07T00:00:00Z,,", out);
-        let moved = moved.replace(
-            "1040-0005,2026-09-07T00:00:00Z,,",
-            "1040-0005,2026-09-07T00:00:00Z,2026-11-15T00:00:00Z,",
-        );
-        moved + "N412FP,aileron_left,EMA-27-1040,1040-0013,2026-11-15T00:00:00Z,,,\n"
-    });
-    fleet.configure("as_of = \"newest_record\"", "as_of = \"now\"");
-    let rows = trend(&fleet);
-    let place = |serial: &str| {
-        let row = &rows[serial];
-        ["tail_number", "position"].map(|column| row[column].as_str().unwrap_or_default().to_owned())
-    };
-    assert_eq!(place("1040-0013"), ["N412FP", "aileron_left"]);
-    let removed = &rows["1040-0005"];
-    assert_eq!((&removed["state"], &removed["removed_utc"]), (&Value::Null, &"2026-11-15T00:00:00Z".into()));
-}
-
 /// The same samples under another departure are the same flight: it moves, and is not there twice.
 #[test]
 fn a_corrected_departure_moves_a_flight() {
@@ -260,66 +236,6 @@ fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
     rewrite(&whole, &fleet.path("ailerons"), &facts(&whole), of_ailerons, |_| true);
     std::fs::rename(fleet.path("ailerons"), &whole).unwrap();
     run_anew();
-}
-
-#[test]
-fn a_unit_keeps_its_history_under_its_numbers_of_today() {
-    let fleet = TestFleet::processed();
-    let before = trend(&fleet)["1040-0013"].clone();
-    // A modification: another part number, on the same serial number, in the same place.
-    fleet.edit(TABLE, |table| {
-        table.replace(
-            "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,,2310.0,3744.0",
-            "N414FP,aileron_left,EMA-27-1060,1040-0013,2026-09-07T00:00:00Z,2026-10-01T00:00:00Z,2310.0,3744.0\n\
-             N414FP,aileron_left,EMA-27-1040,1040-0013,2026-10-01T00:00:00Z,,,",
-        )
-    });
-    assert_eq!(trend(&fleet)["1040-0013"]["flights"], before["flights"]);
-    // A new name plate.
-    std::fs::write(fleet.path("aliases.csv"), "former_serial_number,serial_number\n1040-0005,SN-5\n")
-        .unwrap();
-    fleet.configure("[logs]\n", "[logs]\naliases = \"aliases.csv\"\n");
-    let rows = trend(&fleet);
-    assert_eq!(rows["SN-5"]["flights"], 10);
-    assert!(!rows.contains_key("1040-0005"));
-    assert!(Path::new(&fleet.path("aliases.csv")).exists());
-}
-
-/// A play above the limit, measured by hand, on a unit whose records are below it.
-#[test]
-fn a_hangar_check_above_the_limit_makes_the_state_until_a_renewal() {
-    let fleet = TestFleet::processed();
-    fleet.configure("[logs]\n", "[logs]\ninspections = \"checks.csv\"\n");
-    let check = |rows: &str| {
-        std::fs::write(fleet.path("checks.csv"), format!("serial_number,date_utc,play_m\n{rows}")).unwrap();
-    };
-    check("1040-0005,2026-11-01T00:00:00Z,410e-6\n1040-0006,2026-08-01T00:00:00Z,410e-6\n");
-    let row = trend(&fleet)["1040-0005"].clone();
-    assert_eq!(
-        (&row["state"], &row["reason_code"], &row["due_utc"]),
-        (&"act".into(), &"inspected".into(), &row["as_of_utc"])
-    );
-    let reason = row["reason"].as_str().unwrap();
-    assert!(
-        reason.contains("the hangar check of 2026-11-01 measured 410.0 µm where the records before it read"),
-        "{reason}"
-    );
-    assert!(reason.contains("at or above the limit of 150.0 µm"), "{reason}");
-    // One from before the installation is not of this gap.
-    assert_ne!(trend(&fleet)["1040-0006"]["state"], "act");
-    assert_eq!(fleet.freeplay(&["run", "--fail-on", "act"]).code, Some(4));
-    std::fs::write(
-        fleet.path("work.csv"),
-        "part_number,serial_number,utc,kind\nEMA-27-1040,1040-0005,2026-11-02T00:00:00Z,reshim\n",
-    )
-    .unwrap();
-    fleet.configure("[logs]\n", "[logs]\nmaintenance = \"work.csv\"\n");
-    assert_ne!(trend(&fleet)["1040-0005"]["state"], "act");
-    // One that cannot be right is refused before anything is stored.
-    check("1040-0005,2026-11-01T00:00:00Z,410\n");
-    let refused = fleet.freeplay(&["run"]);
-    assert_eq!(refused.code, Some(2));
-    assert!(refused.err.contains("checks.csv") && refused.err.contains("64 µm are 64e-6"), "{}", refused.err);
 }
 
 /// Versions of the installations table: as it is; another unit on the left aileron; the elevators swapped earlier.

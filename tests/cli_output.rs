@@ -1,7 +1,6 @@
 //! Output of the program: exit codes, formats, pipes without noise, and help for new users.
 
 use std::collections::BTreeSet;
-use std::io::Read;
 
 use crate::harness::{Table, TestFleet, rewrite, write_log};
 
@@ -27,16 +26,6 @@ fn logs_are_structured_when_that_is_asked_for() {
     assert_eq!(result.json()["done"], 10);
     let wrong = fleet.freeplay(&["run", "--config", "none.toml", "--log-format", "json"]);
     assert!(wrong.err.lines().all(|line| line.starts_with('{')), "{}", wrong.err);
-}
-
-#[test]
-fn init_writes_a_configuration_with_its_schema() {
-    let fleet = TestFleet::empty();
-    fleet.run_ok(&["init", "new-fleet"]);
-    let toml = fleet.read("new-fleet/pipeline.toml");
-    assert!(toml.starts_with("#:schema ./pipeline.schema.json\n"), "{toml}");
-    let schema = fleet.read_json("new-fleet/pipeline.schema.json");
-    assert!(schema["properties"]["logs"]["properties"]["files"].is_object(), "{schema}");
 }
 
 /// Proposes a configuration from the logs in `qar`, and accepts the values of its part; the proposal as it was written.
@@ -235,23 +224,6 @@ fn an_estimate_is_drawn_in_the_form_its_ending_names() {
     assert!(!fleet.path("none.svg").exists(), "no plot without data");
 }
 
-/// A reader that closes the pipe after a line ends the program quietly.
-#[test]
-fn a_closed_pipe_ends_quietly() {
-    let fleet = TestFleet::processed();
-    let mut child = fleet
-        .command(&["store", "export", "--format", "csv"])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut first = [0; 64];
-    child.stdout.take().unwrap().read_exact(&mut first).unwrap();
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
-    assert!(output.status.success());
-}
-
 #[test]
 fn estimates_of_another_program_are_assessed_and_an_assessment_sees_nothing_later() {
     let fleet = TestFleet::sample();
@@ -363,31 +335,6 @@ fn json_lines_hold_the_objects_of_the_json_array() {
             lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
         assert_eq!(lines, array, "{args:?}");
         assert!(!lines.is_empty(), "{args:?}");
-    }
-}
-
-/// The shell asks the program; names come from the store, and without one there are none and no message.
-#[test]
-fn names_are_completed_from_the_store() {
-    let fleet = TestFleet::sample();
-    let complete = |words: &[&str]| {
-        let mut command = fleet.command(&["--", "freeplay"]);
-        command.args(words).env("COMPLETE", "bash").env("_CLAP_COMPLETE_INDEX", words.len().to_string());
-        let output = command.env("_CLAP_IFS", "\n").output().unwrap();
-        assert!(output.stderr.is_empty() && output.status.success(), "{words:?}: {output:?}");
-        let text = String::from_utf8(output.stdout).unwrap();
-        text.lines().map(str::to_owned).collect::<Vec<_>>()
-    };
-    assert!(complete(&["trend", "--tail", ""]).is_empty(), "no store, no names");
-    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "1"]);
-    assert_eq!(complete(&["trend", "--tail", ""]), ["N412FP"]);
-    assert_eq!(complete(&["work", "list", "--part", "EMA-27-104"]), ["EMA-27-1040"]);
-    assert_eq!(complete(&["run", "--serial", "1040-"]), ["1040-0005", "1040-0006"]);
-    assert_eq!(complete(&["explain", "N4"]), ["N412FP-0007"]);
-    assert_eq!(complete(&["explain", "N412FP-0007", "aileron_l"]), ["aileron_left"]);
-    assert_eq!(complete(&["query", "position", "elevator_r"]), ["elevator_right"]);
-    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        assert!(fleet.run_ok(&["completions", shell]).contains("COMPLETE"), "{shell}");
     }
 }
 

@@ -78,27 +78,6 @@ fn hostile_tables_are_refused_with_code_2() {
     }
 }
 
-/// Two logs of one flight, and a file of someone else where a normalized log would be.
-#[test]
-fn normalize_overwrites_nothing_but_its_own() {
-    let fleet = TestFleet::sample();
-    let (log, copy) = (fleet.logs()[0].clone(), fleet.path("copy.parquet"));
-    std::fs::copy(&log, &copy).unwrap();
-    let (log, copy) = (log.display().to_string(), copy.display().to_string());
-    let both = fleet.freeplay(&["normalize", &log, &copy, "--output", "normalized"]);
-    assert_eq!(both.code, Some(1), "{both:?}");
-    assert!(
-        both.err.contains("error[would_overwrite]") && both.out.contains("4 normalized logs"),
-        "{both:?}"
-    );
-    fleet.run_ok(&["normalize", &log, "--output", "normalized"]);
-    let written = fleet.glob("normalized/*/*/*");
-    assert_eq!(written.len(), 4, "{written:?}");
-    std::fs::write(&written[0], "years").unwrap();
-    assert_eq!(fleet.freeplay(&["normalize", &log, "--output", "normalized"]).code, Some(1));
-    assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "years");
-}
-
 /// A log of the same flight whose name sorts first arrives for a later run.
 #[test]
 fn a_stored_flight_is_not_displaced_by_a_later_claim() {

@@ -169,23 +169,6 @@ fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
     assert!(checked.err.contains("no matching main log for this flight"), "{}", checked.err);
 }
 
-#[test]
-fn overrides_read_a_tail_and_a_part_otherwise() {
-    let fleet = one_tail();
-    fleet.configure("[channel.load]", "[channel.load]\nsign = -1");
-    fleet.configure("column = \"{position}_motor_deg\"", "column = \"{position}_motor_deg\"\nscale = 2.0");
-    fleet.configure(
-        "[estimate]",
-        "[[override]]\ntails = [\"N4*\"]\nchannel.load.sign = 1\n\n\
-         [[override]]\nparts = [\"EMA-27-10?0\"]\nchannel.motor_position.scale = 1.0\n\n[estimate]",
-    );
-    fleet.run_ok(&["run"]);
-    assert_eq!(numbers(&fleet), plain());
-    fleet.configure("parts = [\"EMA-27-10?0\"]", "parts = [\"EMA-27-1040\"]");
-    let plan = fleet.run_ok(&["run", "--dry-run"]);
-    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
-}
-
 /// A column is renamed after some years: each log is read with its own schema, and `check` reports the change.
 #[test]
 fn changed_columns_are_reported() {

@@ -13,6 +13,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
 use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
+use ingest::tables::{Table, number};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::methods::{METHODS, load_lines_m, spread_m};
@@ -44,25 +45,17 @@ const LAST_SMALL_RAMP: f64 = 4.0;
 /// # Errors
 /// A file that cannot be read or lacks a column, as text.
 pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
-    let manifest = folder.join("manifest.csv");
-    let text = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| {
-        header.iter().position(|h| *h == name).ok_or_else(|| format!("manifest.csv has no column `{name}`"))
-    };
+    let text = |error: ingest::Error| error.diagnostic().to_string();
+    let manifest = Table::read(&folder.join("manifest.csv")).map_err(text)?;
+    let column = |name: &str| manifest.column(&[name]).map_err(text);
     let (file, play) = (column("file")?, column("authors_phase_play_deg")?);
-    let listed = lines.map(|line| {
-        let cell =
-            |k: usize| line.split(',').nth(k).ok_or_else(|| format!("manifest.csv: short line {line}"));
+    let log = |row: usize| {
         // Some phases have no published play.
-        if cell(play)?.is_empty() {
-            return Ok(None);
-        }
-        let play_deg = cell(play)?.parse().map_err(|e| format!("manifest.csv: {line}: {e}"))?;
-        gear(folder, cell(file)?, play_deg).map(Some)
-    });
-    listed.filter_map(Result::transpose).collect()
+        let Some(play_deg) = manifest.optional(row, Some(play), number).map_err(text)? else { return Ok(None) };
+        let file = manifest.required(row, file, |name| Ok(name.to_owned())).map_err(text)?;
+        gear(folder, &file, play_deg).map(Some)
+    };
+    manifest.rows().filter_map(|row| log(row).transpose()).collect()
 }
 
 fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, String> {
