@@ -207,24 +207,6 @@ fn a_trace_holds_every_sample_the_filter_saw() {
 }
 
 #[test]
-fn an_estimate_is_drawn_in_the_form_its_ending_names() {
-    let fleet = TestFleet::of("flights");
-    let logs = ["estimate", "A_nominal.parquet", "D_no_reversal.parquet", "--part", "A", "--plot"];
-    for (name, start) in [("a.svg", &b"<svg"[..]), ("a.html", b"<!DOCTYPE html>")] {
-        fleet.run_ok(&[&logs[..], &[name]].concat());
-        assert!(std::fs::read(fleet.path(name)).unwrap().starts_with(start), "{name}");
-    }
-    let page = fleet.read("a.html");
-    assert!(page.contains("gap 99.9 µm") && page.contains("refused: no_load_reversal"));
-    let result = fleet.freeplay(&[&logs[..], &["a.pdf"]].concat());
-    assert_eq!(result.code, Some(2));
-    assert!(result.err.contains(".svg or .html"), "{}", result.err);
-    let result = fleet.freeplay(&["estimate", "nowhere.parquet", "--part", "A", "--plot", "none.svg"]);
-    assert!(result.err.contains("none.svg was not written"), "{}", result.err);
-    assert!(!fleet.path("none.svg").exists(), "no plot without data");
-}
-
-#[test]
 fn estimates_of_another_program_are_assessed_and_an_assessment_sees_nothing_later() {
     let fleet = TestFleet::sample();
     let row = |day: i32| {

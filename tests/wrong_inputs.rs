@@ -2,35 +2,6 @@
 
 use crate::harness::{TestFleet, facts, facts_with, rewrite};
 
-fn gaps_um(fleet: &TestFleet) -> Vec<f64> {
-    let rows = fleet.rows(&["query", "tail", "N412FP"]);
-    rows.iter().map(|row| row["gap_m"].as_f64().unwrap() * 1e6).collect()
-}
-
-/// A stiffness in N/µm, or of another part: the gaps stay right, and the run names the key.
-#[test]
-fn a_stiffness_of_another_unit_is_named_and_moves_no_gap() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
-    let right = gaps_um(&fleet);
-    for (from, to) in [("5.0e7", "5.0e8"), ("5.0e8", "5.0e10")] {
-        fleet.configure(from, to);
-        let check = fleet.freeplay(&["check"]);
-        assert_eq!(check.code, Some(1), "{check:?}");
-        assert!(check.err.contains("fit a stiffness unlike the configured one"), "{}", check.err);
-        assert!(check.err.contains("`stiffness_n_per_m`"), "{}", check.err);
-        let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
-        assert_eq!(run.code, Some(1), "{run:?}");
-        assert!(run.out.contains("all actuators of part EMA-27-1040: stiffness_unlike"), "{}", run.out);
-        assert!(run.out.contains("`stiffness_n_per_m`"), "{}", run.out);
-        let found = gaps_um(&fleet);
-        assert_eq!(found.len(), right.len());
-        for (found, right) in found.iter().zip(&right) {
-            assert!((found - right).abs() < 1.0, "{to}: {found} µm instead of {right} µm");
-        }
-    }
-}
-
 /// Columns depend on the part, so a position whose unit is not booked may lack its columns: it is an error all the same.
 #[test]
 fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_part() {

@@ -202,7 +202,8 @@ fn shell(folder: &std::path::Path, script: &str) -> Command {
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
     let mut shell = Command::new("sh");
     shell.args(["-c", script]).current_dir(folder).stdin(Stdio::null());
-    shell.env("PATH", path).env("TOP", folder).env_remove("FREEPLAY_CONFIG");
+    shell.env("PATH", path).env("TOP", folder).env("DATA", top().join("tests/data"));
+    shell.env_remove("FREEPLAY_CONFIG");
     shell
 }
 

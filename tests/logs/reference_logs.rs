@@ -1,13 +1,6 @@
-//! Logs of another physics engine, and of a real robot.
+//! Logs of a real robot.
 
 use crate::harness::{TestFleet, print_line};
-
-#[test]
-fn the_whole_job_runs_on_them_too() {
-    let fleet = TestFleet::of("flights");
-    let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("3 estimated, 1 refused (no_load_reversal 1)"), "{account}");
-}
 
 /// A real machine: every axis ends with a record or a refusal, and none with silence.
 #[test]

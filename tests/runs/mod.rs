@@ -1,4 +1,4 @@
-//! Runs: incremental, interrupted, killed, on failing disks and on stores of older versions.
+//! Runs: incremental, interrupted, killed, and on failing disks.
 
 #[cfg(target_os = "linux")]
 mod disk_faults;
@@ -8,8 +8,6 @@ mod injected_faults;
 mod interruption;
 mod killed_run_recovery;
 mod large_inputs;
-mod mapping_faults;
-mod old_store_formats;
 #[cfg(target_os = "linux")]
 mod quiet_failures;
 #[cfg(target_os = "linux")]

@@ -328,7 +328,7 @@ impl Sensors {
     }
 
     /// τ in `screw_logged(t) = X_screw(t − τ)`, against the motor channel, seconds: delays and lags.
-    pub(crate) fn skew_s(&self) -> f64 {
+    pub fn skew_s(&self) -> f64 {
         (self.screw.delay_s + self.screw.lag_s) - (self.motor.delay_s + self.motor.lag_s)
     }
 
