@@ -136,67 +136,6 @@ fn departures_in_another_zone_are_named() {
     assert_eq!(trend(&fleet), before);
 }
 
-/// One digit of the hour meter of a flight without a log.
-#[test]
-fn a_misread_hour_meter_moves_no_usage_and_is_named() {
-    let fleet = TestFleet::processed();
-    let rows = |meter: &str| {
-        format!(
-            "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n\
-             N414FP,X1,2026-10-02T00:00:00Z,1.0,{meter}\n"
-        )
-    };
-    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
-    let with = |meter: &str| {
-        std::fs::write(fleet.path("flights.csv"), rows(meter)).unwrap();
-        trend(&fleet)["1040-0013"].clone()
-    };
-    let (without, slip) = (with(""), with("38095.0"));
-    let hours = |row: &Value| row["unit_hours"].as_f64().unwrap();
-    assert!((hours(&slip) - hours(&without)).abs() < 1e-6, "{slip}");
-    assert_eq!(slip["state"], without["state"]);
-    assert!(slip["reason"].as_str().unwrap().contains("1 hour-meter readings that contradict"), "{slip}");
-}
-
-/// The same samples under another departure are the same flight: it moves, and is not there twice.
-#[test]
-fn a_corrected_departure_moves_a_flight() {
-    let fleet = TestFleet::sample();
-    fleet.configure("departure_utc = \"departure_utc\", ", "");
-    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
-    fleet.configure("logs/**/*.parquet", "logs/N412FP/*.parquet");
-    let rows = |first_hour: u32| {
-        let row = |n: u32| {
-            let hour = if n == 1 { first_hour } else { 10 };
-            format!("N412FP,N412FP-{n:04},2026-10-{n:02}T{hour:02}:00:00Z\n")
-        };
-        let rows: String = (1..=10).map(row).collect();
-        std::fs::write(fleet.path("flights.csv"), format!("tail_number,flight_id,departure_utc\n{rows}"))
-            .unwrap();
-    };
-    rows(10);
-    // A log without its row fails, and is stored once the row is there.
-    fleet.edit("flights.csv", |text| text.lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
-    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
-    assert_eq!(records_with(&fleet, "N412FP"), 36);
-    rows(10);
-    fleet.run_ok(&["run"]);
-    assert_eq!(records_with(&fleet, "N412FP"), 40);
-    rows(12);
-    let summary = fleet.run_ok(&["run"]);
-    assert!(summary.contains("1 new or changed"), "{summary}");
-    assert_eq!((records_with(&fleet, "N412FP"), records_with(&fleet, "2026-10-01T12:00:00")), (40, 4));
-    assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
-    // A log that moved to another folder and name is no other flight.
-    let log = &fleet.logs_of("N412FP")[0];
-    std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
-    let summary = fleet.run_ok(&["run"]);
-    assert!(!summary.contains("absent"), "{summary}");
-    assert_eq!(records_with(&fleet, "N412FP"), 40);
-    let explained = fleet.run_ok(&["explain", "N412FP-0001", "aileron_left"]);
-    assert!(explained.contains("renamed.parquet") && explained.contains("bit-identical"), "{explained}");
-}
-
 /// A log is sent again for the one position that failed.
 #[test]
 fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {

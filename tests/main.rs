@@ -16,5 +16,4 @@ mod markdown;
 mod report_contents;
 mod runs;
 mod states;
-mod stroke;
 mod wrong_inputs;

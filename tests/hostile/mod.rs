@@ -1,7 +1,5 @@
 //! Inputs that would end a run, delete other files, or execute a program: the run names each, and processes all others.
 
-mod operations;
-
 use crate::harness::{TestFleet, copy, facts, top, write_log};
 
 /// The files of `tests/data/hostile`: name, code of the error, and a part of its text.

@@ -86,22 +86,3 @@ fn the_sample_fleet_is_made_anywhere_and_is_the_same_again() {
     }
     assert_eq!(made.freeplay(&["init", "--sample", "--from", "demo"]).code, Some(2));
 }
-
-#[test]
-fn a_simulated_fleet_is_the_same_again_from_its_seed() {
-    let fleet = TestFleet::empty();
-    let spec = "seed = 7\ntails = [\"N1\"]\nflights_per_tail = 2\n\n[profile]\nduration_s = 30.0\n\n[[parts]]\npart_number = \"EMA\"\n\n[[positions]]\nposition = \"aileron\"\npart_number = \"EMA\"\n";
-    std::fs::write(fleet.path("spec.toml"), spec).unwrap();
-    for (folder, jobs) in [("a", "1"), ("b", "2")] {
-        fleet.run_ok(&["simulate", "spec.toml", "--output", folder, "--jobs", jobs]);
-    }
-    let log = |folder: &str| {
-        let files = fleet.glob(&format!("{folder}/logs/N1/*.parquet"));
-        files.iter().map(|f| std::fs::read(f).unwrap()).collect::<Vec<_>>()
-    };
-    assert_eq!(log("a").len(), 2);
-    assert_eq!(log("a"), log("b"));
-    let account = fleet.run_ok(&["run", "--config", "a/pipeline.toml"]);
-    assert!(account.contains("2 records of 2 flights"), "{account}");
-    assert_eq!(fleet.freeplay(&["simulate", "spec.toml", "--output", "a"]).code, Some(2));
-}

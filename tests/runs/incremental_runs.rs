@@ -1,21 +1,6 @@
-//! Runs after runs: neither workers, memory nor a second log of a flight change a record.
+//! Runs after runs: a second log of a flight changes no record.
 
 use crate::harness::{TestFleet, facts, rewrite};
-
-/// Less memory and more workers than logs move no number.
-#[test]
-fn a_memory_budget_and_idle_workers_change_no_record() {
-    let plain = TestFleet::sample();
-    plain.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
-    plain.run_ok(&["run", "--jobs", "1"]);
-    for settings in ["", "memory_mib = 1\n", "memory_mib = 4\n"] {
-        let spread = TestFleet::sample();
-        spread.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
-        spread.configure("[store]", &format!("[run]\n{settings}\n[store]"));
-        spread.run_ok(&["run", "--jobs", "8"]);
-        assert_eq!(spread.exported(), plain.exported(), "{settings}");
-    }
-}
 
 /// Two recordings of one flight: the one whose name sorts first is used, and the other is named, also where two recorders
 /// write the flight id differently. The summary does not depend on the worker that was faster.

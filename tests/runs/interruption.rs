@@ -158,3 +158,36 @@ fn decisions_during_a_run_are_all_kept() {
     assert!(events >= 6, "one file for the run, and one for each decision: {events}");
     assert!(fleet.run_ok(&["store", "verify"]).contains("OK"));
 }
+
+/// All is stored when the summary cannot be written: `/dev/full` is a disk without space.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_summary_that_cannot_be_written_does_not_fail_the_run() {
+    let fleet = TestFleet::sample();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = fleet.command(&["run"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("output_failed"), "{output:?}");
+}
+
+/// An object store that takes requests for a listing and answers none of them.
+#[cfg(unix)]
+#[test]
+fn a_signal_during_a_slow_listing_ends_the_run_within_two_seconds() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "s3://fleet/logs/**/*.parquet");
+    for signal in ["-INT", "-TERM"] {
+        let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut run = fleet.command(&["run", "--metrics", "freeplay.prom"]);
+        run.env("AWS_ENDPOINT_URL", format!("http://{}", server.local_addr().unwrap()));
+        run.envs([("AWS_ACCESS_KEY_ID", "a"), ("AWS_SECRET_ACCESS_KEY", "b"), ("AWS_REGION", "c")]);
+        let mut run = run.spawn().unwrap();
+        let _request = server.accept().unwrap();
+        let begun = std::time::Instant::now();
+        std::process::Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
+        assert_eq!(run.wait().unwrap().code(), Some(130));
+        assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+        let metrics = fleet.read("freeplay.prom");
+        assert!(metrics.contains("\nfreeplay_run_exit_code 130\n"), "{metrics}");
+    }
+}

@@ -51,7 +51,9 @@ pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let (file, play) = (column("file")?, column("authors_phase_play_deg")?);
     let log = |row: usize| {
         // Some phases have no published play.
-        let Some(play_deg) = manifest.optional(row, Some(play), number).map_err(text)? else { return Ok(None) };
+        let Some(play_deg) = manifest.optional(row, Some(play), number).map_err(text)? else {
+            return Ok(None);
+        };
         let file = manifest.required(row, file, |name| Ok(name.to_owned())).map_err(text)?;
         gear(folder, &file, play_deg).map(Some)
     };
