@@ -4,6 +4,7 @@
 //! other is brought to the motor's instants by [`crate::time::resample`].
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 
 use crate::channel::buffer_pool;
 use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
@@ -52,8 +53,8 @@ impl From<Vec<f64>> for Channel {
     }
 }
 
-/// How the samples of a channel lie in time.
-#[derive(Debug)]
+/// How the samples of a channel lie in their table and in time.
+#[derive(Debug, Clone)]
 pub(crate) struct ChannelSampling<'s> {
     pub(crate) table: &'s RowTable,
     pub(crate) map: &'s ChannelMapping,
@@ -64,28 +65,31 @@ pub(crate) struct ChannelSampling<'s> {
     every: usize,
     /// Its rows on one clock.
     pub(crate) base: TimeBase,
+    /// The stamps of the rows that count, once they were read.
+    stamps: OnceCell<Timestamps>,
 }
 
 impl<'s> ChannelSampling<'s> {
     /// A channel of a position, whose clock is not read yet.
-    pub(crate) fn new(table: &'s RowTable, map: &'s ChannelMapping, name: &str, position: &str) -> Self {
+    pub(crate) fn new(table: &'s RowTable, map: &'s ChannelMapping, position: &str) -> Self {
         let named = |column: &String| ColumnPattern::new(column).column_for(position);
         Self {
             table,
             map,
-            samples: table.samples(name, position),
+            samples: table.samples(&named(&map.column), position),
             time_column: map.time_column.as_ref().map(named),
             valid: map.valid_column.as_ref().map(|column| table.samples(&named(column), position)),
             every: 1,
             base: clock::uniform(0, 1.0),
+            stamps: OnceCell::new(),
         }
     }
 
-    /// The same with its rows on one clock.
-    pub(crate) fn with_clock(mut self) -> Result<Self, Error> {
-        (self.base, _) = self.base_of()?;
-        self.every = self.rows_between();
-        Ok(self)
+    /// The samples that are read for it: its own, the marks of the valid ones, and its own stamps, which lie in its rows.
+    pub(crate) fn selectors(&self) -> impl Iterator<Item = SampleSelector> {
+        let time = self.time_column.iter();
+        let stamps = time.map(|time| SampleSelector { leaf: time.clone(), rows: self.samples.rows.clone() });
+        std::iter::once(self.samples.clone()).chain(self.valid.clone()).chain(stamps)
     }
 
     /// All that the instants of its samples depend on: channels of one log that agree in it share them.
@@ -103,9 +107,10 @@ impl<'s> ChannelSampling<'s> {
         files.try_for_each(|file| file.check_pages(leaf))
     }
 
-    /// The column of the channel.
+    /// The name of the channel in its table.
     pub(crate) fn column(&self) -> &str {
-        self.samples.rows.first().map_or(&self.samples.leaf, |(_, name)| name)
+        let rows = self.samples.rows.first().filter(|_| self.table.layout.name_column.is_some());
+        rows.map_or(&self.samples.leaf, |(_, name)| name)
     }
 
     /// Whether its rows are those of another channel.
@@ -119,7 +124,8 @@ impl<'s> ChannelSampling<'s> {
     /// instants of their own, which begin with the stamp of the row.
     fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
         let own = &self.samples.leaf;
-        if !matches!(*error.kind, ErrorKind::RowCount { .. }) || !self.table.is_listed(own) {
+        let is_other = matches!(*error.kind, ErrorKind::RowCount { .. }) && *own != other.samples.leaf;
+        if !is_other || !self.table.is_listed(own) {
             return Ok(false);
         }
         if self.time_column.is_some() || self.table.clock.column.is_some() {
@@ -142,22 +148,27 @@ impl<'s> ChannelSampling<'s> {
         Cow::Owned(ClockMapping { rate_hz: self.map.rate_hz.or(shared), ..self.table.clock.clone() })
     }
 
-    /// The clock of its rows, with their stamps where it is its own. That of a table's own rows is read once for all its
-    /// channels.
-    fn base_of(&self) -> Result<(TimeBase, Option<Timestamps>), Error> {
+    /// The same with the clock of its rows. That of a table's own rows is read once for all its channels.
+    pub(crate) fn with_clock(mut self) -> Result<Self, Error> {
         let of_table = self.time_column.is_none()
             && self.samples.rows.is_empty()
             && matches!(self.clock(), Cow::Borrowed(_))
             && !self.table.is_listed(&self.samples.leaf);
-        if let Some(known) = self.table.base.get().filter(|_| of_table) {
-            return Ok((known.clone(), None));
-        }
-        let (stamps, base) = self.read_base()?;
-        if !of_table {
-            return Ok((base, stamps));
-        }
-        buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
-        Ok((self.table.base.get_or_init(|| base).clone(), None))
+        let known = self.table.base.get().filter(|_| of_table);
+        self.base = if let Some(known) = known {
+            known.clone()
+        } else {
+            let (stamps, base) = self.read_base()?;
+            if of_table {
+                buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
+                self.table.base.get_or_init(|| base).clone()
+            } else {
+                self.stamps = stamps.map(|stamps| kept(&base, stamps).into()).unwrap_or_default();
+                base
+            }
+        };
+        self.every = self.rows_between();
+        Ok(self)
     }
 
     fn read_base(&self) -> Result<(Option<Timestamps>, TimeBase), Error> {
@@ -182,27 +193,34 @@ impl<'s> ChannelSampling<'s> {
         }
     }
 
-    /// The stamps of the rows that count, which are read where they are not `known`, and their instants, shifted to when the
-    /// channel was true.
-    fn instants(&self, known: Option<Timestamps>) -> Result<(Timestamps, Vec<f64>), Error> {
-        let stamps = if known.is_some() { known } else { self.read_base()?.0 };
+    /// The stamps of the rows that count.
+    fn stamps(&self) -> Result<&Timestamps, Error> {
+        if let Some(known) = self.stamps.get() {
+            return Ok(known);
+        }
         let even = || Timestamps::uniform(self.base.rows, self.base.step_s.recip());
-        let stamps = stamps.unwrap_or_else(even);
-        let mut instants = self.base.keep(stamps.seconds);
-        instants.iter_mut().for_each(|t| *t += self.map.shift_s());
-        Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
+        let stamps = self.read_base()?.0.unwrap_or_else(even);
+        Ok(self.stamps.get_or_init(|| kept(&self.base, stamps)))
     }
 
     /// The channel in SI at its own rows; those that are not wanted may be missing.
     fn readings(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
         let map = self.map;
+        if let Some(values) = &map.condition {
+            let read = if RawValue::has_text(values) {
+                self.table.matches(&self.samples, values)?
+            } else {
+                self.table.numbers(&self.samples, None, None)?.0
+            };
+            self.same_count(read.len(), self.column())?;
+            return Ok(self.base.keep(read).into());
+        }
         let mut si = to_si(self.column(), map, geometry).map_err(|f| self.table.error(f))?;
         if !map.ignore_metadata && self.table.layout.name_column.is_none() {
             let (scale, offset) = self.table.scale_and_offset(&self.samples.leaf, map)?;
             si = si.with_line(scale, offset);
         }
-        let is_text = !map.texts.is_empty();
-        let is_mended = is_text || !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
+        let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
             // Rows that were put in order are not those of the file.
             let wanted = if self.base.kept.is_none() { wanted } else { None };
@@ -211,11 +229,7 @@ impl<'s> ChannelSampling<'s> {
             let seen = seen.filter(|_| self.base.kept.is_none());
             return Ok(Channel { seen, ..self.base.keep(values).into() });
         }
-        let read = if is_text {
-            self.table.matches(&self.samples, &map.texts)?
-        } else {
-            self.table.numbers(&self.samples, None, None)?.0
-        };
+        let read = self.table.numbers(&self.samples, None, None)?.0;
         self.same_count(read.len(), self.column())?;
         let mut values = self.base.keep(read);
         if !map.missing.is_empty() {
@@ -246,64 +260,55 @@ impl<'s> ChannelSampling<'s> {
         Err(self.table.error(ErrorKind::RowCount { column, found, declared }))
     }
 
-    /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
-    pub(crate) fn own(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
-        if self.every == 1 {
-            return self.readings(geometry, wanted);
+    /// Reads the channel in SI at the instants of the motor position `master`, which may be the channel itself; those that
+    /// are not wanted may be missing.
+    pub(crate) fn follow(
+        mut self,
+        master: &ChannelSampling<'_>,
+        role: Role,
+        geometry: Geometry,
+        wanted: RowSelection<'_>,
+    ) -> Result<Channel, Error> {
+        let mut shared = self.shares_rows(master);
+        if shared {
+            self.base = master.base.clone();
+            self.every = self.rows_between();
+        } else {
+            self = self.with_clock()?;
         }
-        let read = self.readings(geometry, None)?;
-        let (_, instants) = self.instants(None)?;
-        let values = self.placed(&instants, &read.values, &instants, Interpolation::Line);
-        Ok(Channel { values, seen: None, ..read })
-    }
-
-    /// Its values, sampled at instants of its own, at others; where it is slower than its rows, its own samples count.
-    fn placed(&self, own_s: &[f64], values: &[f64], at_s: &[f64], between: Interpolation) -> Vec<f64> {
-        let rows = decimated_rows(values, self.every).into_iter();
-        let (own_s, values): (Vec<_>, Vec<_>) = rows.map(|i| (own_s[i as usize], values[i as usize])).unzip();
+        let is_slow_load = role == Role::Load && self.every > 1;
+        // A nanosecond is no shift.
+        let is_shifted = (self.map.shift_s() - master.map.shift_s()).abs() >= 1e-9;
+        let is_direct = shared && !is_shifted && (self.every == 1 || is_slow_load);
+        let read = match self.readings(geometry, wanted.filter(|_| is_direct)) {
+            Ok(read) if is_direct => return Ok(read),
+            Err(error) if shared && self.has_own_list(master, &error)? => {
+                shared = false;
+                self = self.with_clock()?;
+                self.readings(geometry, None)?
+            }
+            read => read?,
+        };
+        let lead = master.stamps()?;
+        let stamps = if shared { lead } else { self.stamps()? };
+        let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
+            let (column, other) = (stamps.column.clone(), lead.column.clone());
+            self.table.error(ErrorKind::ClocksDiffer { column, other })
+        })?;
+        let at_s: Vec<f64> = lead.seconds.iter().map(|t| t + master.map.shift_s() + apart_s).collect();
+        // Where it is slower than its rows, its own samples count.
+        let rows = decimated_rows(&read.values, self.every).into_iter().map(|row| row as usize);
+        let own = rows.map(|row| (stamps.seconds[row] + self.map.shift_s(), read.values[row]));
+        let (own_s, values): (Vec<_>, Vec<_>) = own.unzip();
         let step_s = self.base.step_s * self.every as f64;
-        interpolate_at(TimeSeries { at_s: &own_s, values: &values, step_s }, at_s, between)
+        let is_slow = step_s > BREAK_STEPS * master.base.step_s;
+        let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
+        let series = TimeSeries { at_s: &own_s, values: &values, step_s };
+        Ok(Channel { turn_m: read.turn_m, ..interpolate_at(series, &at_s, between).into() })
     }
 }
 
-/// Reads a channel, whose clock is not read yet, in SI at the instants of the motor position `master`; those that are not
-/// wanted may be missing.
-pub(crate) fn follow(
-    master: &ChannelSampling<'_>,
-    mut own: ChannelSampling<'_>,
-    role: Role,
-    geometry: Geometry,
-    wanted: RowSelection<'_>,
-) -> Result<Channel, Error> {
-    let shared = own.shares_rows(master);
-    let mut stamps = None;
-    if shared {
-        own.base = master.base.clone();
-    } else {
-        (own.base, stamps) = own.base_of()?;
-    }
-    own.every = own.rows_between();
-    let is_slow_load = role == Role::Load && own.every > 1;
-    // A nanosecond is no shift.
-    let is_shifted = (own.map.shift_s() - master.map.shift_s()).abs() >= 1e-9;
-    let is_direct = shared && !is_shifted && (own.every == 1 || is_slow_load);
-    let read = own.readings(geometry, if is_direct { wanted } else { None });
-    let Channel { values, turn_m, .. } = match read {
-        Ok(read) if is_direct => return Ok(read),
-        Err(error) if shared && own.has_own_list(master, &error)? => {
-            (own.base, stamps) = own.base_of()?;
-            own.readings(geometry, None)?
-        }
-        read => read?,
-    };
-    let (stamps, own_s) = own.instants(stamps)?;
-    let (lead, mut at_s) = master.instants(None)?;
-    let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
-        own.table.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
-    })?;
-    at_s.iter_mut().for_each(|t| *t += apart_s);
-    let is_slow = own.base.step_s * own.every as f64 > BREAK_STEPS * master.base.step_s;
-    let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
-    let values = own.placed(&own_s, &values, &at_s, between);
-    Ok(Channel { turn_m, ..values.into() })
+/// The stamps of the rows that count.
+fn kept(base: &TimeBase, stamps: Timestamps) -> Timestamps {
+    Timestamps { seconds: base.keep(stamps.seconds), ..stamps }
 }

@@ -13,7 +13,7 @@ use crate::channel::stats::span;
 use crate::error::{Error, ErrorKind};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
-use crate::log::channel_reader::{self, Channel, ChannelSampling};
+use crate::log::channel_reader::{Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
 use crate::log::normalized;
@@ -303,22 +303,23 @@ impl Log {
                 self.table_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
                 lacking.push(name.clone());
             }
-            *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));
+            *slot = first.map(|own| own.column().to_owned()).or((role != Role::Temperature).then_some(name));
         }
         Ok(ActuatorColumns { position, columns, lacking })
     }
 
-    /// A channel and its alternatives, as far as the log has them, with their names here.
+    /// A channel and its alternatives, as far as the log has them.
     fn present<'c>(
-        &self,
+        &'c self,
         map: &'c ChannelMapping,
         position: &Position,
-    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+    ) -> Result<Vec<ChannelSampling<'c>>, Error> {
         let mut found = Vec::new();
         for choice in map.choices() {
-            let name = column_at(&choice.column, position);
-            if self.names_for(choice)?.contains(&name) {
-                found.push((choice, name));
+            let Some(table) = self.table(choice) else { continue };
+            let own = ChannelSampling::new(table, choice, position.as_str());
+            if table.names()?.contains(own.column()) {
+                found.push(own);
             }
         }
         Ok(found)
@@ -327,9 +328,10 @@ impl Log {
     /// The leaves that these actuators need, table by table.
     fn leaves(&self, used: &[(&Channels, &ActuatorColumns)]) -> Vec<(&RowTable, BTreeSet<String>)> {
         let mut found: Vec<_> = self.tables.values().map(|table| (table, BTreeSet::new())).collect();
-        self.each_use(used, |table, _, samples| {
-            let of_table = found.iter_mut().find(|(other, _)| std::ptr::eq(*other, table));
-            of_table.into_iter().for_each(|(_, leaves)| leaves.extend(table.leaves_of(samples)));
+        self.each_use(used, |own, _| {
+            for (_, leaves) in found.iter_mut().filter(|(table, _)| std::ptr::eq(*table, own.table)) {
+                leaves.extend(own.selectors().flat_map(|samples| own.table.leaves_of(&samples)));
+            }
         });
         found
     }
@@ -337,30 +339,27 @@ impl Log {
     /// Announces the samples of actuators that will be read. Where rows belong to actuators or channels, one pass
     /// over the files then gathers the rows of all of them.
     pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) {
-        self.each_use(used, |table, position, samples| table.announce(samples, position));
+        self.each_use(used, |own, position| {
+            // No row group has rows of a channel that the log lacks.
+            if own.table.names().is_ok_and(|names| names.contains(own.column())) {
+                own.selectors().for_each(|samples| own.table.announce(&samples, position));
+            }
+        });
     }
 
-    /// Hands over the samples that these actuators need, with their table and their position.
+    /// Hands over the channels and conditions of these actuators, each with its position.
     fn each_use(
         &self,
         used: &[(&Channels, &ActuatorColumns)],
-        mut take: impl FnMut(&RowTable, &str, &SampleSelector),
+        mut take: impl FnMut(&ChannelSampling<'_>, &str),
     ) {
         for (channels, at) in used {
-            let position = at.position.as_str();
-            let named = |column: &String| column_at(column, &at.position);
             let conditions: Vec<ChannelMapping> = channels.when.iter().map(ChannelMapping::from).collect();
             let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
             for map in maps.flat_map(ChannelMapping::choices).chain(&conditions) {
-                let Some(table) = self.table(map) else { continue };
-                let samples = table.samples(&named(&map.column), position);
-                take(table, position, &samples);
-                if let Some(valid) = &map.valid_column {
-                    take(table, position, &table.samples(&named(valid), position));
-                }
-                // The channel's own stamps lie in the rows of the channel.
-                if let Some(time) = &map.time_column {
-                    take(table, position, &SampleSelector { leaf: named(time), ..samples });
+                if let Some(table) = self.table(map) {
+                    let position = at.position.as_str();
+                    take(&ChannelSampling::new(table, map, position), position);
                 }
             }
         }
@@ -423,89 +422,68 @@ struct ActuatorReader<'c> {
 
 impl<'c> ActuatorReader<'c> {
     fn read(self) -> Result<ActuatorChannels, Error> {
-        let (motor, (master, selection)) = self.motor()?;
-        let output_locked = self.channels.output.is_locked();
-        let screw = if output_locked {
-            selection.cut(vec![0.0; motor.values.len()].into())
-        } else {
-            self.follower(Role::Screw, &master, &selection)?
-        };
-        let load = self.follower(Role::Load, &master, &selection)?;
-        // The mean of the flight, whatever counts of it.
-        let whole = SampleSelection::whole(&master.base);
-        let temperature = self.channels.temperature.as_ref();
-        let temperature = temperature.and_then(|_| self.follower(Role::Temperature, &master, &whole).ok());
-        let temperature_c = temperature.and_then(|read| mean(&read.values));
-        let is_relative = self.channels.is_relative();
-        let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
-        Ok(assemble(self.at.position.clone(), read, &master.base, temperature_c))
-    }
-
-    /// The motor position, and its sampling and selected samples, which all other channels follow.
-    fn motor(self) -> Result<(Channel, (ChannelSampling<'c>, SampleSelection)), Error> {
-        let read = |map: &'c ChannelMapping, name: &str| {
-            let master = self.sampling(map, name)?.with_clock()?;
+        let geometry = self.geometry;
+        let (motor, (master, selection)) = self.first_alive(Role::Motor, |own| {
+            let master = own.with_clock()?;
             if !self.channels.when.is_empty() {
                 // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
                 master.check_rows()?;
             }
             let selection = self.selected(&master)?;
-            Ok((selection.cut(master.own(self.geometry, selection.wanted())?), (master, selection)))
-        };
-        let (channel, (master, selection)) = self.first_alive(Role::Motor, read)?;
+            let read = master.clone().follow(&master, Role::Motor, geometry, selection.wanted())?;
+            Ok((selection.cut(read), (master, selection)))
+        })?;
         self.check_one_flight(&master)?;
-        Ok((channel, (master, selection)))
-    }
-
-    /// A channel on the motor's clock.
-    fn follower(
-        self,
-        role: Role,
-        master: &ChannelSampling<'_>,
-        selection: &SampleSelection,
-    ) -> Result<Channel, Error> {
-        let read = |map: &'c ChannelMapping, name: &str| {
-            let own = self.sampling(map, name)?;
-            let read = channel_reader::follow(master, own, role, self.geometry, selection.wanted())?;
-            Ok((selection.cut(read), ()))
+        let follower = |role: Role, selection: &SampleSelection| {
+            self.first_alive(role, |own| {
+                own.follow(&master, role, geometry, selection.wanted()).map(|read| (selection.cut(read), ()))
+            })
         };
-        self.first_alive(role, read).map(|(channel, ())| channel)
-    }
-
-    fn sampling<'m>(self, map: &'m ChannelMapping, name: &str) -> Result<ChannelSampling<'m>, Error>
-    where
-        'c: 'm,
-    {
-        Ok(ChannelSampling::new(self.log.table_of(map)?, map, name, self.at.position.as_str()))
+        let output_locked = self.channels.output.is_locked();
+        let screw = if output_locked {
+            selection.cut(vec![0.0; motor.values.len()].into())
+        } else {
+            follower(Role::Screw, &selection)?.0
+        };
+        let load = follower(Role::Load, &selection)?.0;
+        // The mean of the flight, whatever counts of it.
+        let whole = SampleSelection::whole(&master.base);
+        let temperature = self.channels.temperature.as_ref();
+        let temperature = temperature.and_then(|_| follower(Role::Temperature, &whole).ok());
+        let temperature_c = temperature.and_then(|(read, ())| mean(&read.values));
+        let is_relative = self.channels.is_relative();
+        let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
+        Ok(assemble(self.at.position.clone(), read, &master.base, temperature_c))
     }
 
     /// Reads redundant channels until one is alive, and returns it as `read` gave it; the first channel where none is alive.
     fn first_alive<T>(
         self,
         role: Role,
-        read: impl Fn(&'c ChannelMapping, &str) -> Result<(Channel, T), Error>,
+        read: impl Fn(ChannelSampling<'c>) -> Result<(Channel, T), Error>,
     ) -> Result<(Channel, T), Error> {
         let map = self.channels.of(role).unwrap_or(&self.channels.motor_position);
         let choices = self.log.present(map, &self.at.position)?;
-        let mut found = None;
-        for (k, (map, name)) in choices.iter().enumerate() {
-            let (mut channel, rest) = read(map, name)?;
-            let is_alive = choices.len() == 1 || channel.is_alive();
+        let (count, mut found) = (choices.len(), None);
+        for (k, own) in choices.into_iter().enumerate() {
+            let name = own.column().to_owned();
+            let (mut channel, rest) = read(own)?;
+            let is_alive = count == 1 || channel.is_alive();
             if is_alive || found.is_none() {
-                (channel.column, channel.is_alternative) = (Some(name.clone()), k > 0);
-                found = Some((channel, rest, name));
+                (channel.column, channel.is_alternative) = (Some(name), k > 0);
+                found = Some((channel, rest));
             }
             if is_alive {
                 break;
             }
         }
-        let Some((channel, rest, name)) = found else {
+        let Some((channel, rest)) = found else {
             let name = column_at(&map.column, &self.at.position);
             return Err(self.log.table(map).unwrap_or(self.log.main()).lacks(&name));
         };
         let counted = channel.values.len() - channel.excluded;
         if (counted > 0 || channel.excluded == 0) && !channel.values.iter().any(|v| v.is_finite()) {
-            let (column, rows) = (name.clone(), counted as u64);
+            let (column, rows) = (channel.column.unwrap_or_default(), counted as u64);
             return Err(self.log.main().error(ErrorKind::AllMissing { column, rows }));
         }
         Ok((channel, rest))
@@ -518,15 +496,12 @@ impl<'c> ActuatorReader<'c> {
             return Ok(SampleSelection::whole(base));
         }
         let maps: Vec<ChannelMapping> = filters.iter().map(ChannelMapping::from).collect();
-        let mut conditions = Vec::with_capacity(maps.len());
-        for map in &maps {
-            let name = column_at(&map.column, &self.at.position);
-            let own = self.sampling(map, &name)?;
-            if !self.log.names_for(map)?.contains(&name) {
-                return Err(own.table.lacks(&name));
-            }
-            conditions.push(own);
-        }
+        let sampled = |map| {
+            let table = self.log.table_of(map)?;
+            let own = ChannelSampling::new(table, map, self.at.position.as_str());
+            if table.names()?.contains(own.column()) { Ok(own) } else { Err(table.lacks(own.column())) }
+        };
+        let conditions = maps.iter().map(sampled).collect::<Result<Vec<_>, _>>()?;
         let samples: Vec<_> = conditions.iter().map(|own| (&own.samples, &own.time_column)).collect();
         let key = format!("{:?}", (filters, samples, master.clock_key()));
         let mut before = self.log.selected.lock().unwrap_or_else(PoisonError::into_inner);
@@ -536,8 +511,7 @@ impl<'c> ActuatorReader<'c> {
         let mut segments = base.segments.clone();
         for (filter, own) in filters.iter().zip(conditions) {
             // A state stands until the next one comes, as a slow load does.
-            let read = channel_reader::follow(master, own, Role::Load, self.geometry, None)?;
-            let mut values = read.values;
+            let mut values = own.follow(master, Role::Load, self.geometry, None)?.values;
             zero_order_hold(&mut values, &base.segments, base.step_s);
             segments = filter.within(&values, &segments, base.step_s);
         }

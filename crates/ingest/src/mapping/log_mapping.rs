@@ -351,9 +351,9 @@ pub struct ChannelMapping {
     /// Redundant channels, best first, for logs in which this one is not usable.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ChannelMapping>,
-    /// Values for which the channel is 1, and 0 for every other; of a condition on a column of texts.
+    /// The raw values that a condition asks for, if the column is that of a condition: it is read as it is logged.
     #[serde(skip)]
-    pub texts: Vec<RawValue>,
+    pub condition: Option<Vec<RawValue>>,
 }
 
 impl ChannelMapping {
@@ -375,16 +375,14 @@ impl ChannelMapping {
 }
 
 impl From<&SampleFilter> for ChannelMapping {
-    /// The filter's column, read raw: no unit is applied.
+    /// The column of a condition.
     fn from(filter: &SampleFilter) -> Self {
         Self {
             column: filter.column.clone(),
-            unit: Unit::Celsius,
             group: filter.group.clone(),
             time_column: filter.time_column.clone(),
             rate_hz: filter.rate_hz,
-            texts: if filter.is_on_text() { filter.equals.clone() } else { Vec::new() },
-            ignore_metadata: true,
+            condition: Some(filter.equals.clone()),
             ..Self::default()
         }
     }

@@ -39,7 +39,7 @@ impl RawValue {
     }
 
     /// Whether any of these values is a text: the column is then read as text.
-    fn has_text(values: &[Self]) -> bool {
+    pub(crate) fn has_text(values: &[Self]) -> bool {
         values.iter().any(|value| matches!(value, Self::Text(_)))
     }
 
@@ -79,16 +79,11 @@ impl SampleFilter {
         !self.equals.is_empty() || self.at_least.is_some() || self.at_most.is_some()
     }
 
-    /// Whether the column is read as text.
-    pub(crate) fn is_on_text(&self) -> bool {
-        RawValue::has_text(&self.equals)
-    }
-
     /// Whether a raw value will do. A missing one does not.
     fn holds(&self, value: f64) -> bool {
         // A column of texts is read as 1 where it holds one of them.
         let one_of = self.equals.is_empty()
-            || if self.is_on_text() {
+            || if RawValue::has_text(&self.equals) {
                 value > 0.5
             } else {
                 self.equals.iter().any(|wanted| wanted.is(value))
