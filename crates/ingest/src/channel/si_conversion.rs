@@ -24,12 +24,6 @@ pub enum Geometry {
 impl Geometry {
     /// Metres at the screw axis per radian, where it is known: r/2π of X₁ = θ·r/2π (the paper, section 2), or the radius of
     /// a rotary part.
-    ///
-    /// ```
-    /// let screw = ingest::Geometry::Linear { lead_m_per_rev: Some(0.005) };
-    /// let quarter_turn_m = screw.metres_per_radian().map(|m| m * std::f64::consts::FRAC_PI_2);
-    /// assert!(quarter_turn_m.is_some_and(|m| (m - 0.00125).abs() < 1e-15));
-    /// ```
     pub(crate) fn metres_per_radian(self) -> Option<f64> {
         match self {
             Self::Linear { lead_m_per_rev } => lead_m_per_rev.map(|lead| lead / std::f64::consts::TAU),

@@ -36,10 +36,8 @@ pub struct InferredMapping {
     pub clock: Option<(String, Option<&'static str>)>,
     /// What the time column counts from, in its unit.
     pub epoch: Epoch,
-    /// Channel → its column with `{position}` in it, and its unit where the name holds one.
-    pub channels: BTreeMap<Role, (String, Option<Unit>)>,
-    /// Redundant columns of a channel, best first.
-    pub alternatives: BTreeMap<Role, Vec<(String, Option<Unit>)>>,
+    /// Channel → its columns with `{position}` in them, best first, each with its unit where the log names it.
+    pub channels: BTreeMap<Role, Vec<(String, Option<Unit>)>>,
     /// The value at which the motor position starts again.
     pub motor_wraps_at: Option<f64>,
     /// How the rows are laid out.
@@ -58,6 +56,13 @@ pub struct InferredMapping {
     pub tails: BTreeSet<String>,
     /// Columns that hold numbers and were not understood.
     pub others: Vec<String>,
+}
+
+impl InferredMapping {
+    /// The best column of a channel, and its unit where the log names it.
+    pub fn channel(&self, role: Role) -> Option<&(String, Option<Unit>)> {
+        self.channels.get(&role)?.first()
+    }
 }
 
 /// Names of columns that name the channel of a row, and words in the names of those that hold its value.
@@ -122,8 +127,11 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let has_own_position = layout.position_column.is_some() || columns.contains_key(&IdentityField::Position);
     if has_own_position {
         let only = found.positions.iter().next().cloned().unwrap_or_default();
-        let patterns = found.channels.values_mut().chain(found.alternatives.values_mut().flatten());
-        patterns.for_each(|(pattern, _)| *pattern = pattern.replace(PLACEHOLDER, &only));
+        for columns in found.channels.values_mut() {
+            let mut known = BTreeSet::new();
+            columns.iter_mut().for_each(|(pattern, _)| *pattern = pattern.replace(PLACEHOLDER, &only));
+            columns.retain(|(pattern, _)| known.insert(pattern.clone()));
+        }
     }
     let others = names.iter().filter(|name| !guesses.iter().any(|guess| guess == *name));
     found.others = others.map(|name| (*name).to_owned()).collect();
@@ -134,7 +142,7 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     }
     let first = found.positions.iter().next().map_or("", String::as_str);
     let units = units_by_name(&table, &layout)?;
-    for (pattern, unit) in found.channels.values_mut().filter(|(_, unit)| unit.is_none()) {
+    for (pattern, unit) in found.channels.values_mut().flatten().filter(|(_, unit)| unit.is_none()) {
         let name = pattern.replace(PLACEHOLDER, first);
         *unit = units.get(&name).copied().flatten().or_else(|| file.field_metadata(&name).unit);
     }
@@ -299,8 +307,7 @@ fn channels(names: &[&str], root: &str) -> (InferredMapping, BTreeSet<String>) {
     share_positions(&mut guesses);
     let found = choose(guesses.iter().map(|(_, guess)| guess));
     let is_chosen = |guess: &ParsedName| {
-        let all = found.channels.values().chain(found.alternatives.values().flatten());
-        all.into_iter().any(|(pattern, _)| *pattern == guess.pattern)
+        found.channels.values().flatten().any(|(pattern, _)| *pattern == guess.pattern)
             && guess.position.as_ref().is_none_or(|position| found.positions.contains(position))
     };
     let understood =
@@ -354,20 +361,17 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
             of_role.map(|((_, name), pattern)| (*name, pattern)).collect();
         ranked.sort_by_key(|(_, (places, _, sensor))| (std::cmp::Reverse(places.len()), *sensor));
         let Some((name, (places, unit, sensor))) = ranked.first().copied() else { continue };
-        found.channels.insert(role, (name.to_owned(), *unit));
+        let mut columns = vec![(name.to_owned(), *unit)];
         let is_redundant = |other: &Pattern<'_>| sensor.is_some() && other.2.is_some() && other.0 == *places;
         let mut covered = places.clone();
-        let mut others = Vec::new();
         for (name, other) in ranked.iter().skip(1) {
             let is_of_others = other.0.is_disjoint(&covered) && !other.0.is_disjoint(&shared);
             if is_of_others || is_redundant(other) {
                 covered.extend(&other.0);
-                others.push(((*name).to_owned(), other.1));
+                columns.push(((*name).to_owned(), other.1));
             }
         }
-        if !others.is_empty() {
-            found.alternatives.insert(role, others);
-        }
+        found.channels.insert(role, columns);
     }
     found.positions = shared.into_iter().map(str::to_owned).collect();
     found
@@ -375,7 +379,7 @@ fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping 
 
 /// The value at which the first motor position starts again: it leaps by more than half a turn within one turn.
 fn wraps_at(table: &RowTable, found: &InferredMapping) -> Option<f64> {
-    let (pattern, unit) = found.channels.get(&Role::Motor)?;
+    let (pattern, unit) = found.channel(Role::Motor)?;
     let turn = match unit {
         Some(Unit::Degree) | None => 360.0,
         Some(Unit::Radian) => std::f64::consts::TAU,
@@ -401,7 +405,10 @@ mod tests {
         let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
         let found = propose(&log).unwrap();
         assert_eq!(found.clock, Some(("time_s".to_owned(), Some("s"))));
-        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
+        assert_eq!(
+            found.channels[&Role::Screw],
+            [("{position}_screw_mm".to_owned(), Some(Unit::Millimetre))]
+        );
         let positions: Vec<&str> = found.positions.iter().map(String::as_str).collect();
         assert_eq!(positions, ["aileron_left", "aileron_right", "elevator_left", "elevator_right"]);
         assert_eq!((found.metadata.len(), found.others.len()), (5, 0));
@@ -423,23 +430,22 @@ mod tests {
     #[test]
     fn redundant_sensors_are_alternatives_and_numbered_actuators_are_positions() {
         let found = of(&["ail_l_motor_a_deg", "ail_l_motor_b_deg", "ail_l_screw_mm", "ail_l_load_n"]);
-        assert_eq!(found.channels[&Role::Motor].0, "{position}_motor_a_deg");
-        assert_eq!(found.alternatives[&Role::Motor][0].0, "{position}_motor_b_deg");
+        let motors: Vec<&str> = found.channels[&Role::Motor].iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(motors, ["{position}_motor_a_deg", "{position}_motor_b_deg"]);
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
         let found = of(&["ail_l.motor_angle", "ail_l.screw_pos", "ail_l.hinge_load", "ail_lh.load"]);
-        assert_eq!(found.channels[&Role::Load].0, "{position}.hinge_load");
+        assert_eq!(found.channels[&Role::Load][0].0, "{position}.hinge_load");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
         // The elevator's screw is measured otherwise, and nothing but a load is known of the spoiler.
         let names =
             ["ail_motor_deg", "ail_screw_mm", "ail_load_n", "elv_motor_deg", "elv_screw_um", "elv_load_n"];
         let found = of(&[&names[..], &["spoiler_load_kn"]].concat());
-        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
-        let other = ("{position}_screw_um".to_owned(), Some(Unit::Micrometre));
-        assert_eq!(found.alternatives, [(Role::Screw, vec![other])].into());
+        let screws = [("{position}_screw_mm", Unit::Millimetre), ("{position}_screw_um", Unit::Micrometre)];
+        assert_eq!(found.channels[&Role::Screw], screws.map(|(name, unit)| (name.to_owned(), Some(unit))));
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail", "elv"]);
         let numbers = ["motor_1_deg", "motor_2_deg", "screw_1_mm", "screw_2_mm", "load_1_n", "load_2_n"];
         let found = of(&numbers);
-        assert_eq!(found.channels[&Role::Load].0, "load_{position}_n");
+        assert_eq!(found.channels[&Role::Load][0].0, "load_{position}_n");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["1", "2"]);
     }
 
@@ -458,7 +464,7 @@ mod tests {
         assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
         let Layout { value_column, position_column, .. } = found.layout;
         assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
-        assert_eq!(found.channels[&Role::Load], ("{position}/load".to_owned(), Some(Unit::Newton)));
+        assert_eq!(found.channels[&Role::Load], [("{position}/load".to_owned(), Some(Unit::Newton))]);
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
         let epochs =
             [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true), (46_345.0, "d", false)]
@@ -500,7 +506,10 @@ mod tests {
         let found = proposed(&columns);
         assert_eq!(found.clock, Some(("stamp_ms".to_owned(), Some("ms"))));
         assert_eq!(found.layout.name_column.as_deref(), Some("parameter"));
-        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
+        assert_eq!(
+            found.channels[&Role::Screw],
+            [("{position}_screw_mm".to_owned(), Some(Unit::Millimetre))]
+        );
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
         let facts: Vec<&str> = found.columns.values().map(String::as_str).collect();
         assert_eq!((facts, found.by_row), (vec!["tail_number", "flight_id", "departure_utc"], false));

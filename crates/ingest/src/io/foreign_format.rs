@@ -45,21 +45,3 @@ fn text_format(head: &[u8]) -> Option<&'static str> {
         _ => Some("a text file"),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn files_of_other_tools_are_named() {
-        let cases: [(&[u8], &str); 3] = [
-            (b"\xef\xbb\xbfZeit;Winkel\r\n0,0;1,0\r\n", "a CSV file"),
-            (b"MDF     4.10    asammdf ", "an MDF file (ASAM)"),
-            (b"{\"a\": 1}", "a JSON file"),
-        ];
-        for (head, format) in cases {
-            assert_eq!(of(head), Some(format));
-        }
-        assert_eq!((of(&[0; 64]), of(b"")), (None, None));
-    }
-}

@@ -150,11 +150,10 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields,
     let Some(groups) = regex.captures(&text) else { return Ok(IdentityFields::new()) };
     let named = |fact: &IdentityField| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
     let mut facts: IdentityFields = IdentityField::ALL.iter().filter_map(named).collect();
-    if let (Some(date), Some(time)) = (groups.name("departure_date"), groups.name("departure_time")) {
-        let departure = format!("{}T{}", date.as_str(), time.as_str());
+    if let Some(date) = groups.name("departure_date") {
+        let time = groups.name("departure_time").map(|time| format!("T{}", time.as_str()));
+        let departure = [date.as_str(), &time.unwrap_or_default()].concat();
         facts.entry(IdentityField::DepartureUtc).or_insert(departure);
-    } else if let Some(date) = groups.name("departure_date") {
-        facts.entry(IdentityField::DepartureUtc).or_insert_with(|| date.as_str().to_owned());
     }
     Ok(facts)
 }

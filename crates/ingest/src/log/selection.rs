@@ -17,7 +17,7 @@ pub(crate) struct SampleSelection {
 impl SampleSelection {
     /// All that is unbroken.
     pub(crate) fn whole(base: &TimeBase) -> Self {
-        Self { segments: base.segments.clone(), excluded: 0 }
+        Self::of(base.segments.clone(), base)
     }
 
     pub(crate) fn of(segments: Vec<Range<usize>>, base: &TimeBase) -> Self {

@@ -10,7 +10,7 @@ use std::sync::{Arc, OnceLock};
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
-use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
@@ -246,9 +246,10 @@ impl LogFile {
         self.want(&leaves, wanted.iter().copied())?;
         for group in wanted {
             let mut scan = scan;
-            for leaf in &leaves {
-                let pages = self.pages(group, leaf)?;
-                scan.batch_rows = page_reader::batch_rows(self.chunk(group, leaf), &pages, scan.batch_rows);
+            let has_shared_beginnings =
+                |leaf: &&&LeafColumn| page_reader::has_shared_beginnings(self.chunk(group, leaf));
+            for leaf in leaves.iter().filter(has_shared_beginnings) {
+                scan.batch_rows = page_reader::batch_rows(&self.pages(group, leaf)?, scan.batch_rows);
             }
             self.each_batch(group, &leaves, scan, |columns| {
                 take(names, columns.iter().map(leaf_columns::flatten).collect())
@@ -293,8 +294,9 @@ impl LogFile {
                 into.append_nulls(declared);
                 continue;
             }
-            let (pages, chunk) = (self.pages(group, leaf)?, self.chunk(group, leaf));
+            let chunk = self.chunk(group, leaf);
             if column_numbers::is_plain(chunk) {
+                let pages = self.pages(group, leaf)?;
                 let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
                 column_numbers::append(pages, chunk, wanted, into)
                     .map_err(|detail| self.decode(leaf, group, detail))?;
@@ -357,16 +359,11 @@ impl LogFile {
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let coded = || self.coded.get_or_init(|| with_codes(&self.footer, |_| true).ok()).as_ref();
         let footer = is_coded.then(coded).flatten().unwrap_or(&self.footer);
-        let schema = footer.parquet_schema();
-        let mask = ProjectionMask::leaves(schema, [leaf.index]);
-        let hint = is_coded.then(|| footer.schema().fields());
+        let mask = ProjectionMask::leaves(footer.parquet_schema(), [leaf.index]);
+        let kinds = is_coded.then(|| footer.schema().fields());
         let (file, groups) = (Arc::clone(&self.source.file), vec![group]);
         let groups = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: scan.batch_rows };
-        parquet_to_arrow_field_levels(schema, mask, hint)
-            .and_then(|levels| {
-                ParquetRecordBatchReader::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
-            })
-            .map_err(|e| self.decode(leaf, group, e.to_string()))
+        groups.reader(mask, kinds).map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
     /// Whether a chunk is a text column outside of structs, with dictionary codes as values.

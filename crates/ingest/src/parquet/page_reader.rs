@@ -7,10 +7,12 @@ use std::io::Read;
 use std::sync::Arc;
 use std::vec;
 
+use arrow::datatypes::Fields;
 use bytes::Bytes;
 use flate2::read::MultiGzDecoder;
 use lz4_flex::{block, frame};
-use parquet::arrow::arrow_reader::RowGroups;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowGroups};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
 use parquet::basic::{Compression, Encoding, EncodingMask, Type};
 use parquet::column::page::{Page, PageIterator, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
@@ -45,6 +47,17 @@ pub(crate) struct BoundedGroups<'m> {
 }
 
 impl<'m> BoundedGroups<'m> {
+    /// Reads the leaves of a mask, each as `kinds` has it, where it has kinds for all columns of the file.
+    pub(crate) fn reader(
+        &self,
+        mask: ProjectionMask,
+        kinds: Option<&Fields>,
+    ) -> Result<ParquetRecordBatchReader> {
+        let schema = self.metadata.file_metadata().schema_descr();
+        let levels = parquet_to_arrow_field_levels(schema, mask, kinds)?;
+        ParquetRecordBatchReader::try_new_with_row_groups(&levels, self, self.batch_rows, None)
+    }
+
     fn chosen(&self) -> impl Iterator<Item = &'m RowGroupMetaData> {
         self.groups.iter().map(|group| self.metadata.row_group(*group))
     }
@@ -244,11 +257,13 @@ impl Pages {
     }
 }
 
-/// Rows of a batch of a column of which these are the pages. Texts that share beginnings may each be as long as a page.
-pub(crate) fn batch_rows(chunk: &ColumnChunkMetaData, pages: &[RawPage], usual: usize) -> usize {
-    if !chunk.encodings().any(|encoding| encoding == Encoding::DELTA_BYTE_ARRAY) {
-        return usual;
-    }
+/// Whether texts of a chunk share their beginnings: each may be as long as a page.
+pub(crate) fn has_shared_beginnings(chunk: &ColumnChunkMetaData) -> bool {
+    chunk.encodings().any(|encoding| encoding == Encoding::DELTA_BYTE_ARRAY)
+}
+
+/// Rows of a batch of texts that may each be as long as one of these pages.
+pub(crate) fn batch_rows(pages: &[RawPage], usual: usize) -> usize {
     let largest = pages.iter().map(|page| page.header.uncompressed_page_size).max().unwrap_or(0);
     let fitting = BATCH_TEXT_BYTES / usize::try_from(largest).unwrap_or(0).max(1);
     fitting.clamp(LEAST_BATCH, usual.max(LEAST_BATCH))

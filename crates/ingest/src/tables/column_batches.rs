@@ -18,8 +18,8 @@ use arrow::csv::ReaderBuilder;
 use arrow::csv::reader::Format;
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
 use jiff::Timestamp;
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
-use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
 use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, ErrorKind};
@@ -265,12 +265,7 @@ fn groups(
     let groups = groups.start..groups.end.min(some.len());
     let (file, groups) = (Arc::clone(file), groups.collect());
     let rows = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: ROWS };
-    let mut reader = caught(|| {
-        let hint = Some(footer.schema().fields());
-        let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;
-        ParquetRecordBatchReader::try_new_with_row_groups(&levels, &rows, ROWS, None)
-    })
-    .map_err(not_parquet)?;
+    let mut reader = caught(|| rows.reader(mask, Some(footer.schema().fields()))).map_err(not_parquet)?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);
     let batch = move || caught(|| reader.next().transpose()).map_err(not_parquet).transpose();
     let batches = Box::new(std::iter::from_fn(batch));

@@ -26,9 +26,18 @@ fn code(result: Result<Log, Error>) -> String {
 fn files_that_are_no_logs_are_distinguished() {
     let (dir, file) = place("hdf.parquet");
     let open = |file: &Path| Log::open(&LogFiles::one(file), &Arc::new(plain()));
-    std::fs::write(&file, b"\x89HDF\r\n\x1a\n").unwrap();
-    let foreign = open(&file).unwrap_err().diagnostic();
-    assert!(foreign.message.contains("HDF5") && foreign.hint.unwrap().contains("docs/convert-logs.md"));
+    let others: [(&[u8], &str); 5] = [
+        (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+        (b"\xef\xbb\xbfZeit;Winkel\r\n0,0;1,0\r\n", "a CSV file"),
+        (b"MDF     4.10    asammdf ", "an MDF file (ASAM)"),
+        (b"{\"a\": 1}", "a JSON file"),
+        (&[0; 64], "not a Parquet file"),
+    ];
+    for (bytes, format) in others {
+        std::fs::write(&file, bytes).unwrap();
+        let foreign = open(&file).unwrap_err().diagnostic();
+        assert!(foreign.message.contains(format) && foreign.code == "not_parquet", "{foreign}");
+    }
     write(&file, &[("t", reals([]))]);
     assert_eq!(code(open(&file)), "empty_log");
     std::fs::write(&file, b"PARE\x00\x00\x00\x00PARE").unwrap();

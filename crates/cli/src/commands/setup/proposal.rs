@@ -233,9 +233,8 @@ impl Proposal {
             return;
         }
         for (role, own) in &variant.offer.channels {
-            if main.offer.channels.get(role) != Some(own) {
-                main.offer.alternatives.entry(*role).or_default().push(own.clone());
-            }
+            let known = main.offer.channels.entry(*role).or_default();
+            known.extend(own.first().filter(|column| !known.contains(column)).cloned());
         }
         main.add(variant);
     }
@@ -304,7 +303,7 @@ impl Proposal {
 
     /// Placeholders of a part, without limits: a run refuses them.
     fn part(&self, of_template: &str) -> String {
-        let dimension = |role: Role| Some(self.main.offer.channels.get(&role)?.1?.dimension());
+        let dimension = |role: Role| Some(self.main.offer.channel(role)?.1?.dimension());
         let is_rotary = dimension(Role::Load) == Some(Dimension::Torque)
             && dimension(Role::Screw) == Some(Dimension::Angle);
         let (_, linear) = of_template.split_once("[part.\"EMA-27-1040\"]").unwrap_or(("", of_template));
@@ -324,9 +323,8 @@ impl Proposal {
         let mut text =
             format!("# {}.\n[[override]]\ntails = [{}]\n", self.seen_in(variant), tails.join(", "));
         let (own, usual) = (&variant.offer, &self.main.offer);
-        let differs = |role: &Role| {
-            own.channels.contains_key(role) && own.channels.get(role) != usual.channels.get(role)
-        };
+        let differs =
+            |role: &Role| own.channels.contains_key(role) && own.channel(*role) != usual.channel(*role);
         for (role, name) in CHANNELS.iter().filter(|(role, _)| differs(role)) {
             let _ = write!(text, "[override.channel.{name}]\n{}", self.channel(variant, *role));
         }
@@ -392,7 +390,7 @@ impl Proposal {
     fn channel(&self, variant: &Variant, role: Role) -> String {
         let (offer, usual) = (&variant.offer, usual(role).as_str());
         let seen = format!("in {} of {} logs looked at", variant.logs, self.looked_at);
-        let mut text = match offer.channels.get(&role) {
+        let mut text = match offer.channel(role) {
             Some((column, unit)) => {
                 let (unit, sure) = match unit {
                     Some(unit) => (unit.as_str(), "high: the log names it"),
@@ -410,7 +408,7 @@ impl Proposal {
         if let Some(turn) = turn {
             let _ = writeln!(text, "wraps_at = {turn:?}   # high: it leaps by more than half a turn");
         }
-        let own_unit = offer.channels.get(&role).and_then(|(_, unit)| *unit);
+        let own_unit = offer.channel(role).and_then(|(_, unit)| *unit);
         let other = |(column, unit): &(String, Option<Unit>)| {
             let is_alike = unit.is_none() || *unit == own_unit;
             let unit = unit.or(own_unit).map_or(usual, |unit| unit.as_str());
@@ -418,7 +416,9 @@ impl Proposal {
                 turn.filter(|_| is_alike).map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
             format!("{{ column = {}, unit = {unit:?}{wraps} }}", quoted(column))
         };
-        if let Some(others) = offer.alternatives.get(&role) {
+        if let Some([_, others @ ..]) = offer.channels.get(&role).map(Vec::as_slice)
+            && !others.is_empty()
+        {
             let is_guess = others.iter().any(|(_, unit)| unit.is_none());
             let sure =
                 if is_guess { "   # low: a column that names no unit may have another one" } else { "" };
@@ -460,8 +460,6 @@ fn group(folder: &Path, found: &[Variant], kind: Kind) -> Option<(Variant, Strin
         let of_kind = || Group { offer: variant.offer.clone(), files: kind.pattern(name), roles: Vec::new() };
         groups.entry(name.clone()).or_insert_with(of_kind).roles.push(role);
         main.offer.channels.insert(role, variant.offer.channels[&role].clone());
-        let others = variant.offer.alternatives.get(&role);
-        main.offer.alternatives.extend(others.map(|others| (role, others.clone())));
     }
     Some((main, kind.pattern(name), groups))
 }
