@@ -133,15 +133,6 @@ pub fn write(
     let [motor_m, dx_m, load_n] = [&channels.motor_m, &channels.dx_m, &channels.load_n].map(Clone::clone);
     let columns = [("time_s", time_s), ("motor_m", motor_m), ("dx_m", dx_m), ("load_n", load_n)];
     let columns = columns.map(|(name, values)| (name.to_owned(), Column::Real(values)));
-    write_encoded(file, &columns, &footer(channels, identity, geometry, provenance), encoding)
-}
-
-fn footer(
-    channels: &ActuatorChannels,
-    identity: &Identity,
-    geometry: Geometry,
-    provenance: &BTreeMap<String, String>,
-) -> Vec<(String, String)> {
     let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     let segments: Vec<String> = channels.segments.iter().map(|s| format!("{}..{}", s.start, s.end)).collect();
     let breaks: Vec<String> = channels.breaks.iter().map(|(row, s)| format!("{row}:{s}")).collect();
@@ -163,6 +154,7 @@ fn footer(
         ("units", "time_s: s since the first sample; motor_m, dx_m: m at the screw; load_n: N".to_owned()),
     ];
     let own = own.into_iter().map(|(key, value)| (format!("freeplay.{key}"), value));
-    let told = provenance.iter().map(|(key, value)| (format!("freeplay.{key}"), value.clone()));
-    std::iter::once((KEY.to_owned(), VERSION.to_owned())).chain(own).chain(told).collect()
+    let source = provenance.iter().map(|(key, value)| (format!("freeplay.{key}"), value.clone()));
+    let version = std::iter::once((KEY.to_owned(), VERSION.to_owned()));
+    write_encoded(file, &columns, &version.chain(own).chain(source).collect::<Vec<_>>(), encoding)
 }

@@ -129,14 +129,10 @@ mod tests {
     }
 
     #[test]
-    fn stretches_are_cut_to_where_it_holds() {
+    fn stretches_are_cut_to_where_it_holds_less_the_margin_at_both_ends() {
         let values = [0.0, 1.0, 1.0, 0.0, 1.0, f64::NAN, 1.0, 1.0];
         assert_eq!(when(&[1.0], None, None).within(&values, &[0..7, 7..8], 0.1), [1..3, 4..5, 6..7, 7..8]);
         assert_eq!(when(&[], Some(0.5), None).within(&values, &[2..5], 0.1), [2..3, 4..5]);
-    }
-
-    #[test]
-    fn the_margin_is_left_out_at_both_ends() {
         let values = [1.0; 20];
         assert_eq!(when(&[1.0], None, Some(0.25)).within(&values, &[0..20], 0.1), [3..17]);
         assert!(when(&[1.0], None, Some(2.0)).within(&values, &[0..20], 0.1).is_empty());
