@@ -116,6 +116,17 @@ impl FlightLog {
         self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 
+    /// The actuator in a position that the log had when its records were stored.
+    ///
+    /// # Errors
+    /// A diagnostic when the log has no such position any more.
+    pub fn actuator_at(&self, position: &str) -> Result<&ActuatorColumns, Diagnostic> {
+        self.positions.iter().find(|at| at.position.as_str() == position).ok_or_else(|| {
+            Diagnostic::new("no_position", format!("the log has no position {position} any more"))
+                .in_file(&self.display_name)
+        })
+    }
+
     /// Estimates one actuator of the log.
     ///
     /// # Errors
@@ -129,7 +140,8 @@ impl FlightLog {
     ) -> Result<GapRecord, Diagnostic> {
         let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
         let (installation, part) = self.unit(at, config, installations).map_err(in_file)?;
-        let estimate = self.estimate(at, part, config).map_err(in_file)?;
+        let (estimate, channels) = self.estimate(at, part, config).map_err(in_file)?;
+        channels.into_iter().for_each(ActuatorChannels::recycle_buffers);
         Ok(GapRecord {
             flight: self.flight(),
             position: at.position.clone(),
@@ -167,7 +179,8 @@ impl FlightLog {
         Ok((installation, part_of(config, &installation.part_number)?))
     }
 
-    /// Estimates one actuator as a given part, regardless of the installations table.
+    /// Estimates one actuator as a given part, regardless of the installations table. Its channels are returned, too,
+    /// unless the log lacks one of them.
     ///
     /// # Errors
     /// A diagnostic when its channels cannot be read.
@@ -176,14 +189,12 @@ impl FlightLog {
         at: &ActuatorColumns,
         part: &Part,
         config: &Config,
-    ) -> Result<GapEstimate, Diagnostic> {
+    ) -> Result<(GapEstimate, Option<ActuatorChannels>), Diagnostic> {
         if !at.lacking.is_empty() {
-            return Ok(GapEstimate::refused("channel_unmapped"));
+            return Ok((GapEstimate::refused("channel_unmapped"), None));
         }
-        let actuator = self.channels(at, part)?;
-        let estimate = estimate::estimate(&actuator, part, &config.document.estimate);
-        actuator.recycle_buffers();
-        estimate
+        let channels = self.channels(at, part)?;
+        Ok((estimate::estimate(&channels, part, &config.document.estimate)?, Some(channels)))
     }
 
     /// Reads the channels of one actuator of a given part.
@@ -210,27 +221,17 @@ impl FlightLog {
     }
 }
 
-/// Passes the channels of every actuator of a log to `take`, with its part: the installed one, or one part for all, for
-/// which the log needs no identity.
+/// Passes on the channels of every actuator of a log as those of one part. The log needs no identity.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.
-pub fn for_each_actuator(
+pub fn read_as_part(
     files: &LogFiles,
     display_name: &str,
     config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
-    mut take: impl FnMut(&ActuatorChannels, &Part) -> Result<(), Diagnostic>,
+    number: &PartNumber,
+    mut take: impl FnMut(ActuatorChannels, &Part) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
-    let Some(number) = part else {
-        let opened = FlightLog::open(files, display_name, config, installations)?;
-        for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-            let (_, part) = opened.unit(at, config, installations)?;
-            take(&opened.channels(at, part)?, part)?;
-        }
-        return Ok(());
-    };
     let part = part_of(config, number)?;
     let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
     let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
@@ -246,7 +247,7 @@ pub fn for_each_actuator(
     log.announce(&used);
     for at in &positions {
         let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
-        take(&read, part).map_err(|diagnostic| diagnostic.in_file(display_name))?;
+        take(read, part).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())
 }
@@ -455,30 +456,6 @@ fn map_actuators(
         Some(error) if at.is_empty() => Err(error),
         _ => Ok(at.into_values().collect()),
     }
-}
-
-/// blake3 of every sample of every actuator that could be read, in SI: two logs of one flight that hold
-/// the same samples are the same log, however they are encoded.
-///
-/// # Errors
-/// A diagnostic when a log or a channel cannot be read.
-pub fn sample_digest(
-    files: &LogFiles,
-    display_name: &str,
-    config: &Config,
-    installations: &Installations,
-) -> Result<String, Diagnostic> {
-    catch_panic(display_name, || {
-        let mut hash = blake3::Hasher::new();
-        for_each_actuator(files, display_name, config, installations, None, |read, _| {
-            hash.update(read.position.as_str().as_bytes());
-            for value in [&read.motor_m, &read.dx_m, &read.load_n].into_iter().flatten() {
-                hash.update(&value.to_bits().to_le_bytes());
-            }
-            Ok(())
-        })?;
-        Ok(hash.finalize().to_hex().to_string())
-    })
 }
 
 /// The error of a log whose flight another log holds with other samples.

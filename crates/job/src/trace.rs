@@ -1,14 +1,12 @@
 //! Trace: inputs and outputs of the filter, sample by sample.
 
 use estimator::{GainSchedule, StreamStep};
-use ingest::LogFiles;
+use ingest::ActuatorChannels;
 use ingest::parquet::writer::Column;
-use records::{Diagnostic, Installations, PartNumber};
+use records::Diagnostic;
 
-use crate::config::Config;
 use crate::config::part::Part;
 use crate::estimate;
-use crate::flight_log;
 
 /// Columns of numbers, in their order.
 const COLUMNS: [&str; 11] = [
@@ -42,6 +40,20 @@ impl Trace {
         self.log.len()
     }
 
+    /// Puts the samples of an actuator of a log behind those that are there.
+    ///
+    /// # Errors
+    /// A diagnostic when the settings of the part do not fit the step of the log.
+    pub fn add(&mut self, log: &str, channels: &ActuatorChannels, part: &Part) -> Result<(), Diagnostic> {
+        let (numbers, count) = (numbers(channels, part)?, channels.dx_m.len());
+        self.log.extend(std::iter::repeat_n(log.to_owned(), count));
+        self.position.extend(std::iter::repeat_n(channels.position.to_string(), count));
+        for (column, numbers) in self.numbers.iter_mut().zip(numbers) {
+            column.extend(numbers);
+        }
+        Ok(())
+    }
+
     /// Puts another trace behind this one.
     pub fn extend(&mut self, other: Self) {
         self.log.extend(other.log);
@@ -58,47 +70,43 @@ impl Trace {
         let numbers = COLUMNS.iter().zip(&self.numbers);
         text.chain(numbers.map(|(name, values)| ((*name).to_owned(), Column::Real(values.clone())))).collect()
     }
+}
 
-    fn of(log: &str, channels: &ingest::ActuatorChannels, part: &Part) -> Result<Self, Diagnostic> {
-        let (samples, count) = (estimate::samples(channels), channels.dx_m.len());
-        let mut steps: [Vec<f64>; 5] = std::array::from_fn(|_| vec![f64::NAN; count]);
-        let schedule = GainSchedule::new(&estimate::filter(channels, part)?);
-        let put = |k: usize, step: &StreamStep| {
-            let numbers = [step.s_m(), step.innovation_m, step.innovation_variance_m2, step.x[0], step.x[1]];
-            steps.iter_mut().zip(numbers).for_each(|(column, number)| column[k] = number);
-        };
-        schedule.for_each_step(&samples, put).map_err(|e| Diagnostic::new("estimate_failed", e))?;
-        let [s_m, innovation_m, variance_m2, mut position_m, mut speed_m_per_s] = steps;
-        for segment in samples.segments {
-            let missing = channels.dx_m[segment.clone()].iter().take_while(|y| y.is_nan()).count();
-            for column in [&mut position_m, &mut speed_m_per_s] {
-                column[segment.start..][..missing].fill(f64::NAN);
-            }
+/// The columns of an actuator, in the order of [`COLUMNS`].
+fn numbers(channels: &ActuatorChannels, part: &Part) -> Result<[Vec<f64>; COLUMNS.len()], Diagnostic> {
+    let (samples, count) = (estimate::samples(channels), channels.dx_m.len());
+    let mut steps: [Vec<f64>; 5] = std::array::from_fn(|_| vec![f64::NAN; count]);
+    let schedule = GainSchedule::new(&estimate::filter(channels, part)?);
+    let put = |k: usize, step: &StreamStep| {
+        let numbers = [step.s_m(), step.innovation_m, step.innovation_variance_m2, step.x[0], step.x[1]];
+        steps.iter_mut().zip(numbers).for_each(|(column, number)| column[k] = number);
+    };
+    schedule.for_each_step(&samples, put).map_err(|e| Diagnostic::new("estimate_failed", e))?;
+    let [s_m, innovation_m, variance_m2, mut position_m, mut speed_m_per_s] = steps;
+    for segment in samples.segments {
+        let missing = channels.dx_m[segment.clone()].iter().take_while(|y| y.is_nan()).count();
+        for column in [&mut position_m, &mut speed_m_per_s] {
+            column[segment.start..][..missing].fill(f64::NAN);
         }
-        let time_s = (0..count).map(|k| channels.time_s(k)).collect();
-        Ok(Self {
-            log: vec![log.to_owned(); count],
-            position: vec![channels.position.to_string(); count],
-            numbers: [
-                time_s,
-                channels.motor_m.clone(),
-                channels.dx_m.clone(),
-                channels.load_n.clone(),
-                s_m,
-                innovation_m,
-                variance_m2,
-                flanks(channels, part, count)?,
-                position_m,
-                speed_m_per_s,
-                motor_speed_m_per_s(channels),
-            ],
-        })
     }
+    Ok([
+        (0..count).map(|k| channels.time_s(k)).collect(),
+        channels.motor_m.clone(),
+        channels.dx_m.clone(),
+        channels.load_n.clone(),
+        s_m,
+        innovation_m,
+        variance_m2,
+        flanks(channels, part, count)?,
+        position_m,
+        speed_m_per_s,
+        motor_speed_m_per_s(channels),
+    ])
 }
 
 /// Speed of the motor at the screw axis, m/s: central difference over two steps; NaN at the ends of a segment and
 /// next to a missing position.
-fn motor_speed_m_per_s(channels: &ingest::ActuatorChannels) -> Vec<f64> {
+fn motor_speed_m_per_s(channels: &ActuatorChannels) -> Vec<f64> {
     let mut speed = vec![f64::NAN; channels.motor_m.len()];
     for segment in estimate::samples(channels).segments {
         let inner = speed.iter_mut().skip(segment.start + 1);
@@ -110,7 +118,7 @@ fn motor_speed_m_per_s(channels: &ingest::ActuatorChannels) -> Vec<f64> {
 }
 
 /// Which flank was pressed at each sample, as the contact regression saw it.
-fn flanks(channels: &ingest::ActuatorChannels, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
+fn flanks(channels: &ActuatorChannels, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
     let mut pressed = vec![0.0; count];
     for touch in estimate::plot_data(channels, part)?.iter().flat_map(|picture| &picture.touches) {
         let at = |time_s: f64| ((time_s / channels.step_s).round().max(0.0) as usize).min(count);
@@ -118,23 +126,4 @@ fn flanks(channels: &ingest::ActuatorChannels, part: &Part, count: usize) -> Res
         pressed[at(touch.time_s - half_s)..at(touch.time_s + half_s)].fill(touch.flank.sign());
     }
     Ok(pressed)
-}
-
-/// Traces every actuator of a log: as installed, or all as one part.
-///
-/// # Errors
-/// A diagnostic when the log or an actuator in it cannot be read.
-pub fn of_log(
-    files: &LogFiles,
-    log_path: &str,
-    config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
-) -> Result<Trace, Diagnostic> {
-    let mut whole = Trace::default();
-    flight_log::for_each_actuator(files, log_path, config, installations, part, |channels, part| {
-        whole.extend(Trace::of(log_path, channels, part)?);
-        Ok(())
-    })?;
-    Ok(whole)
 }

@@ -2,14 +2,15 @@
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use arrow::array::RecordBatch;
 use ingest::log::in_memory::ChannelArrays;
 use ingest::parquet::writer::Encoding;
 use pipeline::Request;
+use pipeline::inspect::estimate::{self, EstimateRequest, LogEstimates};
 use pipeline::logs::discover;
 use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
@@ -30,37 +31,42 @@ fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
     Ok(named)
 }
 
-/// The part as which all actuators are taken, or the installations table that names the part of each.
-fn parts<'c>(
+/// Estimates of logs: as installed, or all as one part.
+fn request(
     py: Python<'_>,
-    config: &'c Config,
+    config: &Config,
     number: Option<&str>,
-) -> PyResult<(Option<PartNumber>, &'c Installations)> {
-    static NONE: LazyLock<Installations> = LazyLock::new(Installations::default);
-    Ok(match number {
-        Some(number) => (Some(part(py, config, number)?), &NONE),
-        None => (None, config.installations(py)?),
-    })
+    has_trace: bool,
+) -> PyResult<EstimateRequest> {
+    let (part, installations) = match number {
+        Some(number) => (Some(part(py, config, number)?), Installations::default()),
+        None => (None, config.installations(py)?.clone()),
+    };
+    let (config, installations) = (Arc::new(config.inner.clone()), Arc::new(installations));
+    let (program_version, has_plots) = (VERSION, false);
+    Ok(EstimateRequest { config, installations, part, program_version, has_trace, has_plots })
+}
+
+fn estimate_log(py: Python<'_>, log: &Path, request: &EstimateRequest) -> PyResult<LogEstimates> {
+    py.check_signals()?;
+    py.detach(|| estimate::estimate(log, request)).map_err(|error| to_run_exception(py, error))
 }
 
 /// Estimates logs: as installed, or all as one part. Errors of logs are in `Table.errors`.
 #[pyfunction]
-#[pyo3(signature = (logs, config, part_number=None))]
-pub(crate) fn estimate(
+#[pyo3(name = "estimate", signature = (logs, config, part_number=None))]
+pub(crate) fn estimate_logs(
     py: Python<'_>,
     logs: Vec<PathBuf>,
     config: &Config,
     part_number: Option<&str>,
 ) -> PyResult<Table> {
-    let (number, installations) = parts(py, config, part_number)?;
+    let request = request(py, config, part_number, false)?;
     let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
-    let mut of_log = |log: &Path| {
-        let (config, number) = (&config.inner, number.as_ref());
-        pipeline::inspect::estimate::estimate(log, config, installations, number, VERSION, &mut diagnostics)
-    };
     for log in &logs {
-        py.check_signals()?;
-        found.extend(py.detach(|| of_log(log)).map_err(|error| to_run_exception(py, error))?);
+        let of_log = estimate_log(py, log, &request)?;
+        found.extend(of_log.rows);
+        diagnostics.extend(of_log.diagnostics);
     }
     let batch = to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?;
     Ok(Table::with_errors(batch, diagnostics))
@@ -82,7 +88,7 @@ pub(crate) fn estimate_arrays(
         [numbers(time_s)?, numbers(motor_m)?, numbers(screw_m)?, numbers(load_n)?];
     let found = py.detach(|| {
         let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
-        pipeline::inspect::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
+        estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
     Table::of_rows(py, &[found])
@@ -97,11 +103,11 @@ pub(crate) fn trace(
     config: &Config,
     part_number: Option<&str>,
 ) -> PyResult<Table> {
-    let (number, installations) = parts(py, config, part_number)?;
-    let (config, log_path) = (&config.inner, log.display().to_string());
-    let files = discover::log_containing(config, &log).map_err(|error| to_run_exception(py, error))?;
-    let seen = py.detach(|| job::trace::of_log(&files, &log_path, config, installations, number.as_ref()));
-    let columns = seen.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?.columns();
+    let seen = estimate_log(py, &log, &request(py, config, part_number, true)?)?;
+    if let Some(diagnostic) = seen.diagnostics.into_iter().chain(seen.not_shown).next() {
+        return Err(to_exception(py, ExceptionClass::Log, &[diagnostic]));
+    }
+    let columns = seen.trace.columns();
     Ok(Table::of(ingest::parquet::writer::batch(&columns).map_err(|e| arrow_error(&e))?))
 }
 

@@ -22,7 +22,7 @@ fn _freeplay(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", VERSION)?;
     module.add_class::<config::Config>()?;
     module.add_class::<table::Table>()?;
-    module.add_function(wrap_pyfunction!(functions::estimate, module)?)?;
+    module.add_function(wrap_pyfunction!(functions::estimate_logs, module)?)?;
     module.add_function(wrap_pyfunction!(functions::estimate_arrays, module)?)?;
     module.add_function(wrap_pyfunction!(functions::trace, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::trend, module)?)?;

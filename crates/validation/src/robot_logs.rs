@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use ingest::{ActuatorChannels, LogFiles};
-use job::flight_log::for_each_actuator;
+use job::flight_log::read_as_part;
 use job::{Config, Part, estimate};
-use records::{Diagnostic, Installations, PartNumber};
+use records::{Diagnostic, PartNumber};
 
 use crate::methods::{load_lines_m, spread_m};
 
@@ -35,10 +35,9 @@ fn join_diagnostics(diagnostics: &[Diagnostic]) -> String {
 fn estimate_log(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RobotRow>, String> {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
-    let none = Installations::default();
     let mut rows = Vec::new();
-    for_each_actuator(&LogFiles::one(path), &name, config, &none, Some(&number), |channels, part| {
-        rows.push(row(&name, channels, part, config)?);
+    read_as_part(&LogFiles::one(path), &name, config, &number, |channels, part| {
+        rows.push(row(&name, &channels, part, config)?);
         Ok(())
     })
     .map_err(|diagnostic| diagnostic.to_string())?;

@@ -10,7 +10,7 @@ fn estimate(config: &Config, log: &str) -> GapEstimate {
     let (opened, installations) = (open(log, config).unwrap(), installations());
     let at = opened.actuators(&installations).next().unwrap();
     let (_, part) = opened.unit(at, config, &installations).unwrap();
-    opened.estimate(at, part, config).unwrap()
+    opened.estimate(at, part, config).unwrap().0
 }
 
 /// Only the published statistic is there; a load that never reverses is refused without the regression, too.

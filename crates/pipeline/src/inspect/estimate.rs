@@ -1,16 +1,21 @@
 //! Estimates without a store: from logs or arrays to rows.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use ingest::LogFiles;
 use ingest::log::in_memory::ChannelArrays;
-use job::Config;
-use job::flight_log::{FlightLog, catch_panic, for_each_actuator, part_of};
+use ingest::{ActuatorChannels, LogFiles};
+use job::flight_log::{FlightLog, part_of, read_as_part};
+use job::trace::Trace;
+use job::{Config, Part};
 use records::row_schema::Row;
 use records::{Diagnostic, GapEstimate, GapRecord, Installations, PartNumber, Position};
+use report::EstimatePlot;
 
 use crate::error::Error;
+use crate::inspect::estimate_plots;
 use crate::logs::discover;
+use crate::run::time_limit::within_time_limit;
 
 records::row! {
     /// An estimate without a store: the columns of a record except those of a run. Columns of an unidentified log are
@@ -35,91 +40,130 @@ records::row! {
     order = <GapRecord as Row>::order
 }
 
-/// Estimates every actuator of a log: as installed, or all as one part. Errors of the log, or of single actuators, go
-/// to `diagnostics`.
+/// How logs are estimated.
+#[derive(Debug, Clone)]
+pub struct EstimateRequest {
+    /// The configuration.
+    pub config: Arc<Config>,
+    /// The part in each position; not needed with a `part`.
+    pub installations: Arc<Installations>,
+    /// The part as which every actuator is taken. The logs need no identity then.
+    pub part: Option<PartNumber>,
+    /// Version written into every row.
+    pub program_version: &'static str,
+    /// Whether the filter is traced sample by sample.
+    pub has_trace: bool,
+    /// Whether each estimate is drawn.
+    pub has_plots: bool,
+}
+
+/// Estimates of a log.
+#[derive(Debug, Default)]
+pub struct LogEstimates {
+    /// One row for each actuator that could be estimated.
+    pub rows: Vec<EstimateRow>,
+    /// Inputs and outputs of the filters, one actuator after the other.
+    pub trace: Trace,
+    /// One plot for each actuator.
+    pub plots: Vec<EstimatePlot>,
+    /// Errors of the log, or of single actuators.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Why actuators that were estimated have no trace or no plot.
+    pub not_shown: Vec<Diagnostic>,
+}
+
+/// Estimates every actuator of a log, within `run.log_timeout_s`.
 ///
 /// # Errors
 /// As [`discover::log_containing`].
-pub fn estimate(
-    path: &Path,
-    config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
-    program_version: &str,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Result<Vec<EstimateRow>, Error> {
+pub fn estimate(path: &Path, request: &EstimateRequest) -> Result<LogEstimates, Error> {
+    let (path, of_log) = (path.to_owned(), request.clone());
     let log_path = path.display().to_string();
-    let read = match part {
-        Some(number) => catch_panic(&log_path, || as_part(path, &log_path, config, number, program_version)),
-        None => {
-            let files = discover::log_containing(config, path)?;
-            catch_panic(&log_path, || {
-                as_installed(&files, &log_path, config, installations, program_version, diagnostics)
-            })
-        }
-    };
-    Ok(read.unwrap_or_else(|diagnostic| {
-        diagnostics.push(diagnostic);
-        Vec::new()
-    }))
+    let found = within_time_limit(&log_path.clone(), &request.config, move || {
+        let files = match of_log.part {
+            Some(_) => Ok(LogFiles::one(path)),
+            None => discover::log_containing(&of_log.config, &path),
+        };
+        Ok(files.map(|files| {
+            let mut found = LogEstimates::default();
+            let failed = found.fill(&files, &log_path, &of_log).err();
+            found.diagnostics.extend(failed);
+            found
+        }))
+    });
+    found.unwrap_or_else(|diagnostic| {
+        Ok(LogEstimates { diagnostics: vec![diagnostic], ..LogEstimates::default() })
+    })
 }
 
-fn as_part(
-    path: &Path,
-    log_path: &str,
-    config: &Config,
-    number: &PartNumber,
-    program_version: &str,
-) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let (files, none) = (LogFiles::one(path), Installations::default());
-    let mut rows = Vec::new();
-    for_each_actuator(&files, log_path, config, &none, Some(number), |channels, part| {
-        let estimate = job::estimate::estimate(channels, part, &config.document.estimate)?;
-        rows.push(EstimateRow {
-            position: Some(channels.position.to_string()),
-            log_path: Some(log_path.to_owned()),
-            ..unidentified(estimate, config, number, program_version)
-        });
+impl LogEstimates {
+    fn fill(
+        &mut self,
+        files: &LogFiles,
+        log_path: &str,
+        request: &EstimateRequest,
+    ) -> Result<(), Diagnostic> {
+        let EstimateRequest { config, installations, .. } = request;
+        if let Some(number) = &request.part {
+            return read_as_part(files, log_path, config, number, |channels, part| {
+                let estimate = job::estimate::estimate(&channels, part, &config.document.estimate)?;
+                let row = EstimateRow {
+                    position: Some(channels.position.to_string()),
+                    ..unidentified(estimate, config, number, request.program_version)
+                };
+                self.add(log_path, request, part, row, Some(channels));
+                Ok(())
+            });
+        }
+        let opened = FlightLog::open(files, log_path, config, installations)?;
+        let flight = opened.flight();
+        for at in opened.actuators(installations) {
+            let estimated = opened.unit(at, config, installations).and_then(|(installation, part)| {
+                let (estimate, channels) = opened.estimate(at, part, config)?;
+                let row = EstimateRow {
+                    tail_number: Some(flight.tail_number.to_string()),
+                    position: Some(at.position.to_string()),
+                    part_number: Some(installation.part_number.to_string()),
+                    serial_number: Some(installation.serial_number.to_string()),
+                    flight_id: Some(flight.flight_id.to_string()),
+                    departure_utc: Some(flight.departure_utc),
+                    flight_hours: flight.flight_hours,
+                    tail_hours_end: flight.tail_hours_end,
+                    estimate,
+                    log_digest: Some(opened.digest.clone()),
+                    config_digest: config.digest(&flight.tail_number, &installation.part_number).to_string(),
+                    program_version: request.program_version.to_owned(),
+                    ..EstimateRow::default()
+                };
+                self.add(log_path, request, part, row, channels);
+                Ok(())
+            });
+            self.diagnostics.extend(estimated.err().map(|diagnostic| diagnostic.in_file(log_path)));
+        }
         Ok(())
-    })?;
-    Ok(rows)
-}
-
-fn as_installed(
-    files: &LogFiles,
-    log_path: &str,
-    config: &Config,
-    installations: &Installations,
-    program_version: &str,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let opened = FlightLog::open(files, log_path, config, installations)?;
-    let flight = opened.flight();
-    let mut rows = Vec::new();
-    for at in opened.actuators(installations) {
-        match opened
-            .unit(at, config, installations)
-            .and_then(|(installation, part)| Ok((installation, opened.estimate(at, part, config)?)))
-        {
-            Ok((installation, estimate)) => rows.push(EstimateRow {
-                tail_number: Some(flight.tail_number.to_string()),
-                position: Some(at.position.to_string()),
-                part_number: Some(installation.part_number.to_string()),
-                serial_number: Some(installation.serial_number.to_string()),
-                flight_id: Some(flight.flight_id.to_string()),
-                departure_utc: Some(flight.departure_utc),
-                flight_hours: flight.flight_hours,
-                tail_hours_end: flight.tail_hours_end,
-                estimate,
-                log_path: Some(log_path.to_owned()),
-                log_digest: Some(opened.digest.clone()),
-                config_digest: config.digest(&flight.tail_number, &installation.part_number).to_string(),
-                program_version: program_version.to_owned(),
-            }),
-            Err(diagnostic) => diagnostics.push(diagnostic.in_file(log_path)),
-        }
     }
-    Ok(rows)
+
+    /// Adds a row, and a trace and a plot of its actuator where they are asked for and the log has its channels.
+    fn add(
+        &mut self,
+        log_path: &str,
+        request: &EstimateRequest,
+        part: &Part,
+        row: EstimateRow,
+        channels: Option<ActuatorChannels>,
+    ) {
+        if let Some(channels) = channels {
+            if request.has_trace {
+                self.not_shown.extend(self.trace.add(log_path, &channels, part).err());
+            }
+            if request.has_plots {
+                let plot = estimate_plots::plot(log_path, &channels, part, &row.estimate);
+                plot.map_or_else(|diagnostic| self.not_shown.push(diagnostic), |plot| self.plots.push(plot));
+            }
+            channels.recycle_buffers();
+        }
+        self.rows.push(EstimateRow { log_path: Some(log_path.to_owned()), ..row });
+    }
 }
 
 /// Estimates in-memory channels as a part.

@@ -1,41 +1,24 @@
 //! Diagnostic plots of the estimates of a log: for `estimate --plot` and for the flights of a report.
 
-use ingest::{ActuatorChannels, LogFiles};
-use job::flight_log::for_each_actuator;
-use job::{Config, Part, estimate};
-use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
+use ingest::ActuatorChannels;
+use job::{Part, estimate};
+use records::{Diagnostic, GapEstimate};
 use report::{ContactInterval, EstimatePlot};
 
-/// The plot of every actuator of a log, with its position: as installed, or all as one part.
+/// The plot of an actuator of a log.
 ///
 /// # Errors
-/// A diagnostic when the log or an actuator in it cannot be read.
-pub fn of_log(
-    files: &LogFiles,
+/// A diagnostic when the settings of the part do not fit the step of the log.
+pub(crate) fn plot(
     log_path: &str,
-    config: &Config,
-    installations: &Installations,
-    part: Option<&PartNumber>,
-) -> Result<Vec<(Position, EstimatePlot)>, Diagnostic> {
-    let mut plots = Vec::new();
-    for_each_actuator(files, log_path, config, installations, part, |channels, part| {
-        plots.push((channels.position.clone(), plot(log_path, channels, part, config)?));
-        Ok(())
-    })?;
-    Ok(plots)
-}
-
-fn plot(
-    log: &str,
     channels: &ActuatorChannels,
     part: &Part,
-    config: &Config,
+    estimate: &GapEstimate,
 ) -> Result<EstimatePlot, Diagnostic> {
     let (s_m, midrange) = estimate::filter_output(channels, part)?;
-    let estimate = estimate::estimate(channels, part, &config.document.estimate)?;
     let mut plot = EstimatePlot {
-        title: format!("{} in {log}", channels.position),
-        summary: summary(&estimate),
+        title: format!("{} in {log_path}", channels.position),
+        summary: summary(estimate),
         step_s: channels.step_s,
         breaks: channels.breaks.clone(),
         bounds_m: midrange.map(|gap| (gap.upper_m, gap.lower_m)),

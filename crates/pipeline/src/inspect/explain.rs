@@ -1,8 +1,8 @@
 //! One stored estimate with its settings, recomputed from its log.
 
 use ingest::ActuatorChannels;
+use job::Config;
 use job::flight_log::{FlightLog, catch_panic};
-use job::{Config, estimate};
 use records::{Diagnostic, GapEstimate, GapRecord, Installations, Status};
 use serde_json::{Value, json};
 use store::{Query, Store};
@@ -112,16 +112,9 @@ fn replay(
     let files = discover::stored_log(config, log_path);
     catch_panic(log_path, || {
         let opened = FlightLog::open(&files, log_path, config, installations)?;
-        let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
-            Diagnostic::new("no_position", format!("the log has no position {} any more", record.position))
-                .in_file(log_path)
-        })?;
+        let at = opened.actuator_at(record.position.as_str())?;
         let (_, part) = opened.unit(at, config, installations)?;
-        let channels = at.lacking.is_empty().then(|| opened.channels(at, part)).transpose()?;
-        let estimate = match &channels {
-            Some(channels) => estimate::estimate(channels, part, &config.document.estimate)?,
-            None => opened.estimate(at, part, config)?,
-        };
+        let (estimate, channels) = opened.estimate(at, part, config)?;
         Ok(Recomputation { digest: opened.digest, channels, estimate })
     })
 }

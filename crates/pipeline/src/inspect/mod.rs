@@ -3,7 +3,7 @@
 
 pub mod check;
 pub mod estimate;
-pub mod estimate_plots;
+pub(crate) mod estimate_plots;
 pub mod explain;
 pub mod normalize;
 pub mod simulate;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use ::report::{Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
+use ::report::{EstimatePlot, Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
 use jiff::Timestamp;
 use job::Config;
 use job::flight_log::FlightLog;
@@ -131,29 +131,34 @@ fn of_log(
     config: &Arc<Config>,
     installations: &Arc<Installations>,
 ) -> Result<Vec<(Wanted, Page)>, Diagnostic> {
-    let (name, digest, of_log, units) =
+    let (name, digest, config, installations) =
         (log.clone(), digest.clone(), Arc::clone(config), Arc::clone(installations));
-    let plots = within_time_limit(log, config, move || {
-        let files = discover::stored_log(&of_log, &name);
-        if FlightLog::open(&files, &name, &of_log, &units)?.digest != digest {
+    let positions: Vec<Arc<str>> =
+        wanted.iter().map(|wanted| Arc::clone(&wanted.of(report).position)).collect();
+    let plots = within_time_limit(log, &Arc::clone(&config), move || {
+        let files = discover::stored_log(&config, &name);
+        let opened = FlightLog::open(&files, &name, &config, &installations)?;
+        if opened.digest != digest {
             let what = "the log, or which of its columns are read, has changed since its records were stored";
             let hint = "its flights are not drawn; `freeplay run` stores them anew";
             return Err(Diagnostic::new("log_changed", what).in_file(&name).hint(hint));
         }
-        estimate_plots::of_log(&files, &name, &of_log, &units, None)
+        let plot = |position: &Arc<str>| {
+            let at = opened.actuator_at(position)?;
+            let (_, part) = opened.unit(at, &config, &installations)?;
+            let (estimate, channels) = opened.estimate(at, part, &config)?;
+            channels.map(|channels| estimate_plots::plot(&name, &channels, part, &estimate)).transpose()
+        };
+        positions.iter().map(plot).collect::<Result<Vec<_>, _>>()
     })?;
-    let page = |wanted: &Wanted| {
+    let page = |(wanted, plot): (&Wanted, Option<EstimatePlot>)| {
+        let plot = plot?;
         let (unit, row) = (&report.units[wanted.unit], wanted.of(report));
-        let plot = plots.iter().find(|(position, _)| position.as_str() == &*row.position);
-        let (_, plot) = plot.ok_or_else(|| {
-            let what = format!("the log has no position {} any more", row.position);
-            Diagnostic::new("no_position", what).in_file(log)
-        })?;
         let path = flight_path(&row.tail_number, row.departure_utc, &row.position);
         let back = format!("../{}", unit_path(unit));
-        let html = estimate_plot_html(std::slice::from_ref(plot), Some((&back, &unit.name())))
-            .map_err(|e| Diagnostic::new("cannot_draw", e).in_file(log))?;
-        Ok((*wanted, Page::html(path, &html)))
+        let html = estimate_plot_html(&[plot], Some((&back, &unit.name())));
+        let html = html.map_err(|e| Diagnostic::new("cannot_draw", e).in_file(log));
+        Some(html.map(|html| (*wanted, Page::html(path, &html))))
     };
-    wanted.iter().map(page).collect()
+    wanted.iter().zip(plots).filter_map(page).collect()
 }

@@ -1,17 +1,14 @@
 //! `estimate`: estimates the given logs without storing the results.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-use ingest::LogFiles;
 use job::Config;
 use job::flight_log::part_of;
-use job::trace::{self, Trace};
-use pipeline::inspect::estimate::{self, EstimateRow};
-use pipeline::inspect::estimate_plots;
+use job::trace::Trace;
+use pipeline::inspect::estimate::{self, EstimateRequest, EstimateRow};
 use pipeline::logs::discover;
-use pipeline::run::time_limit::within_time_limit;
-use records::{Diagnostic, Installations, PartNumber};
+use records::{Installations, PartNumber};
 
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
@@ -36,64 +33,34 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
         Some(_) => (load_config(global)?, Installations::default()),
         None => load_with_installations(global)?,
     };
-    let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
-    let (config, installations) = (Arc::new(config), Arc::new(installations));
-    let (mut found, mut diagnostics, mut finished) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &discover::flight_paths(&config, &args.logs) {
-        match estimate_log(path, &config, &installations, part.as_ref()) {
-            Ok(estimated) => {
-                let (rows, of_log) = estimated?;
-                found.extend(rows);
-                diagnostics.extend(of_log);
-                finished.push(path.clone());
-            }
-            // A log that was given up gets no trace and no plot: each would take as long again.
-            Err(diagnostic) => diagnostics.push(diagnostic),
-        }
-    }
-    let part = part.as_ref();
-    let logs = || -> Result<Vec<(LogFiles, String)>, Failure> {
-        let log = |path: &PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
-        finished.iter().map(log).collect()
+    let request = EstimateRequest {
+        part: args.part.as_ref().map(|number| configured(&config, number)).transpose()?,
+        config: Arc::new(config),
+        installations: Arc::new(installations),
+        program_version: VERSION,
+        has_trace: args.trace.is_some(),
+        has_plots: args.plot.is_some(),
     };
-    // The errors of a log were reported by its estimate: without a trace or a plot, it is skipped.
+    let (mut found, mut plots, mut diagnostics) = (Vec::new(), Vec::new(), Vec::new());
+    let mut trace = Trace::default();
+    for path in &discover::flight_paths(&request.config, &args.logs) {
+        let of_log = estimate::estimate(path, &request)?;
+        found.extend(of_log.rows);
+        trace.extend(of_log.trace);
+        plots.extend(of_log.plots);
+        diagnostics.extend(of_log.diagnostics);
+    }
+    // A log that failed is reported already; it has no trace and no plot.
     if let Some(file) = &args.trace {
-        let logs = logs()?;
-        let trace =
-            |(files, log): &(_, String)| trace::of_log(files, log, &config, &installations, part).ok();
-        write_trace(file, logs.iter().filter_map(trace), output)?;
+        write_trace(file, &trace, output)?;
     }
     if let Some(file) = &args.plot {
-        let logs = logs()?;
-        let plots = |(files, log): &(_, String)| {
-            estimate_plots::of_log(files, log, &config, &installations, part).ok()
-        };
-        let plots = logs.iter().filter_map(plots).flatten().map(|(_, plot)| plot);
-        write_plots(file, plots, output)?;
+        write_plots(file, &plots, output)?;
     }
     let batch = || row_output::batch(&found);
     row_output::write_rows(&args.rows, output, batch, || page(&found))?;
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
-}
-
-type Estimated = Result<(Vec<EstimateRow>, Vec<Diagnostic>), pipeline::Error>;
-
-/// The rows and the diagnostics of one log, or why it was given up.
-fn estimate_log(
-    path: &Path,
-    config: &Arc<Config>,
-    installations: &Arc<Installations>,
-    part: Option<&PartNumber>,
-) -> Result<Estimated, Diagnostic> {
-    let (path, part) = (path.to_owned(), part.cloned());
-    let (own_config, installations) = (Arc::clone(config), Arc::clone(installations));
-    within_time_limit(&display_path(&path.clone()), config, move || {
-        let mut diagnostics = Vec::new();
-        let rows =
-            estimate::estimate(&path, &own_config, &installations, part.as_ref(), VERSION, &mut diagnostics);
-        Ok(rows.map(|rows| (rows, diagnostics)))
-    })
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
@@ -131,16 +98,13 @@ fn page(found: &[EstimateRow]) -> String {
 }
 
 /// Writes per-sample filter output of every actuator of the logs.
-fn write_trace(file: &Path, traces: impl Iterator<Item = Trace>, output: &Output) -> Result<(), Failure> {
+fn write_trace(file: &Path, trace: &Trace, output: &Output) -> Result<(), Failure> {
     if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         let what = format!("{}: a trace is written as Parquet", display_path(file));
         return Err(Failure::usage("unknown_ending", what, "use the extension .parquet"));
     }
-    let mut all = Trace::default();
-    traces.for_each(|trace| all.extend(trace));
-    let columns = all.columns();
-    ingest::parquet::writer::write_parquet(file, &columns, &[])
+    ingest::parquet::writer::write_parquet(file, &trace.columns(), &[])
         .map_err(|e| Failure::failed(e.diagnostic()))?;
-    output.note(&format!("wrote {} samples to {}", all.samples(), display_path(file)));
+    output.note(&format!("wrote {} samples to {}", trace.samples(), display_path(file)));
     Ok(())
 }

@@ -14,13 +14,8 @@ use crate::commands::context::display_path;
 ///
 /// # Errors
 /// If the extension is unknown or the file cannot be written.
-pub(super) fn write_plots(
-    file: &Path,
-    plots: impl Iterator<Item = EstimatePlot>,
-    output: &Output,
-) -> Result<(), Failure> {
+pub(super) fn write_plots(file: &Path, plots: &[EstimatePlot], output: &Output) -> Result<(), Failure> {
     let draw = renderer(file)?;
-    let plots: Vec<EstimatePlot> = plots.collect();
     if plots.is_empty() {
         output.note(&format!("no actuator to draw; {} was not written", display_path(file)));
         return Ok(());
@@ -28,7 +23,7 @@ pub(super) fn write_plots(
     let failed = |what: &dyn std::fmt::Display| {
         Failure::failed(records::Diagnostic::new("cannot_write", format!("{}: {what}", display_path(file))))
     };
-    let picture = draw(&plots).map_err(|e| failed(&e))?;
+    let picture = draw(plots).map_err(|e| failed(&e))?;
     std::fs::write(file, picture).map_err(|e| failed(&e))?;
     output.note(&format!("drew {} to {}", table::count(plots.len(), "actuator"), display_path(file)));
     Ok(())

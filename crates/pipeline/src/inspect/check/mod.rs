@@ -1,22 +1,21 @@
 //! Check of logs before a run: how they are mapped, and what would be refused. Nothing is estimated or written.
 
 mod channels;
-mod flight_owners;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ingest::LogFiles;
-use job::flight_log::FlightLog;
+use jiff::Timestamp;
+use job::flight_log::{FlightLog, duplicate_flight, may_be_pieces, pieces_undeclared};
 use job::part_identification::IdentifiedParams;
 use job::{Config, rejection};
-use records::{Diagnostic, Installations, PartNumber};
+use records::{Diagnostic, Installations, PartNumber, Position};
 
 use crate::run::time_limit::within_time_limit;
 
 use channels::{ActuatorCheck, Identified, actuator};
 pub use channels::{ChannelCheck, RATIO};
-use flight_owners::{CheckedLog, FlightOwners, flight_keys};
 
 /// What was found in one log.
 #[derive(Debug, Default)]
@@ -37,6 +36,10 @@ pub struct LogCheck {
     pub channels: Vec<ChannelCheck>,
     diagnostics: Vec<Diagnostic>,
     identified: Vec<Identified>,
+    departure_utc: Timestamp,
+    positions: Vec<Position>,
+    /// blake3 of what is read of its files.
+    digest: String,
 }
 
 /// What was found in logs.
@@ -68,27 +71,23 @@ pub fn check_logs(
     faults: Vec<Diagnostic>,
 ) -> LogsCheck {
     let mut seen = LogsCheck { diagnostics: faults, ..LogsCheck::default() };
-    let mut flights = FlightOwners::default();
     for (files, name) in logs {
         let (of_log, installed, shown) = (Arc::clone(config), Arc::clone(installations), name.clone());
         let looked = within_time_limit(&name, config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
-            let keys = flight_keys(&opened, &installed);
-            let (digest, flight_id) = (opened.digest.clone(), opened.identity.flight_id.clone());
-            let checked = check_log(&opened, &shown, &of_log, &installed);
-            Ok((checked, keys, CheckedLog { files, name: shown, digest, flight_id }))
+            Ok(check_log(&opened, &shown, &of_log, &installed))
         });
         match looked {
-            Ok((mut found, keys, log)) => {
+            Ok(mut found) => {
                 seen.diagnostics.append(&mut found.diagnostics);
                 seen.logs.push(found);
-                seen.diagnostics.extend(flights.enter(log, keys, config, installations));
             }
             Err(diagnostic) => seen.diagnostics.push(diagnostic),
         }
     }
+    seen.diagnostics.extend(duplicate_flights(&seen.logs));
     if config.document.logs.pieces.is_none() {
-        seen.diagnostics.extend(flights.undeclared_pieces());
+        seen.diagnostics.extend(undeclared_pieces(&seen.logs));
     }
     let mut rejections: BTreeMap<PartNumber, Vec<Option<&'static str>>> = BTreeMap::new();
     for log in &mut seen.logs {
@@ -99,6 +98,44 @@ pub fn check_logs(
     }
     seen.mapping_faults = rejections.iter().filter_map(mapping_fault).collect();
     seen
+}
+
+/// Whether two logs hold the same samples, however their files are encoded: all numbers that the samples give are the same.
+fn is_copy(one: &LogCheck, other: &LogCheck) -> bool {
+    let ranges = |log: &LogCheck| -> Vec<_> {
+        log.channels.iter().map(|channel| (channel.samples, channel.min, channel.max)).collect()
+    };
+    one.digest == other.digest || (ranges(one) == ranges(other) && one.identified == other.identified)
+}
+
+/// An error for each log with the flight and a position of an earlier log and other samples.
+fn duplicate_flights(logs: &[LogCheck]) -> Vec<Diagnostic> {
+    let mut owners = BTreeMap::new();
+    let mut faults = Vec::new();
+    for (number, log) in logs.iter().enumerate() {
+        let key = |position| (log.departure_utc, &log.flight[0], position);
+        let owner = log.positions.iter().map(|position| *owners.entry(key(position)).or_insert(number)).min();
+        let Some(first) = owner.filter(|owner| *owner != number).map(|owner| &logs[owner]) else { continue };
+        if !is_copy(first, log) {
+            faults.push(duplicate_flight(&log.name, &first.name));
+        }
+    }
+    faults
+}
+
+/// An error for each log with the tail, flight id and a position of another, and another departure close by.
+fn undeclared_pieces(logs: &[LogCheck]) -> Vec<Diagnostic> {
+    let mut same_id = BTreeMap::<_, Vec<&LogCheck>>::new();
+    for (log, position) in logs.iter().flat_map(|log| log.positions.iter().map(move |at| (log, at))) {
+        same_id.entry((&log.flight[..2], position)).or_default().push(log);
+    }
+    let fault = |log: &LogCheck| {
+        let others = log.positions.iter().flat_map(|position| &same_id[&(&log.flight[..2], position)]);
+        let pieces = others.filter(|other| may_be_pieces(log.departure_utc, other.departure_utc));
+        let other = pieces.min_by_key(|other| &other.name)?;
+        Some(pieces_undeclared(&log.name, log.departure_utc, &other.name, other.departure_utc))
+    };
+    logs.iter().filter_map(fault).collect()
 }
 
 fn mapping_fault((part, codes): (&PartNumber, &Vec<Option<&'static str>>)) -> Option<Diagnostic> {
@@ -121,6 +158,9 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
         rows: opened.rows(),
         has_checksums: opened.is_checked().ok(),
         column_types: opened.column_types(),
+        departure_utc: id.departure_utc,
+        positions: opened.actuators(installations).map(|at| at.position.clone()).collect(),
+        digest: opened.digest.clone(),
         ..LogCheck::default()
     };
     for at in opened.actuators(installations) {
