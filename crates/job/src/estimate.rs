@@ -15,9 +15,6 @@ use crate::config::{EstimateSettings, Method};
 /// Largest relative difference between the slow pole of a filter and the configured bandwidth.
 const BANDWIDTH_TOLERANCE: f64 = 0.25;
 
-/// Longest step between samples that an estimate is made from, s.
-const MAX_STEP_S: f64 = 0.05;
-
 /// Share of samples without a relative position above which the estimate is flagged. Clocks of several files seldom
 /// begin and end together.
 const MISSING_SHARE: f64 = 0.005;
@@ -37,7 +34,7 @@ pub fn estimate(
     if is_too_slow(channels) {
         return Ok(GapEstimate::refused("rate_too_low"));
     }
-    let schedule = part.filters.of(&filter(channels, part)?);
+    let schedule = GainSchedule::new(&filter(channels, part)?);
     let prior = prior(channels, part);
     let failed = |e: estimator::Error| Diagnostic::new("estimate_failed", e);
     let mut estimate = if let Some(reason) = pre_check_rejection(channels) {
@@ -188,7 +185,7 @@ pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
 
 /// Whether the samples are too far apart for any filter: the noise model is checked for the others.
 fn is_too_slow(channels: &ActuatorChannels) -> bool {
-    channels.step_s > MAX_STEP_S * (1.0 + 1e-9)
+    channels.step_s > contact::LONGEST_STEP_S * (1.0 + 1e-9)
 }
 
 /// Rejection code of channels without information, before any statistic is computed.

@@ -5,7 +5,6 @@
 
 pub mod config;
 pub mod estimate;
-pub mod filter_cache;
 pub mod flight_log;
 pub mod normalize;
 pub mod panic;

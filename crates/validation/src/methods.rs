@@ -6,7 +6,6 @@ use ingest::{ActuatorChannels, Geometry};
 use job::Part;
 use job::config::EstimateSettings;
 use job::config::part::PartSettings;
-use job::filter_cache::FilterCache;
 use records::Position;
 use simulator::Sensors;
 
@@ -105,7 +104,6 @@ fn part(case: &Case) -> Result<Part, estimator::Error> {
         noise: expected_noise(&case.sensors),
         initial: InitialVariances::default(),
         settings: PartSettings::default(),
-        filters: FilterCache::default(),
     })
 }
 

@@ -44,8 +44,8 @@ use fit::gauss_newton::GaussNewtonResult;
 use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
 
-/// Slower logs blur the moment at which a flank is left, s.
-const LONGEST_STEP_S: f64 = 0.05;
+/// Longest step between samples, s: slower logs blur the moment at which a flank is left.
+pub const LONGEST_STEP_S: f64 = 0.05;
 /// Standard normal 95 % quantile.
 const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 /// Standard errors by which no gap of a sound log is below zero.

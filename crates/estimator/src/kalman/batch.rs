@@ -21,11 +21,6 @@ impl GainSchedule {
         Self { start: Stream::steady_state(filter), bandwidth_hz: filter.bandwidth_hz() }
     }
 
-    /// The filter it was made for.
-    pub fn filter(&self) -> &Filter {
-        self.start.filter()
-    }
-
     /// As [`Filter::bandwidth_hz`], stored.
     ///
     /// # Errors

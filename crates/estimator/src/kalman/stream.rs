@@ -94,12 +94,6 @@ impl Stream {
         Self { steady, ..Self::constant_time(filter) }
     }
 
-    /// The filter it was made for.
-    #[cfg(feature = "std")]
-    pub(crate) fn filter(&self) -> &Filter {
-        &self.filter
-    }
-
     /// Filters the next sample, from the relative position `y_m`, m, and the load, N; NaN where missing.
     ///
     /// A missing load is replaced by the one before it. S is NaN until a first position is measured. Only there the

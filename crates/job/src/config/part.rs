@@ -10,7 +10,6 @@ use serde_with::skip_serializing_none;
 
 use crate::config::faults::Faults;
 use crate::config::quantity_limits::QuantityLimits;
-use crate::filter_cache::FilterCache;
 
 /// How a part moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -175,8 +174,6 @@ pub struct Part {
     pub initial: estimator::InitialVariances,
     /// The settings as configured. Users take from them what needs no conversion: output, reference load and limits.
     pub settings: PartSettings,
-    /// Gain schedules of its logs, as far as they have been found.
-    pub filters: FilterCache,
 }
 
 impl PartSettings {
@@ -210,7 +207,6 @@ impl PartSettings {
             noise: noise?,
             initial: self.noise.as_ref().map(NoiseSettings::initial).unwrap_or_default(),
             settings: self.clone(),
-            filters: FilterCache::default(),
         })
     }
 
