@@ -17,8 +17,8 @@ use crate::error::{Error, is_passing};
 use crate::logs::discover_remote;
 use crate::logs::file_stat::{FileStat, SeenObjects};
 use crate::logs::local_files;
-use crate::logs::table_folders::{IsLog, TableFolders};
-use crate::logs::temporary_files::{is_temporary, parts_written_out};
+use crate::logs::table_folders::{TableFault, TableFolders};
+use crate::logs::temporary_files::is_temporary;
 
 /// The logs that fit the patterns.
 #[derive(Debug, Clone, Default)]
@@ -258,6 +258,9 @@ fn attach_companions(
     }
 }
 
+/// A file or object that fits a pattern, with its status where the listing has it; or a path at fault, and why.
+type Listed = Result<(PathBuf, Option<FileStat>), TableFault>;
+
 /// Files that fit some patterns, each by its shown name, in order of it.
 fn matching(
     config: &Config,
@@ -275,55 +278,42 @@ fn matching(
         .map(|table| config.path(table))
         .collect();
     let store = config.store();
-    let ours = |path: &PathBuf| path.starts_with(&store) || user_tables.contains(path);
-    let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
-        let what = format!("`{pattern}` is not a valid file pattern: {e}");
-        Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
-    };
+    let is_ours = |path: &Path| path.starts_with(&store) || user_tables.iter().any(|table| table == path);
     for pattern in patterns {
-        let faults = unlisted.len();
-        let mut files: Vec<(PathBuf, Option<FileStat>)> = Vec::new();
-        if object_io::is_address(pattern) {
-            let mut tables = TableFolders::default();
+        let invalid = |e: glob::PatternError| {
+            let what = format!("`{pattern}` is not a valid file pattern: {}", e.msg);
+            Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
+        };
+        let listed = if object_io::is_address(pattern) {
             let address = Address::parse_required(pattern)?;
-            let wanted = glob::Pattern::new(address.key()).map_err(|e| invalid(pattern, &e))?;
-            discover_remote::each(&address, &wanted, &mut tables, |entry| {
-                if !ours(&entry.path) && !is_temporary(&entry.path, Path::new(pattern)) {
-                    files.push((entry.path.clone(), Some(entry.into())));
-                }
-            })?;
-            files.retain(|(path, _)| is_log(config, path, tables.object(path), unlisted));
+            let wanted = glob::Pattern::new(address.key()).map_err(invalid)?;
+            let objects = discover_remote::matching(&address, &wanted, &mut tables)?;
+            objects.into_iter().map(|entry| Ok((entry.path.clone(), Some(entry.into())))).collect()
         } else {
-            let local =
-                local_files::matching(&config.folder, pattern).map_err(|e| invalid(pattern, &e.msg))?;
-            let written = config.folder.join(pattern);
-            let faulty = local.faults.into_iter().map(Err);
-            for found in local.paths.into_iter().map(Ok).chain(faulty) {
-                let checked = found.and_then(|path| match is_file(&path) {
-                    Ok(is_file) => Ok((path, is_file)),
-                    Err(e) => Err((path, e)),
-                });
-                match checked {
-                    Ok((path, is_file)) => {
-                        let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
-                        files.extend(is_kept.then_some((path, None)));
-                    }
-                    Err((path, e)) => {
-                        let log_path = log_path(config, &path);
-                        let fault = unreadable(&path, &log_path, &e);
-                        unlisted.insert(log_path, (path, fault));
-                    }
+            local(config, pattern).map_err(invalid)?
+        };
+        let (mut is_silent, whole) = (true, config.path(pattern));
+        for entry in listed {
+            let checked = entry.and_then(|(path, stat)| {
+                let is_log =
+                    !is_ours(&path) && !is_temporary(&path, &whole) && tables.is_log(&path, &whole)?;
+                Ok(is_log.then_some((path, stat)))
+            });
+            is_silent &= matches!(checked, Ok(None));
+            match checked {
+                Ok(None) => {}
+                Ok(Some((path, stat))) => {
+                    seen.extend(stat.map(|stat| (path.clone(), stat)));
+                    found.insert(log_path(config, &path), path);
+                }
+                Err((path, diagnostic)) => {
+                    let shown = log_path(config, &path);
+                    unlisted.insert(shown.clone(), (path, diagnostic.in_file(&shown)));
                 }
             }
-            let written_out = folder_written_out(&written);
-            files.retain(|(path, _)| is_log(config, path, tables.local(path, &written_out), unlisted));
         }
-        if files.is_empty() && unlisted.len() == faults {
+        if is_silent {
             silent.insert(pattern.as_str());
-        }
-        for (path, stat) in files {
-            seen.extend(stat.map(|stat| (path.clone(), stat)));
-            found.insert(log_path(config, &path), path);
         }
     }
     // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
@@ -334,25 +324,19 @@ fn matching(
     }
 }
 
-/// The folder of a pattern before its first wildcard.
-fn folder_written_out(pattern: &Path) -> PathBuf {
-    let folder = pattern.parent().unwrap_or(pattern);
-    folder.components().take(parts_written_out(folder)).collect()
-}
-
-/// Whether a file is a log, by the table in whose folder it lies; a table that cannot be used is a fault.
-fn is_log(
-    config: &Config,
-    path: &Path,
-    is_log: IsLog,
-    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
-) -> bool {
-    is_log.unwrap_or_else(|(at, diagnostic)| {
-        debug_assert!(path.starts_with(&at), "the fault of another table");
-        let shown = log_path(config, &at);
-        unlisted.insert(shown.clone(), (at, diagnostic.in_file(&shown)));
-        false
-    })
+/// Files of this machine that fit a pattern.
+fn local(config: &Config, pattern: &str) -> Result<Vec<Listed>, glob::PatternError> {
+    let found = local_files::matching(&config.folder, pattern)?;
+    let file = |path: PathBuf| match is_file(&path) {
+        Ok(is_file) => is_file.then_some(Ok((path, None))),
+        Err(e) => Some(Err((path, e))),
+    };
+    let listed = found.paths.into_iter().filter_map(file).chain(found.faults.into_iter().map(Err));
+    let unreadable = |(path, e): (PathBuf, std::io::Error)| {
+        let diagnostic = unreadable(&path, &log_path(config, &path), &e);
+        (path, Box::new(diagnostic))
+    };
+    Ok(listed.map(|entry| entry.map_err(unreadable)).collect())
 }
 
 /// Whether a path is a file; links that lead nowhere, pipes and devices are errors, files that were deleted meanwhile

@@ -11,38 +11,35 @@ use crate::logs::table_folders::TableFolders;
 /// Objects of a folder by which a table is recognised; their names sort before those of data files.
 const MOST_NOTED: usize = 1000;
 
-/// Hands over every object that fits a pattern, and notes the tables that are met. Only the folder before its first
-/// wildcard is listed, and what does not fit is not kept.
+/// Every object that fits a pattern; the tables that are met are noted. Only the folder before its first wildcard is
+/// listed.
 ///
 /// # Errors
 /// [`Error::Objects`] when the store is not reachable.
-pub(crate) fn each(
+pub(crate) fn matching(
     address: &Address,
     wanted: &glob::Pattern,
     tables: &mut TableFolders,
-    mut take: impl FnMut(ListEntry),
-) -> Result<(), Error> {
+) -> Result<Vec<ListEntry>, Error> {
     let Some(first) = address.key().find(['*', '?', '[']) else {
         note_tables_above(address, address.key(), tables)?;
         return match object_io::head(Path::new(&address.to_string())) {
-            Err(object_io::Error::Missing { .. }) => Ok(()),
-            entry => {
-                take(entry?);
-                Ok(())
-            }
+            Err(object_io::Error::Missing { .. }) => Ok(Vec::new()),
+            entry => Ok(vec![entry?]),
         };
     };
     let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
     let root = address.bucket_url();
     note_tables_above(address, folder, tables)?;
+    let mut found = Vec::new();
     object_io::list(&address.with_key(folder), |entry| {
         tables.note(&entry.path);
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
         if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
-            take(entry);
+            found.push(entry);
         }
     })?;
-    Ok(())
+    Ok(found)
 }
 
 /// Notes the tables whose folders lie above a key: a pattern may name a partition of a table. Folders that these

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
 
+use crate::logs::temporary_files::parts_written_out;
+
 /// The format of a table, by the files in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]
 enum TableFormat {
@@ -24,9 +26,8 @@ pub(crate) struct TableFolders {
     tables: BTreeMap<PathBuf, Option<BTreeMap<PathBuf, bool>>>,
 }
 
-/// Whether a file is a log: a file outside of any table, or a live file of a table. An error, with the path at fault, if
-/// the table or this file of it cannot be used.
-pub(crate) type IsLog = Result<bool, (PathBuf, Box<Diagnostic>)>;
+/// A table, or a file of it, that cannot be used, and why.
+pub(crate) type TableFault = (PathBuf, Box<Diagnostic>);
 
 impl TableFolders {
     /// The folders in which tables keep their logs.
@@ -46,23 +47,18 @@ impl TableFolders {
         }
     }
 
-    /// Whether a local file is a log. `written_out` is the folder before the pattern's first wildcard: a folder above it
-    /// may forbid to be listed.
-    pub(crate) fn local(&mut self, file: &Path, written_out: &Path) -> IsLog {
+    /// Whether a file that fits a pattern is a log: of no table, or of one that has it.
+    ///
+    /// # Errors
+    /// Once for each table that cannot be used, and for each file of a table that cannot.
+    pub(crate) fn is_log(&mut self, file: &Path, pattern: &Path) -> Result<bool, TableFault> {
         for folder in file.ancestors().skip(1) {
             let format = match self.folders.get(folder) {
                 Some(format) => *format,
+                // What an object store has was noted from its listing.
+                None if object_io::is_address(file) => None,
                 None => {
-                    let format = match format_of(folder) {
-                        Err(e)
-                            if e.kind() == ErrorKind::PermissionDenied
-                                && !folder.starts_with(written_out) =>
-                        {
-                            None
-                        }
-                        Err(e) => return self.unknown(folder, &e),
-                        Ok(format) => format,
-                    };
+                    let format = local_format(folder, pattern).map_err(|e| self.unknown(folder, &e))?;
                     self.folders.insert(folder.to_owned(), format);
                     format
                 }
@@ -75,25 +71,16 @@ impl TableFolders {
     }
 
     /// A folder that may be a table: any of its files may be withdrawn. It is one fault for all of them.
-    fn unknown(&mut self, folder: &Path, error: &std::io::Error) -> IsLog {
+    fn unknown(&mut self, folder: &Path, error: &std::io::Error) -> TableFault {
         self.folders.insert(folder.to_owned(), Some(TableFormat::Delta));
         self.tables.insert(folder.to_owned(), None);
         let what =
             format!("whether the folder is a Delta, Iceberg or Hudi table cannot be determined: {error}");
         let hint = "check its owner and mode, or the share; then `freeplay run`";
-        Err((folder.to_owned(), Box::new(Diagnostic::new("folder_unreadable", what).hint(hint))))
+        (folder.to_owned(), Box::new(Diagnostic::new("folder_unreadable", what).hint(hint)))
     }
 
-    /// Whether an object of a listing is a log, by what was noted of that listing.
-    pub(crate) fn object(&mut self, object: &Path) -> IsLog {
-        let known = |folder: &Path| Some((folder.to_owned(), (*self.folders.get(folder)?)?));
-        match object.ancestors().skip(1).find_map(known) {
-            Some((folder, format)) => self.member(object, &folder, format),
-            None => Ok(true),
-        }
-    }
-
-    fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> IsLog {
+    fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> Result<bool, TableFault> {
         if !self.tables.contains_key(root) {
             let (live, fault) =
                 live_files(root, format).map_or_else(|e| (None, Some(e)), |live| (Some(live), None));
@@ -113,6 +100,15 @@ impl TableFolders {
                 Err((file.to_owned(), Box::new(Diagnostic::new("table_unsupported", what).hint(hint))))
             }
         }
+    }
+}
+
+/// As [`format_of`]; folders above the part of a pattern that its user wrote out may forbid to be listed.
+fn local_format(folder: &Path, pattern: &Path) -> std::io::Result<Option<TableFormat>> {
+    let is_above = || folder.components().count() < parts_written_out(pattern.parent().unwrap_or(pattern));
+    match format_of(folder) {
+        Err(e) if e.kind() == ErrorKind::PermissionDenied && is_above() => Ok(None),
+        format => format,
     }
 }
 
