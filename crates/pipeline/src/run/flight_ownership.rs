@@ -21,7 +21,7 @@ use crate::error::Error;
 use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{self, Plan, WorkItem};
 use crate::run::event::Event;
-use crate::run::summary::{self, DuplicateLog, RunSummary};
+use crate::run::summary::{self, DuplicateLog, LogError, RunSummary};
 
 /// Outcome of one log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,7 +66,9 @@ pub(crate) struct OwnershipLedger<'a> {
     plan: &'a Plan,
     accounts: HashMap<String, LogRecord>,
     /// Records of this run.
-    own: HashMap<RecordKey, HeldRecord>,
+    own: HashMap<RecordKey, OwnRecord>,
+    /// Errors of each log that this run has processed.
+    errors: BTreeMap<String, Vec<Diagnostic>>,
     /// Logs by the hash of their tail and flight id, unless the configuration declares whether they are pieces.
     same_id: HashMap<u64, Vec<String>>,
     /// Units whose records changed.
@@ -75,7 +77,14 @@ pub(crate) struct OwnershipLedger<'a> {
     pub(crate) renamed: BTreeMap<String, String>,
 }
 
-/// What to do with a record that another log has too.
+/// A record of this run.
+struct OwnRecord {
+    held: HeldRecord,
+    /// Why it has no gap.
+    refused: Option<String>,
+}
+
+/// What becomes of a record that another log holds too.
 enum Claim {
     /// The new record counts.
     Takes,
@@ -94,6 +103,7 @@ impl<'a> OwnershipLedger<'a> {
             plan,
             accounts: HashMap::new(),
             own: HashMap::new(),
+            errors: BTreeMap::new(),
             same_id: HashMap::new(),
             touched: BTreeSet::new(),
             renamed: BTreeMap::new(),
@@ -115,6 +125,34 @@ impl<'a> OwnershipLedger<'a> {
         let is_reached =
             |log: &String| self.accounts.get(log).is_some_and(|account| account.run_id == run_id);
         self.plan.work.iter().map(|work| &work.log_path).filter(|log| !is_reached(log)).cloned().collect()
+    }
+
+    /// Adds up the logs that this run has processed, and their records.
+    pub(crate) fn add_up(&self, report: &mut RunSummary) {
+        report.done = self.errors.len();
+        report.duplicates.sort_by(|a, b| a.log.cmp(&b.log));
+        for record in self.own.values() {
+            match &record.refused {
+                Some(reason) => *report.refused.entry(reason.clone()).or_default() += 1,
+                None => report.estimated += 1,
+            }
+        }
+        let with_records: BTreeSet<&str> = self.own.values().map(|own| own.held.log_path.as_str()).collect();
+        let accounts = with_records.iter().filter_map(|log| self.accounts.get(*log));
+        let flights =
+            accounts.map(|account| (&account.tail_number, &account.flight_id, account.departure_utc));
+        report.flights = flights.collect::<BTreeSet<_>>().len();
+        for (log, errors) in &self.errors {
+            let is_stored = with_records.contains(log.as_str());
+            report.logs_in_part += usize::from(is_stored && !errors.is_empty());
+            let error =
+                |diagnostic: &Diagnostic| LogError { log: log.clone(), diagnostic: diagnostic.clone() };
+            report.errors.extend(errors.iter().map(error));
+            let seconds = self.accounts.get(log).map_or(0.0, |account| account.duration_s);
+            if report.slowest.as_ref().is_none_or(|(_, most)| *most < seconds) {
+                report.slowest = Some((log.clone(), seconds));
+            }
+        }
     }
 
     fn insert(&mut self, account: LogRecord) {
@@ -184,7 +222,6 @@ impl<'a> OwnershipLedger<'a> {
             match self.claim(&account, &new, other, is_same, is_held_by_run) {
                 Claim::Takes => {
                     if is_held_by_run {
-                        report.uncount(&owner, &record.position);
                         displaced.entry(owner).or_insert(is_same);
                     }
                     kept.push(record);
@@ -228,7 +265,8 @@ impl<'a> OwnershipLedger<'a> {
     /// The records of this run that a log still has, after another one took some of them.
     fn left_to(&self, log: &LogRecord) -> Vec<&HeldRecord> {
         let keys = log.keys();
-        keys.iter().filter_map(|key| self.own.get(key)).filter(|held| held.log_path == log.log_path).collect()
+        let own = keys.iter().filter_map(|key| self.own.get(key)).map(|own| &own.held);
+        own.filter(|held| held.log_path == log.log_path).collect()
     }
 
     /// The records that other logs hold of the same flights: those of this run, and stored ones.
@@ -242,7 +280,7 @@ impl<'a> OwnershipLedger<'a> {
         let (own, others): (BTreeSet<_>, BTreeSet<_>) =
             keys.into_iter().partition(|key| self.own.contains_key(key));
         let mut held = if others.is_empty() { BTreeMap::new() } else { writer.held(&others)? };
-        held.extend(own.into_iter().filter_map(|key| Some((key.clone(), self.own.get(&key)?.clone()))));
+        held.extend(own.into_iter().filter_map(|key| Some((key.clone(), self.own.get(&key)?.held.clone()))));
         held.retain(|_, record| record.log_path != account.log_path);
         Ok(held)
     }
@@ -367,14 +405,16 @@ impl<'a> OwnershipLedger<'a> {
         moved_from: Vec<RecordKey>,
         report: &mut RunSummary,
     ) -> LogResult {
-        report.count(&done.account, &done.records, &done.diagnostics);
-        let ProcessedLog { mut account, records, .. } = done;
-        let refused = records.iter().filter(|record| record.estimate.status == Status::Refused).count();
+        let ProcessedLog { mut account, records, diagnostics } = done;
+        self.errors.insert(account.log_path.clone(), diagnostics);
+        let is_refused = |record: &&GapRecord| record.estimate.status == Status::Refused;
+        let refused = records.iter().filter(is_refused).count();
         (account.estimated, account.refused) = ((records.len() - refused) as i64, refused as i64);
         self.keep_counts(&mut account, report);
         for record in &records {
             self.touched.insert((Some(record.part_number.to_string()), record.serial_number.to_string()));
-            self.own.insert(RecordKey::of(record), HeldRecord::of(record));
+            let refused = is_refused(&record).then(|| record.estimate.reason.clone().unwrap_or_default());
+            self.own.insert(RecordKey::of(record), OwnRecord { held: HeldRecord::of(record), refused });
         }
         self.insert(account.clone());
         LogResult { account, records, moved_from }

@@ -162,6 +162,7 @@ pub(crate) fn execute_run(
     })?;
     report.not_reached_logs = ledger.not_reached(&inputs.run_id);
     report.not_reached = report.not_reached_logs.len();
+    ledger.add_up(&mut report);
     report.add_coverage(ledger.accounts(), config, &inputs.installations);
     let OwnershipLedger { touched: mut units, renamed, .. } = ledger;
     report.absent = report.absent.saturating_sub(renamed.len());
@@ -181,7 +182,7 @@ pub(crate) fn execute_run(
         report.quiet.clear();
     }
     report.close(clock.elapsed().as_secs_f64());
-    let exit_code = report.end(context.stop.load(Ordering::Relaxed)).exit_code();
+    let exit_code = report.end(context.stop.load(Ordering::Relaxed)) as i64;
     if store.needs_compaction()? {
         writer.compact()?;
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use records::time::days_between;
-use records::{Diagnostic, GapRecord, Installations, Position, Status};
+use records::{Diagnostic, Installations};
 use store::{LogOutcome, LogRecord, RunRecord};
 
 use crate::assess::changes::UnitChange;
@@ -188,42 +188,20 @@ pub struct RunSummary {
     /// Number of units of the fleet by state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
-    /// Status of each log; the last update counts, independent of the order of the workers.
+    /// Logs in error whose other actuators are stored.
     #[serde(skip)]
-    logs: BTreeMap<String, LogCounts>,
+    pub logs_in_part: usize,
 }
 
-/// Outcome of one log.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct LogCounts {
-    /// Tail, id and departure.
-    flight: (Option<String>, Option<String>, Option<Timestamp>),
-    /// Reason of each position without a gap, and none of the others.
-    records: BTreeMap<Position, Option<String>>,
-    diagnostics: Vec<Diagnostic>,
-    duration_s: f64,
-}
-
-/// How a run ended.
+/// How a run ended, with the exit code of its record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunEnd {
     /// Every log was processed.
-    Complete,
+    Complete = 0,
     /// Every log was processed, and some failed or are mapped wrongly.
-    LogsInError,
+    LogsInError = 1,
     /// An interrupt left logs for the next run.
-    Interrupted,
-}
-
-impl RunEnd {
-    /// Exit code of the run's record.
-    pub(crate) fn exit_code(self) -> i64 {
-        match self {
-            Self::Complete => 0,
-            Self::LogsInError => 1,
-            Self::Interrupted => 130,
-        }
-    }
+    Interrupted = 130,
 }
 
 impl RunSummary {
@@ -275,47 +253,9 @@ impl RunSummary {
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }
 
-    pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {
-        let outcome = |record: &GapRecord| {
-            let is_refused = record.estimate.status == Status::Refused;
-            let reason = is_refused.then(|| record.estimate.reason.clone().unwrap_or_default());
-            (record.position.clone(), reason)
-        };
-        let counted = LogCounts {
-            flight: (account.tail_number.clone(), account.flight_id.clone(), account.departure_utc),
-            records: records.iter().map(outcome).collect(),
-            diagnostics: diagnostics.to_vec(),
-            duration_s: account.duration_s,
-        };
-        self.logs.insert(account.log_path.clone(), counted);
-    }
-
-    /// Takes back the record of a position that another log of the run has replaced.
-    pub(crate) fn uncount(&mut self, log: &str, position: &Position) {
-        self.logs.get_mut(log).into_iter().for_each(|counted| drop(counted.records.remove(position)));
-    }
-
-    /// Adds up the logs, in the order of their names.
+    /// Ends the summary with what follows from its counts.
     pub(crate) fn close(&mut self, took_s: f64) {
         self.took_s = took_s;
-        self.done = self.logs.len();
-        self.duplicates.sort_by(|a, b| a.log.cmp(&b.log));
-        let with_records = self.logs.values().filter(|counted| !counted.records.is_empty());
-        self.flights = with_records.map(|counted| &counted.flight).collect::<BTreeSet<_>>().len();
-        for (log, counted) in &self.logs {
-            for outcome in counted.records.values() {
-                match outcome {
-                    Some(reason) => *self.refused.entry(reason.clone()).or_default() += 1,
-                    None => self.estimated += 1,
-                }
-            }
-            let error =
-                |diagnostic: &Diagnostic| LogError { log: log.clone(), diagnostic: diagnostic.clone() };
-            self.errors.extend(counted.diagnostics.iter().map(error));
-            if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < counted.duration_s) {
-                self.slowest = Some((log.clone(), counted.duration_s));
-            }
-        }
         let refusals = |(reason, count): (&String, &usize)| Refusals {
             reason: reason.clone(),
             count: *count,
@@ -345,11 +285,6 @@ impl RunSummary {
         let mut logs: Vec<&str> = self.errors.iter().map(|e| e.log.as_str()).collect();
         logs.dedup();
         logs.len()
-    }
-
-    /// Number of failed logs whose other actuators are stored.
-    pub fn logs_in_part(&self) -> usize {
-        self.logs.values().filter(|log| !log.records.is_empty() && !log.diagnostics.is_empty()).count()
     }
 
     /// Failed logs of earlier runs that no pattern of `logs.acknowledged_errors` fits.

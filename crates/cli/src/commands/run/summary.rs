@@ -145,7 +145,7 @@ fn failures(report: &RunSummary, page: &mut Page) {
     }
     if !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
-        let what = match report.logs_in_part() {
+        let what = match report.logs_in_part {
             0 => "could not be used; all others are stored".to_owned(),
             part => {
                 format!("in error; {part} of them with their other actuators stored, as all other logs are")
