@@ -16,7 +16,6 @@ use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
 use records::row_schema::to_nullable_batch;
 use records::{Diagnostic, Installations, PartNumber};
-use store::Holder;
 
 use crate::VERSION;
 use crate::arrow_capsule::arrow_error;
@@ -175,10 +174,7 @@ pub(crate) fn run_summary(
 ) -> PyResult<String> {
     let stop = AtomicBool::new(false);
     let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let summary = py.detach(|| {
-        let holder = Holder::this_process();
-        run(&Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} })
-    });
+    let summary = py.detach(|| run(&Context { program_version: VERSION, wait, stop: &stop, watch: &|_| {} }));
     let summary = summary.map_err(|error| to_run_exception(py, error))?;
     serde_json::to_string(&summary)
         .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))

@@ -1,7 +1,7 @@
 //! Loading of configuration and tables, common to all commands.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
@@ -83,8 +83,8 @@ const NAMES: [(&str, &str); 5] = [
 pub(crate) enum KnownNames {
     /// A store, if there is one, and the installations table.
     Store(Option<Box<Store>>, Installations),
-    /// A table of estimates made elsewhere.
-    Estimates(Histories),
+    /// A table of estimates made elsewhere, and its units.
+    Estimates(PathBuf, Histories),
 }
 
 /// The word that messages use for a column of names.
@@ -113,7 +113,7 @@ impl KnownNames {
                 });
                 stored.unwrap_or_default().into_iter().chain(installed).collect()
             }
-            Self::Estimates(histories) => match column {
+            Self::Estimates(_, histories) => match column {
                 "tail_number" => histories.tails().map(str::to_owned).collect(),
                 "serial_number" => histories.units.keys().map(|(_, serial)| serial.clone()).collect(),
                 "part_number" => histories.units.keys().filter_map(|(part, _)| part.clone()).collect(),
@@ -134,13 +134,14 @@ impl KnownNames {
             what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
         let hint = match nearest(name, known.iter().map(String::as_str)) {
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
-            None => "list all units of the store with `freeplay trend`".to_owned(),
+            None => format!("list all units of {} with `freeplay trend`", self.place()),
         };
-        Err(Failure::usage(
-            "unknown_name",
-            format!("no {what} `{name}` in the store and the installations table ({} searched)", known.len()),
-            &hint,
-        ))
+        let searched = match self {
+            Self::Store(..) => "the store and the installations table".to_owned(),
+            Self::Estimates(..) => self.place(),
+        };
+        let what = format!("no {what} `{name}` in {searched} ({} searched)", known.len());
+        Err(Failure::usage("unknown_name", what, &hint))
     }
 
     /// Refuses the first name of a selection of units that is unknown.
@@ -172,19 +173,27 @@ impl KnownNames {
         format!("{table}; list the flights there with `freeplay query tail {tail}`")
     }
 
-    /// The range of departures that was searched, as text.
+    /// Where the departures are, as text.
+    fn place(&self) -> String {
+        match self {
+            Self::Store(..) => "the store".to_owned(),
+            Self::Estimates(file, _) => display_path(file),
+        }
+    }
+
+    /// What was searched, as text: the departures in the store.
     fn searched(&self) -> String {
         let range = match self {
             Self::Store(store, _) => store
                 .as_ref()
                 .and_then(|store| store.info().ok())
                 .and_then(|info| info.first_departure_utc.zip(info.last_departure_utc)),
-            Self::Estimates(histories) => histories.oldest_utc().zip(histories.newest_utc()),
+            Self::Estimates(_, histories) => histories.oldest_utc().zip(histories.newest_utc()),
         };
-        let day = |at: Timestamp| at.strftime("%Y-%m-%d");
+        let (day, place) = (|at: Timestamp| at.strftime("%Y-%m-%d"), self.place());
         range.map_or_else(
-            || "the store has no departures".to_owned(),
-            |(from, to)| format!("the departures in the store are from {} to {}", day(from), day(to)),
+            || format!("{place} has no departures"),
+            |(from, to)| format!("the departures in {place} are from {} to {}", day(from), day(to)),
         )
     }
 }

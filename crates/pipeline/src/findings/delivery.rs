@@ -58,8 +58,8 @@ pub trait Courier {
     /// When the store cannot be written.
     fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Self::Error>;
 
-    /// Sends the message of a row.
-    fn send(&mut self, row: &AlertRecord) -> Attempt;
+    /// Sends the message of a row through its channel.
+    fn send(&mut self, channel: &AlertChannel, row: &AlertRecord) -> Attempt;
 
     /// Whether the run must end soon.
     fn is_stopped(&self) -> bool;
@@ -104,17 +104,18 @@ pub fn deliver<C: Courier>(
     if !delivery.unconfirmed.is_empty() {
         courier.write(&delivery.unconfirmed)?;
     }
-    for (name, mut rows) in due {
+    for (name, channel) in channels {
+        let Some(mut rows) = due.remove(name) else { continue };
         // A message that always fails must not keep others back.
         rows.sort_by_cached_key(|row| (row.attempts, row.as_of_utc, row.change_number, row.alert_id.clone()));
-        let is_repeatable = channels.get(&name).is_some_and(is_repeatable);
         let delivery = &mut delivery;
-        ChannelDelivery { run_id, is_repeatable, courier, delivery, summary }.run(rows)?;
+        ChannelDelivery { run_id, channel, courier, delivery, summary }.run(rows)?;
     }
     Ok(delivery)
 }
 
-/// Whether a message may be sent twice: a file of one name is written once, and some receivers drop doubles.
+/// Whether a message may be sent twice, so that it needs no claim: a file of one name is written once, and some receivers
+/// drop doubles.
 fn is_repeatable(channel: &AlertChannel) -> bool {
     channel.resend_unconfirmed || channel.folder.is_some()
 }
@@ -122,8 +123,7 @@ fn is_repeatable(channel: &AlertChannel) -> bool {
 /// Delivery of one channel.
 struct ChannelDelivery<'a, C> {
     run_id: &'a str,
-    /// Messages need no claim: one that was sent and not marked is sent again.
-    is_repeatable: bool,
+    channel: &'a AlertChannel,
     courier: &'a mut C,
     delivery: &'a mut Delivery,
     summary: &'a mut AlertSummary,
@@ -140,7 +140,7 @@ impl<C: Courier> ChannelDelivery<'_, C> {
             let Some(mut row) = rows.next() else { break };
             row.attempts += 1;
             row.error = None;
-            if self.is_repeatable {
+            if is_repeatable(self.channel) {
                 if marked.len() == MAX_MARKED {
                     self.courier.write(&std::mem::take(&mut marked))?;
                 }
@@ -159,7 +159,7 @@ impl<C: Courier> ChannelDelivery<'_, C> {
 
     /// Sends one message and counts it.
     fn send(&mut self, row: &mut AlertRecord) {
-        let (status, error) = match self.courier.send(row) {
+        let (status, error) = match self.courier.send(self.channel, row) {
             Attempt::Sent => (AlertStatus::Sent, None),
             Attempt::NotSent(why) => (AlertStatus::Pending, Some(why)),
             Attempt::Unknown(why) => (AlertStatus::Unconfirmed, Some(why)),

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use jiff::Timestamp;
 use job::Config;
+use job::config::AlertChannel;
 use records::{AlertRecord, AlertStatus, Diagnostic, Installations, WorkEventKind, WorkRequest};
 use store::Writer;
 
@@ -174,11 +175,8 @@ impl Courier for StoreCourier<'_> {
         self.writer.write_alerts(rows)
     }
 
-    fn send(&mut self, row: &AlertRecord) -> Attempt {
-        match self.config.document.alerts.get(&row.channel) {
-            Some(settings) => channel::send(self.config, settings, row),
-            None => Attempt::NotSent("the channel is not configured".to_owned()),
-        }
+    fn send(&mut self, channel: &AlertChannel, row: &AlertRecord) -> Attempt {
+        channel::send(self.config, channel, row)
     }
 
     fn is_stopped(&self) -> bool {

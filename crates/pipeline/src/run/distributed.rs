@@ -12,7 +12,7 @@ use ingest::LogFiles;
 use job::Config;
 use records::Installations;
 use serde::{Deserialize, Serialize};
-use store::{LogOutcome, LogRecord};
+use store::LogRecord;
 
 use crate::error::Error;
 use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
@@ -120,11 +120,7 @@ fn to_log_result(inputs: &RunInputs, work: &WorkItem, answer: ProcessedLog) -> P
     let LogRecord { size_bytes, modified_utc_ns, file_id, log_path, .. } =
         summary::of_log(work, &inputs.run_id);
     let account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..answer.account };
-    if let Some((estimated, refused)) = inputs.already_recorded(work, &account) {
-        let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
-        return ProcessedLog::without_records(already_recorded, Vec::new());
-    }
-    ProcessedLog { account, ..answer }
+    inputs.known(work, &account).unwrap_or(ProcessedLog { account, ..answer })
 }
 
 /// Results by log; the first of several results of a log counts.

@@ -45,8 +45,6 @@ const BATCH_LOGS: usize = 256;
 pub struct Context<'a> {
     /// Version written into every record.
     pub program_version: &'a str,
-    /// Holder of the store's lock.
-    pub holder: Holder,
     /// Longest wait for another run that holds it.
     pub wait: Option<Duration>,
     /// Set from outside to end the run after the flights in progress.
@@ -125,7 +123,7 @@ pub(crate) fn execute_run(
     inspections::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
-    let mut writer = store.lock(&context.holder, context.wait)?;
+    let mut writer = store.lock(&Holder::this_process(), context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let started_utc = Timestamp::now();
@@ -239,9 +237,9 @@ impl RunInputs {
         ProcessedLog::in_error(account, diagnostic)
     }
 
-    /// Numbers of records that are stored for this log's content and these settings: its own, or those of a deleted log
-    /// that it replaces; none if another existing log owns them.
-    pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
+    /// The outcome of a log whose content is known under these settings. Its records are its own, those of a log that is
+    /// gone, whose place it takes, or none, when another existing log owns them.
+    pub(crate) fn known(&self, work: &WorkItem, account: &LogRecord) -> Option<ProcessedLog> {
         let digests = plan::digests(account)?;
         if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
             return None;
@@ -251,13 +249,14 @@ impl RunInputs {
                 && plan::is_same_flight(before, account)
                 && before.flight_id == account.flight_id
         };
-        if let Some(own) = work.before.as_ref().filter(is_known) {
-            return Some((own.estimated, own.refused));
-        }
+        let counts = |before: &LogRecord| (before.estimated, before.refused);
+        let own = work.before.as_ref().filter(is_known).map(counts);
         let here = self.plan.here.get(&digests).and_then(|path| self.plan.accounts.get(path));
         let is_copy = here.filter(is_known).map(|_| (0, 0));
         let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
-        is_copy.or_else(|| gone.filter(is_known).map(|gone| (gone.estimated, gone.refused)).next())
+        let (estimated, refused) = own.or(is_copy).or_else(|| gone.filter(is_known).map(counts).next())?;
+        let known = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account.clone() };
+        Some(ProcessedLog::without_records(known, Vec::new()))
     }
 }
 
@@ -354,10 +353,8 @@ impl WorkerContext<'_> {
         account.flight_id = Some(flight.flight_id.to_string());
         account.departure_utc = Some(flight.departure_utc);
         account.positions = names.iter().map(ToString::to_string).collect();
-        if let Some(already_recorded) = self.inputs.already_recorded(work, &account) {
-            (account.estimated, account.refused) = already_recorded;
-            account.outcome = LogOutcome::Known;
-            return ProcessedLog::without_records(account, Vec::new());
+        if let Some(known) = self.inputs.known(work, &account) {
+            return known;
         }
         drop(step);
         self.read(&opened, account)

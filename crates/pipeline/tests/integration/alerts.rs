@@ -110,7 +110,7 @@ impl Courier for World {
         self.write_all(rows)
     }
 
-    fn send(&mut self, row: &AlertRecord) -> Attempt {
+    fn send(&mut self, _: &AlertChannel, row: &AlertRecord) -> Attempt {
         let why = "a fault".to_owned();
         self.attempts += 1;
         let (attempt, is_received) = match self.random.u64(..10) {

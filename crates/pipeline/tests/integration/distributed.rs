@@ -9,7 +9,7 @@ use pipeline::run::distributed::{self, Task};
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Error, Request, RunSummary};
 use records::GapRecord;
-use store::{Holder, Query, Store};
+use store::{Query, Store};
 use tempfile::TempDir;
 
 /// Six logs of one aircraft of the small fleet, and a store of their own.
@@ -32,8 +32,7 @@ fn fleet() -> (TempDir, Config) {
 
 fn with_context<T>(ask: impl FnOnce(&Context<'_>) -> T) -> T {
     let stop = AtomicBool::new(false);
-    let holder = Holder::this_process();
-    ask(&Context { program_version: "0", holder, wait: None, stop: &stop, watch: &|_| {} })
+    ask(&Context { program_version: "0", wait: None, stop: &stop, watch: &|_| {} })
 }
 
 /// Does tasks as a worker would, and hands the answers to `spoil` on their way.

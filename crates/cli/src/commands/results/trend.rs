@@ -36,7 +36,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     let mut nothing = "no unit was queried\n".to_owned();
     if found.now.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
-            Some(file) => KnownNames::Estimates(external_estimates::read(file)?),
+            Some(file) => KnownNames::Estimates(file.clone(), external_estimates::read(file)?),
             None => KnownNames::of(&config),
         };
         known.check_units(&args.units)?;

@@ -13,7 +13,6 @@ use pipeline::logs::plan::WorkItem;
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::{SerialNumber, TailNumber};
-use store::Holder;
 
 use crate::args::{Global, RunArgs, UnitFilterArgs};
 use crate::exit::{Code, Failure};
@@ -71,13 +70,7 @@ fn execute(
         output.event(&event);
         progress.follow(&event);
     };
-    let context = Context {
-        program_version: VERSION,
-        holder: Holder::this_process(),
-        wait: args.wait,
-        stop: &stop,
-        watch: &watch,
-    };
+    let context = Context { program_version: VERSION, wait: args.wait, stop: &stop, watch: &watch };
     let metrics = args.metrics.clone();
     answer_interrupt(&stop, &phase, output, move || {
         metrics.map_or(Ok(()), |file| metrics::write_failed(&file, started_utc, Code::Interrupted))
