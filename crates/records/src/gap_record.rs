@@ -2,7 +2,7 @@
 
 use arrow::datatypes::SchemaRef;
 use jiff::Timestamp;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use strum::{EnumString, IntoStaticStr};
 
 use crate::flight::Flight;
@@ -143,12 +143,21 @@ stored_row! {
         /// Standard error of `preload_n`, N.
         pub preload_se_n: Option<f64>,
         /// Screw positions of the gap profile, where the gap varies, m.
+        #[serde(deserialize_with = "numbers")]
         pub gap_profile_at_m: Vec<f64>,
         /// Gap at each of `gap_profile_at_m`, m.
+        #[serde(deserialize_with = "numbers")]
         pub gap_profile_m: Vec<f64>,
         /// Standard error of `gap_profile_m`, m.
+        #[serde(deserialize_with = "numbers")]
         pub gap_profile_se_m: Vec<f64>,
     }
+}
+
+/// Reads numbers of JSON, which has `null` for one that is not finite.
+fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let numbers = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(numbers.into_iter().map(|number| number.unwrap_or(f64::NAN)).collect())
 }
 
 impl GapEstimate {
@@ -233,5 +242,23 @@ impl RecordKey {
             tail_number: record.flight.tail_number.to_string(),
             position: record.position.to_string(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The results of a distributed run are JSON: one number must not make a log's whole result unreadable.
+    #[test]
+    fn a_profile_with_a_number_that_is_not_finite_is_read_back_from_json() {
+        let estimate = GapEstimate { gap_profile_m: vec![1e-6, f64::NAN], ..GapEstimate::default() };
+        let text = serde_json::to_string(&estimate).unwrap();
+        let read: GapEstimate = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            read.gap_profile_m.iter().map(|m| m.is_nan()).collect::<Vec<_>>(),
+            [false, true],
+            "{text}"
+        );
     }
 }
