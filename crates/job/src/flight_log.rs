@@ -78,7 +78,7 @@ impl FlightLog {
     }
 
     /// Its name in records and diagnostics.
-    pub(crate) fn display_name(&self) -> &str {
+    pub fn display_name(&self) -> &str {
         &self.display_name
     }
 
@@ -221,7 +221,7 @@ impl FlightLog {
     }
 }
 
-/// Passes on the channels of every actuator of a log as those of one part. The log needs no identity.
+/// Passes the channels of every actuator of a log to `take`, all as those of one part. The log needs no identity.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.

@@ -6,7 +6,6 @@
 pub mod config;
 pub mod estimate;
 pub mod flight_log;
-pub mod normalize;
 pub mod panic;
 pub mod part_identification;
 pub mod rejection;

@@ -1,12 +1,13 @@
-//! Many logs to normalized logs, one log per worker.
+//! Logs to normalized logs, one log per worker: a file for each actuator, which `run` reads back to the same gap.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use ingest::LogFiles;
 use ingest::parquet::writer::Encoding;
+use ingest::{ActuatorColumns, LogFiles};
 use job::Config;
+use job::flight_log::{FlightLog, catch_panic};
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
@@ -22,10 +23,11 @@ pub struct Normalized {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Writes the normalized logs of some logs below a folder.
+/// Writes the normalized logs of some logs below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight number
+/// flies again.
 ///
 /// # Errors
-/// When workers cannot be started. Logs in error are diagnostics.
+/// When workers cannot be started. Logs and actuators in error are diagnostics; the others are written.
 pub fn normalize(
     config: &Config,
     installations: &Installations,
@@ -37,47 +39,107 @@ pub fn normalize(
 ) -> Result<Normalized, Error> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
-    let claims: Mutex<BTreeMap<PathBuf, String>> = Mutex::default();
+    let request = Normalization { config, installations, folder, encoding, claims: Mutex::default() };
     let one = |(files, log_path): &(LogFiles, String)| {
-        let claim = |file: &Path, digest: &str| claimed(&claims, file, log_path, digest);
-        let done =
-            job::normalize::normalize(files, log_path, config, installations, folder, encoding, &claim);
-        let done = done.unwrap_or_else(|diagnostic| (Vec::new(), vec![diagnostic]));
-        let (log, diagnostics) = (log_path.clone(), done.1.clone());
-        watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, diagnostics });
+        let mut done = Normalized::default();
+        let failed = catch_panic(log_path, || request.one(files, log_path, &mut done)).err();
+        done.diagnostics.extend(failed);
+        let (log, diagnostics) = (log_path.clone(), done.diagnostics.clone());
+        watch(Event::Finished { log, bytes: 0, estimated: done.written.len(), refused: 0, diagnostics });
         done
     };
     let done: Vec<_> = pool.install(|| logs.par_iter().map(one).collect());
     let mut all = Normalized::default();
-    for (written, diagnostics) in done {
-        all.written.extend(written);
-        all.diagnostics.extend(diagnostics);
+    for of_log in done {
+        all.written.extend(of_log.written);
+        all.diagnostics.extend(of_log.diagnostics);
     }
     Ok(all)
 }
 
-/// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log.
-fn claimed(
-    claims: &Mutex<BTreeMap<PathBuf, String>>,
-    file: &Path,
-    log_path: &str,
-    digest: &str,
-) -> Result<(), Diagnostic> {
-    let mut claims = claims.lock().unwrap_or_else(PoisonError::into_inner);
-    let owner = match claims.get(file) {
-        Some(other) => Some(format!("the normalized log of {other}")),
-        None if file.symlink_metadata().is_err() => None,
-        None => match ingest::log::normalized::source(file) {
-            Some((log, of)) if log == log_path || of == digest => None,
-            Some((log, _)) => Some(format!("the normalized log of {log}")),
-            None => Some("not a normalized log".to_owned()),
-        },
-    };
-    if let Some(owner) = owner {
-        let what = format!("{} exists and is {owner}", file.display());
-        let hint = "remove one of the logs or the file, or name another folder";
-        return Err(Diagnostic::new("would_overwrite", what).hint(hint));
+/// How logs are normalized, and which log each file is of.
+struct Normalization<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    folder: &'a Path,
+    encoding: Encoding,
+    claims: Mutex<BTreeMap<PathBuf, String>>,
+}
+
+impl Normalization<'_> {
+    fn one(&self, files: &LogFiles, log_path: &str, done: &mut Normalized) -> Result<(), Diagnostic> {
+        let opened = FlightLog::open(files, log_path, self.config, self.installations)?;
+        let complete = opened.actuators(self.installations).filter(|at| at.lacking.is_empty());
+        for at in complete {
+            match self.write(&opened, at) {
+                Ok(file) => done.written.push(file),
+                Err(diagnostic) => done.diagnostics.push(diagnostic.in_file(log_path)),
+            }
+        }
+        Ok(())
     }
-    claims.insert(file.to_owned(), log_path.to_owned());
-    Ok(())
+
+    fn write(&self, opened: &FlightLog, at: &ActuatorColumns) -> Result<PathBuf, Diagnostic> {
+        let id = &opened.identity;
+        let (installation, part) = opened.unit(at, self.config, self.installations)?;
+        let channels = opened.channels(at, part)?;
+        let flight = format!("{}_{}", id.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight_id);
+        let names = [id.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
+        let file = self.folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
+        self.claim(&file, opened)?;
+        let config_digest = self.config.digest(&id.tail_number, &installation.part_number);
+        let provenance = BTreeMap::from([
+            ("source_log".to_owned(), opened.display_name().to_owned()),
+            ("source_digest".to_owned(), opened.digest.clone()),
+            ("config_digest".to_owned(), config_digest.to_string()),
+            ("part_number".to_owned(), installation.part_number.to_string()),
+            ("serial_number".to_owned(), installation.serial_number.to_string()),
+        ]);
+        ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, self.encoding)
+            .map_err(|e| e.diagnostic())?;
+        Ok(file)
+    }
+
+    /// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log.
+    fn claim(&self, file: &Path, opened: &FlightLog) -> Result<(), Diagnostic> {
+        let log_path = opened.display_name();
+        let mut claims = self.claims.lock().unwrap_or_else(PoisonError::into_inner);
+        let owner = match claims.get(file) {
+            Some(other) => Some(format!("the normalized log of {other}")),
+            None if file.symlink_metadata().is_err() => None,
+            None => match ingest::log::normalized::source(file) {
+                Some((log, digest)) if log == log_path || digest == opened.digest => None,
+                Some((log, _)) => Some(format!("the normalized log of {log}")),
+                None => Some("not a normalized log".to_owned()),
+            },
+        };
+        if let Some(owner) = owner {
+            let what = format!("{} exists and is {owner}", file.display());
+            let hint = "remove one of the logs or the file, or name another folder";
+            return Err(Diagnostic::new("would_overwrite", what).hint(hint));
+        }
+        claims.insert(file.to_owned(), log_path.to_owned());
+        Ok(())
+    }
+}
+
+/// A name as a file may carry it: what is no letter, digit, dot, dash or underscore is written `%2F`.
+fn file_name(name: &str) -> String {
+    let plain = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_') || *b == b'.';
+    let dots = name.bytes().all(|b| b == b'.');
+    name.bytes()
+        .map(|b| if plain(&b) && !dots { char::from(b).to_string() } else { format!("%{b:02X}") })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_leaves_its_folder() {
+        assert_eq!(file_name("N412FP"), "N412FP");
+        assert_eq!(file_name("../x"), "..%2Fx");
+        assert_eq!(file_name(".."), "%2E%2E");
+    }
 }

@@ -12,8 +12,7 @@ use store::{LogOutcome, LogRecord, RecordKey};
 
 use crate::error::{is_passing, is_unlisted};
 use crate::logs::discover::DiscoveredLogs;
-use crate::logs::file_stat::FileStat;
-use crate::logs::file_stat::SeenObjects;
+use crate::logs::file_stat::{FileStat, SeenObjects};
 
 /// Options of a run.
 #[derive(Debug, Clone, Default)]
@@ -149,8 +148,6 @@ pub struct Plan {
     pub left: usize,
     /// Failed logs of earlier runs that are not processed again, by path.
     pub standing_errors: Vec<StandingError>,
-    /// Files of groups whose flight has no main log.
-    pub strays: Vec<String>,
     /// Digest of the settings of a log without an identity.
     pub unidentified: String,
 }
@@ -193,7 +190,7 @@ pub fn plan(
     accounts: Vec<LogRecord>,
     request: &Request,
 ) -> Plan {
-    let (strays, seen) = (found.strays, found.seen);
+    let seen = found.seen;
     let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
         found.logs.into_iter().map(|(log_path, files)| (log_path, (files, None))).collect();
     let faulty = |(log_path, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
@@ -249,7 +246,6 @@ pub fn plan(
         absent,
         not_asked,
         left,
-        strays,
         standing_errors,
         ..Plan::default()
     };

@@ -21,7 +21,7 @@ use crate::error::Error;
 use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{self, Plan, WorkItem};
 use crate::run::event::Event;
-use crate::run::summary::{self, DuplicateLog, LogError, RunSummary};
+use crate::run::summary::{self, DuplicateLog, LogError, Refusals, RunSummary};
 
 /// Outcome of one log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -137,6 +137,12 @@ impl<'a> OwnershipLedger<'a> {
                 None => report.estimated += 1,
             }
         }
+        let refusals = |(reason, count): (&String, &usize)| Refusals {
+            reason: reason.clone(),
+            count: *count,
+            remedy: job::rejection::remedy(reason),
+        };
+        report.refusals = report.refused.iter().map(refusals).collect();
         let with_records: BTreeSet<&str> = self.own.values().map(|own| own.held.log_path.as_str()).collect();
         let accounts = with_records.iter().filter_map(|log| self.accounts.get(*log));
         let flights =

@@ -179,7 +179,7 @@ pub(crate) fn execute_run(
         // A run that left logs out cannot determine which tails have no data.
         report.quiet.clear();
     }
-    report.close(clock.elapsed().as_secs_f64());
+    report.took_s = clock.elapsed().as_secs_f64();
     let exit_code = report.end(context.stop.load(Ordering::Relaxed)) as i64;
     if store.needs_compaction()? {
         writer.compact()?;
@@ -357,28 +357,24 @@ impl WorkerContext<'_> {
             return known;
         }
         drop(step);
-        self.read(&opened, account)
-    }
-
-    fn read(&self, opened: &FlightLog, mut account: LogRecord) -> ProcessedLog {
-        let stamp = ProvenanceStamp {
-            run_id: self.inputs.run_id.clone(),
-            program_version: self.inputs.program_version.clone(),
-            processed_utc: Timestamp::now(),
-        };
-        let (records, diagnostics) = self.records(opened, &stamp);
+        let (records, diagnostics) = self.records(&opened);
         summary::set_error(&mut account, &diagnostics);
         ProcessedLog { account, records, diagnostics }
     }
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
-    fn records(&self, opened: &FlightLog, stamp: &ProvenanceStamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
+    fn records(&self, opened: &FlightLog) -> (Vec<GapRecord>, Vec<Diagnostic>) {
+        let stamp = ProvenanceStamp {
+            run_id: self.inputs.run_id.clone(),
+            program_version: self.inputs.program_version.clone(),
+            processed_utc: Timestamp::now(),
+        };
         let actuators: Vec<_> = opened.actuators(&self.inputs.installations).collect();
         let bytes = MemoryBudget::actuator_bytes(opened.rows());
         let process_log = |at: &&ActuatorColumns| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();
-            opened.record(at, &self.inputs.config, &self.inputs.installations, stamp)
+            opened.record(at, &self.inputs.config, &self.inputs.installations, &stamp)
         };
         let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
         for done in actuators.par_iter().with_max_len(1).map(process_log).collect::<Vec<_>>() {

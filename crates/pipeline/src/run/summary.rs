@@ -253,17 +253,6 @@ impl RunSummary {
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }
 
-    /// Ends the summary with what follows from its counts.
-    pub(crate) fn close(&mut self, took_s: f64) {
-        self.took_s = took_s;
-        let refusals = |(reason, count): (&String, &usize)| Refusals {
-            reason: reason.clone(),
-            count: *count,
-            remedy: job::rejection::remedy(reason),
-        };
-        self.refusals = self.refused.iter().map(refusals).collect();
-    }
-
     /// Records without a gap.
     pub fn refusals(&self) -> usize {
         self.refused.values().sum()

@@ -8,7 +8,8 @@ use job::flight_log::part_of;
 use job::trace::Trace;
 use pipeline::inspect::estimate::{self, EstimateRequest, EstimateRow};
 use pipeline::logs::discover;
-use records::{Installations, PartNumber};
+use records::{Diagnostic, Installations, PartNumber};
+use report::{EstimatePlot, estimate_plot_html, estimate_plot_svg};
 
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
@@ -16,7 +17,6 @@ use crate::output::Output;
 use crate::row_output;
 use crate::table::{self, count, number, or_dash, text, unit_name};
 
-use super::estimate_plot::write_plots;
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
 use crate::commands::results::query::{flags_text, load};
 
@@ -50,7 +50,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
         plots.extend(of_log.plots);
         diagnostics.extend(of_log.diagnostics);
     }
-    // A log that failed is reported already; it has no trace and no plot.
+    // An actuator whose estimate failed has neither trace nor plot: its error is among the diagnostics.
     if let Some(file) = &args.trace {
         write_trace(file, &trace, output)?;
     }
@@ -107,4 +107,40 @@ fn write_trace(file: &Path, trace: &Trace, output: &Output) -> Result<(), Failur
         .map_err(|e| Failure::failed(e.diagnostic()))?;
     output.note(&format!("wrote {} samples to {}", trace.samples(), display_path(file)));
     Ok(())
+}
+
+/// Draws the plots of all actuators into one file; the extension selects the format.
+fn write_plots(file: &Path, plots: &[EstimatePlot], output: &Output) -> Result<(), Failure> {
+    let draw = renderer(file)?;
+    if plots.is_empty() {
+        output.note(&format!("no actuator to draw; {} was not written", display_path(file)));
+        return Ok(());
+    }
+    let failed = |what: &dyn std::fmt::Display| {
+        Failure::failed(Diagnostic::new("cannot_write", format!("{}: {what}", display_path(file))))
+    };
+    let picture = draw(plots).map_err(|e| failed(&e))?;
+    std::fs::write(file, picture).map_err(|e| failed(&e))?;
+    output.note(&format!("drew {} to {}", count(plots.len(), "actuator"), display_path(file)));
+    Ok(())
+}
+
+type Renderer = fn(&[EstimatePlot]) -> Result<Vec<u8>, report::Error>;
+
+fn renderer(file: &Path) -> Result<Renderer, Failure> {
+    let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    match ending.as_str() {
+        "svg" => Ok(|plots| Ok(estimate_plot_svg(plots).into_bytes())),
+        "html" | "htm" => Ok(|plots| estimate_plot_html(plots, None).map(String::into_bytes)),
+        "png" => Err(Failure::usage(
+            "unknown_ending",
+            format!("{}: plots are not written as PNG", display_path(file)),
+            "write .svg and convert it, for example with `rsvg-convert plot.svg -o plot.png`",
+        )),
+        _ => Err(Failure::usage(
+            "unknown_ending",
+            format!("{} has no known extension", display_path(file)),
+            "use the extension .svg or .html",
+        )),
+    }
 }

@@ -2,5 +2,4 @@
 
 pub(crate) mod check;
 pub(crate) mod estimate;
-mod estimate_plot;
 pub(crate) mod normalize;
