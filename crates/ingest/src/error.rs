@@ -49,7 +49,7 @@ impl Error {
     }
 }
 
-/// What can be wrong: one variant for each thing its owner would do differently.
+/// Kind of an error: one variant for each different remedy.
 ///
 /// The name of a variant is its code where no other is given; its message is the remedy. Rows count from 0.
 #[derive(Debug, thiserror::Error, strum::IntoStaticStr, strum::EnumMessage)]

@@ -24,7 +24,7 @@ use crate::{estimate, panic};
 /// Time zones and clocks that drift explain no more than this.
 const MAX_AHEAD: SignedDuration = SignedDuration::from_hours(24);
 
-/// What a run writes on everything it makes.
+/// Provenance that a run writes into its records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProvenanceStamp {
     /// The run.
@@ -270,7 +270,7 @@ pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, 
     })
 }
 
-/// Why no unit has a log's channels. The text is the same for all logs of one cause, so that it is told once.
+/// Why no unit has a log's channels. The text is the same for all logs of one cause, so that it is reported once.
 fn no_installation(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
     let (tail, at) = (&id.tail_number, id.departure_utc);
     if !installations.contains_tail(tail) {

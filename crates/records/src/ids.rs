@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Most bytes of an identifier: it stands in every record, file name and message.
+/// Maximum length of an identifier, bytes: every record, file name and message contains it.
 const ID_BYTES: usize = 256;
 
 /// A text that is no identifier; `what` is its kind, e.g. `tail number`.

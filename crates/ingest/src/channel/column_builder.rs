@@ -4,10 +4,10 @@ use crate::channel::buffer_pool;
 use crate::channel::si_conversion::{SiConversion, apply_to_all};
 use crate::channel::stats::{ChannelStats, StatsAccumulator};
 
-/// Numbers that are brought in between two looks: few enough to stay in the first cache.
+/// Numbers that are read and added at a time: few enough to stay in the first-level cache.
 pub(crate) const BATCH: usize = 2048;
 
-/// A column that more raw numbers are added to.
+/// A column to which raw numbers are added.
 #[derive(Debug)]
 pub(crate) struct ColumnBuilder {
     to_si: Option<SiConversion>,
@@ -17,7 +17,7 @@ pub(crate) struct ColumnBuilder {
 }
 
 impl ColumnBuilder {
-    /// An empty column with room for so many values, which become SI or stay raw.
+    /// An empty column with room for `values` values, which become SI or stay raw.
     pub(crate) fn with_capacity(values: usize, to_si: Option<SiConversion>) -> Self {
         Self { to_si, values: buffer_pool::acquire(values), scanner: None }
     }

@@ -101,7 +101,7 @@ pub(crate) fn to_si(
     })
 }
 
-/// What brings the unit's dimension to the screw axis, or what would be wanted instead.
+/// Factor that converts the unit's dimension to the screw axis; the error names the units that are needed instead.
 fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
     let rotary = matches!(geometry, Geometry::Rotary { .. });
     let metres_per_radian = geometry.metres_per_radian();

@@ -10,7 +10,7 @@ use crate::infer::column_names::{place_in, words};
 use crate::log::identity::hive_folders;
 use crate::mapping::IdentityField;
 
-/// Names by which a fact goes, in small letters, the best known one first.
+/// Names of a field of the identity, in small letters, the most common first.
 const SOUNDS: [(IdentityField, &str); 6] = [
     (
         IdentityField::TailNumber,
@@ -131,7 +131,7 @@ const TAILS: [&str; 3] = [
     r"(?:[A-Z]{1,2}-[A-Z0-9]{2,6}|[A-Z]{1,2}\d[A-Z0-9]{0,5}|\d\d-(?:[03-9]\d{3}|\d{5}))",
     "[A-Z]{5}",
 ];
-/// What a type of aircraft looks like, which is no tail number.
+/// Pattern of an aircraft type, which is no tail number.
 const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
 /// Folders between that of the tail and the log, at most.
 const MOST_FOLDERS: usize = 4;
@@ -229,7 +229,7 @@ pub fn path_tail(path: &Path) -> Option<String> {
     captured(&path_identity(path, false)?.0, path.to_str()?, "tail_number")
 }
 
-/// What a position in a path looks like.
+/// Pattern of a position in a path.
 const PLACE: &str = "[A-Za-z]+(?:[_ -][A-Za-z]+)*";
 
 /// The end of a file name that is a position.

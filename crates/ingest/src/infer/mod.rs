@@ -29,7 +29,7 @@ use crate::time::timestamps::EXCEL_ZERO_S;
 
 pub use identity_sources::{folder_value, path_identity, path_position, path_tail};
 
-/// What a log seems to offer.
+/// The mapping that is inferred from a log.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct InferredMapping {
     /// The time column, and its unit where the name holds one; timestamp types need none.

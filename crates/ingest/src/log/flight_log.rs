@@ -34,7 +34,7 @@ pub struct Log {
     mapping: Arc<Mapping>,
     /// Identity fields of a normalized log.
     normalized: Option<IdentityFields>,
-    /// What the conditions left of the actuator before, with all that it depends on: most actuators share it.
+    /// Selected samples of the previous actuator, with the conditions as text: most actuators have the same.
     selected: Mutex<Option<(String, SampleSelection)>>,
 }
 

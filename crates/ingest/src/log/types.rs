@@ -70,7 +70,7 @@ pub struct ActuatorChannels {
     pub missing_share: f64,
     /// The columns of motor, screw and load that were read: of redundant ones the first that is alive.
     pub columns: [Option<String>; 3],
-    /// What each channel looked like before anything was made of it: motor, screw, load.
+    /// Quality of each raw channel: motor, screw, load.
     pub quality: [Quality; 3],
     /// Quality flags of the channels: stable codes.
     pub flags: Vec<String>,
@@ -84,7 +84,7 @@ impl ActuatorChannels {
         records::sample_time_s(sample as f64, self.step_s, &self.breaks)
     }
 
-    /// What δX looks like.
+    /// Quality of δX.
     pub fn dx_quality(&self) -> Quality {
         Quality::of(&self.dx_m, &self.segments, None, self.step_s, self.excluded)
     }

@@ -266,7 +266,7 @@ pub enum Role {
 impl Role {
     /// Every channel, in the order in which they are read.
     pub const ALL: [Self; 4] = [Self::Motor, Self::Screw, Self::Load, Self::Temperature];
-    /// Those without which there is no estimate.
+    /// The roles that an estimate needs.
     pub const NEEDED: [Self; 3] = [Self::Motor, Self::Screw, Self::Load];
 
     /// The word in codes: `motor_frozen`.

@@ -57,7 +57,7 @@ impl Table {
         Err(found.into_iter().filter_map(Result::err).collect())
     }
 
-    /// What `read` makes of each row; if it cannot read some, an error for each of them.
+    /// The result of `read` for each row; if some rows cannot be read, an error for each of them.
     pub(super) fn read_rows<T>(
         &self,
         read: impl Fn(usize) -> Result<T, Error>,

@@ -100,7 +100,7 @@ impl TimeBase {
     }
 }
 
-/// What the first stamp of a clock means.
+/// Origin of a clock: the meaning of its first timestamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TimeOrigin {
     /// Where the log begins: rows without stamps.

@@ -10,7 +10,7 @@ const REGULAR_SHARE: f64 = 0.5;
 /// Least ratio of the median change to the 10 % quantile of the changes. A coarse sensor that follows a slow motion changes
 /// by one step of its resolution each time: ratio 1.
 const UNLIKE: f64 = 2.0;
-/// Nothing is drawn over more of the channel's own steps than this.
+/// Longest interval that is interpolated, in the channel's own steps.
 const LONGEST_STEPS: usize = 4;
 
 /// Draws a line between the samples of a slow channel; leaves any other as it is.

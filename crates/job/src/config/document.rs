@@ -31,7 +31,7 @@ pub struct Document {
     /// Where results are kept.
     #[serde(default)]
     pub store: StoreSettings,
-    /// What a run may use of the machine.
+    /// Limits of a run: time, rows and memory.
     #[serde(default)]
     pub run: RunSettings,
     /// Timeouts and retries of object stores.
@@ -300,7 +300,7 @@ impl Document {
         schema
     }
 
-    /// How logs are read where nothing is otherwise.
+    /// The mapping without overrides.
     pub(super) fn mapping(&self) -> Mapping {
         let bare = |group: &GroupMapping| GroupMapping { files: Vec::new(), ..group.clone() };
         Mapping {

@@ -190,17 +190,17 @@ impl Config {
         self.path(&self.document.store.path)
     }
 
-    /// How logs are read where nothing is otherwise.
+    /// The mapping without overrides.
     pub(crate) fn base_mapping(&self) -> &Arc<Mapping> {
         self.overrides.base()
     }
 
-    /// How the logs of an aircraft are read; with a part, how the channels of its actuators are.
+    /// The mapping of an aircraft's logs; with a part, of the channels of its actuators.
     pub fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
         self.overrides.mapping(tail, part)
     }
 
-    /// Whether a part is configured, and its channels are read otherwise somewhere.
+    /// Whether a part is configured and has an override.
     pub(crate) fn has_overrides(&self, part: &PartNumber) -> bool {
         self.parts.contains_key(part) && self.overrides.applies_to_part(part)
     }
@@ -212,7 +212,7 @@ impl Config {
         self.overrides.cached(tail, Some(part), |mapping| self.digest_with(mapping, part))
     }
 
-    /// How the logs of an aircraft are read, as JSON.
+    /// The mapping of an aircraft's logs, as JSON.
     pub(crate) fn mapping_text(&self, tail: &TailNumber) -> Arc<str> {
         self.overrides.cached(tail, None, |mapping| serde_json::to_string(mapping).unwrap_or_default())
     }

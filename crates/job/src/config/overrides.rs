@@ -117,7 +117,7 @@ impl Overrides {
         mapping
     }
 
-    /// How logs are read where nothing is otherwise.
+    /// The mapping without overrides.
     pub(super) fn base(&self) -> &Arc<Mapping> {
         &self.base
     }

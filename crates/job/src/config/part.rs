@@ -34,7 +34,7 @@ pub enum WearAxis {
     Reversals,
 }
 
-/// What a unit whose gap is at or above its limit asks for.
+/// Action for a unit whose gap is at or above its limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AtLimit {
@@ -56,7 +56,7 @@ pub enum LimitedGap {
     Largest,
 }
 
-/// `[part."EMA-27-1040"]`: what is known of a design.
+/// `[part."EMA-27-1040"]`: parameters of a part number.
 #[skip_serializing_none]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -87,7 +87,7 @@ pub struct PartSettings {
     pub output: Output,
     /// Load, positive and negative, at which lost motion is measured, N.
     pub reference_load_n: Option<f64>,
-    /// What the sensors and the model do not know.
+    /// Noise of the sensors and of the model.
     pub noise: Option<NoiseSettings>,
     /// Removal limit, m: state `act` at or above.
     pub limit_m: Option<f64>,

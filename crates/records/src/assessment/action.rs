@@ -151,7 +151,7 @@ pub fn state_rank(state: Option<&str>) -> u8 {
     }
 }
 
-/// What the installed units ask for, counted, the most urgent first: `1 replace now · 2 inspect, the first before 14 Dec · 8
+/// Number of installed units by action, the most urgent first: `1 replace now · 2 inspect, the first before 14 Dec · 8
 /// fine`.
 pub fn counts_text<'a>(rows: impl IntoIterator<Item = &'a TrendRow>) -> String {
     let mut kinds = BTreeMap::<(u8, String), (usize, Option<&TrendRow>)>::new();

@@ -72,7 +72,7 @@ impl TrendRow {
         std::iter::once(why.clone()).chain(others).collect::<Vec<_>>().join("; ")
     }
 
-    /// The last change of the gap that neither wear nor the books explain.
+    /// The last change of the gap that neither wear nor a table explains.
     pub(crate) fn unexplained_change(&self) -> Option<&ChangePoint> {
         self.change_points.iter().rev().find(|change| matches!(change.kind, "step" | "reset" | "onset"))
     }

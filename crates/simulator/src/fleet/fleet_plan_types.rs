@@ -55,7 +55,7 @@ pub struct Inspection {
     pub force_n: f64,
 }
 
-/// One actuator in one flight: its unit, and everything needed to fly it.
+/// One actuator in one flight: its unit, and everything needed to simulate it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedActuator {
     /// The place.

@@ -34,7 +34,7 @@ pub struct Spec {
     /// One flight of this many in a row, drawn at random, has a log. Default 1: each.
     #[default(1)]
     pub flights_per_log: usize,
-    /// Each flight has a slot of so many days; below 1, several flights a day. Default 7.
+    /// Days from one flight of a tail to the next; below 1, several flights a day. Default 7.
     #[default(7.0)]
     pub days_between_flights: f64,
     /// Mean length of a flight, hours. Default 1.8.

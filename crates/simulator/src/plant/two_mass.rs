@@ -41,7 +41,7 @@ pub struct State {
 /// The forces from outside, constant over a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Forces {
-    /// What the motor's field pushes with, at the screw, N.
+    /// Force of the motor's field, at the screw, N.
     pub drive_n: f64,
     /// The aerodynamic load on the screw, N, positive along +X.
     pub load_n: f64,
