@@ -57,11 +57,7 @@ pub fn assess(
         as_of_us,
         flights: flights.len(),
         estimates: unit.history.estimates.len(),
-        unit_hours: series
-            .usage
-            .unit_hours_at_start
-            .zip(flights.last())
-            .map(|(start, last)| start + last.hours),
+        unit_hours: series.unit_hours_at_start.zip(flights.last()).map(|(start, last)| start + last.hours),
         level: unit.measured.level,
         latest: unit.measured.latest,
         installation_sd_m: unit.prior.bias_sd_m,

@@ -9,7 +9,7 @@ pub enum Error {
         "{what} of the flight departing at {departure_us} µs is {value}: leave it out when it is not known"
     )]
     Observation { what: &'static str, departure_us: i64, value: f64 },
-    /// A limit, horizon or nominal figure that must be positive and plausible is not.
+    /// A limit or horizon that must be positive and plausible is not.
     #[error("setting {name} is {value}, which must be positive and of a plausible size")]
     Setting { name: &'static str, value: f64 },
     /// The watch limit does not lie below the act limit.

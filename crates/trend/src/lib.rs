@@ -7,7 +7,7 @@
 //! [`assess()`] fits a bank of wear curves to the series under that prior.
 //!
 //! ```
-//! use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, State, UsageDefaults, assess};
+//! use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, State, assess};
 //!
 //! // One flight of 1.5 h a day; the gap grows from 30 µm by 10 nm per flight, with a scatter of 1 µm.
 //! let day_us = |day: i64| day * 86_400_000_000;
@@ -18,7 +18,7 @@
 //!     gap_se_m: Some(1e-6),
 //!     ..Observation::default()
 //! };
-//! let series = Series::new((0..500).map(flight), &UsageDefaults::default())?;
+//! let series = Series::new((0..500).map(flight))?;
 //!
 //! let settings = Settings::for_limit(100e-6);
 //! let prior = FleetPrior::learn([&series], day_us(500), settings.limit_m, None, &SerialExecutor);
@@ -55,7 +55,7 @@ mod unit_fit;
 mod wear;
 
 pub use assess::assess;
-pub use data::series::{MaintenanceEvent, Observation, RowFaults, Series, UsageDefaults, UsageSource};
+pub use data::series::{MaintenanceEvent, Observation, RowFaults, Series, UsageSource};
 pub use error::Error;
 pub use executor::{Executor, SerialExecutor};
 pub use forecast::{Forecast, Interval, forecast};

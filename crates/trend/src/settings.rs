@@ -5,6 +5,9 @@ use crate::error::Error;
 /// Sizes that a limit [m], a horizon [h] or a number of days can have.
 const PLAUSIBLE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
+/// An unrecorded change is reported for this many days.
+pub(crate) const CHANGE_WATCH_DAYS: f64 = 30.0;
+
 /// Limits and horizons of one part number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -18,15 +21,13 @@ pub struct Settings {
     pub horizon_hours: f64,
     /// Flight hours until the next check, for the probability of passing the limit before it.
     pub check_interval_hours: f64,
-    /// An unrecorded change is reported for this many days.
-    pub change_watch_days: f64,
     /// Without a sound record for this many days the state is `unassessed`.
     pub stale_after_days: f64,
 }
 
 impl Settings {
     /// Settings for an act limit: watch at 80 % of it, planning 500 h, horizon 20,000 h, checks
-    /// every 300 h, changes watched for 30 days, stale after 30.
+    /// every 300 h, stale after 30 days.
     pub fn for_limit(limit_m: f64) -> Self {
         Self {
             limit_m,
@@ -34,7 +35,6 @@ impl Settings {
             planning_horizon_hours: 500.0,
             horizon_hours: 20_000.0,
             check_interval_hours: 300.0,
-            change_watch_days: 30.0,
             stale_after_days: 30.0,
         }
     }
@@ -50,7 +50,6 @@ impl Settings {
             ("planning_horizon_hours", self.planning_horizon_hours),
             ("horizon_hours", self.horizon_hours),
             ("check_interval_hours", self.check_interval_hours),
-            ("change_watch_days", self.change_watch_days),
             ("stale_after_days", self.stale_after_days),
         ];
         if let Some(&(name, value)) = values.iter().find(|(_, v)| !PLAUSIBLE.contains(v)) {

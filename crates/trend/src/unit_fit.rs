@@ -45,7 +45,7 @@ impl<'a> UnitFit<'a> {
         let prior = prior.cloned().unwrap_or_else(|| FleetPrior::uninformative(settings.limit_m));
         let data = series.until(as_of_us);
         let measured = Measured::new(data, settings);
-        let history = History::read(data, series.usage.unit_hours_at_start, &prior);
+        let history = History::read(data, series.unit_hours_at_start, &prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
         changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));

@@ -51,7 +51,7 @@ impl<'a> FleetPriors<'a> {
         days: &[Timestamp],
     ) -> Self {
         let mut classes: BTreeMap<Option<&str>, Vec<&Series>> = BTreeMap::new();
-        for (part, series) in units {
+        for (part, series) in units.filter(|(_, series)| !series.flights().is_empty()) {
             classes.entry(part).or_default().push(series);
         }
         let first = classes.values().flatten().filter_map(|series| series.flights().first());

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use records::row_schema::NoColumn;
 use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
-use trend::{Assessment, Reason, Series, State};
+use trend::{Assessment, FleetPrior, Reason, Series, State};
 
 use crate::assess::limits::Limits;
 use crate::assess::tail_wide_steps::TailWide;
@@ -24,13 +24,12 @@ fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
 pub(crate) struct RowSources<'a> {
     pub(crate) name: &'a UnitKey,
     pub(crate) history: &'a History,
-    pub(crate) series: Option<&'a Series>,
+    pub(crate) series: &'a Series,
     pub(crate) limits: Limits<'a>,
     pub(crate) trend: &'a Assessment,
     pub(crate) as_of: Timestamp,
     pub(crate) wide: &'a TailWide<'a>,
-    /// Usage axis of the fleet prior.
-    pub(crate) usage_axis: Option<String>,
+    pub(crate) prior: Option<&'a FleetPrior>,
     /// The installation that the unit is in.
     pub(crate) installed: Option<&'a Installation>,
     /// The last installation of a unit that is in none.
@@ -40,7 +39,7 @@ pub(crate) struct RowSources<'a> {
     /// The latest inspection in its installation.
     pub(crate) inspection: Option<&'a InspectionRow>,
     /// States of other quantities than the gap.
-    pub(crate) conditions: Vec<String>,
+    pub(crate) conditions: &'a [String],
 }
 
 impl RowSources<'_> {
@@ -52,7 +51,7 @@ impl RowSources<'_> {
         // The installations table says where a unit is; of an external table, its last flight does.
         let place = self.installed.or(removal).map(TailPosition::of);
         let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
-        let flights = self.series.map_or(&[][..], |series| series.flights_until(trend.as_of_us));
+        let flights = self.series.flights_until(trend.as_of_us);
         let gaps_m: Vec<f64> = flights.iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect();
         // A removed unit wears no more: it has no state, no date and no place among the expected removals.
         let is_judged = limit_m.is_some() && removal.is_none();
@@ -93,7 +92,7 @@ impl RowSources<'_> {
             growth_probability: trend.growth_probability,
             wear_law: trend.law.map(|(law, _)| law.to_string()),
             wear_law_probability: trend.law.map(|(_, share)| share),
-            usage_axis: self.usage_axis.clone(),
+            usage_axis: self.prior.map(|prior| prior.axis.to_string()),
             trend_p_value: None,
             change_points: trend.changes.iter().filter_map(|change| self.change_point(change)).collect(),
             limit_m,
@@ -114,7 +113,7 @@ impl RowSources<'_> {
             hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
             flights_per_day: use_now.map(|u| u.flights_per_day),
             hours_per_flight: use_now.map(|u| u.hours_per_flight),
-            usage_source: use_now.and(self.series).map(|series| series.usage.source.to_string()),
+            usage_source: use_now.map(|_| self.series.source.to_string()),
             stale_days: trend.stale_days.filter(|_| removal.is_none()),
             removed_utc: removal.and_then(|installation| installation.removed_utc),
             state: removal.is_none().then(|| state.as_str()),
@@ -125,7 +124,7 @@ impl RowSources<'_> {
                     caveats.iter().fold(self.reason_of_state(cause), |all, caveat| format!("{all}; {caveat}"))
                 }
             }),
-            conditions: self.conditions,
+            conditions: self.conditions.to_vec(),
             action: None,
             due_utc: None,
             elapsed_hours: NoColumn(trend.elapsed_hours),
@@ -155,7 +154,7 @@ impl RowSources<'_> {
         let is_said = matches!(cause, Reason::Stale { .. });
         let age = trend.stale_days.filter(|_| !is_said);
         let age = age.map(|days| format!("no sound record for {days:.0} days"));
-        let faults = self.series.map(|series| series.faults).unwrap_or_default();
+        let faults = self.series.faults;
         let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
         // A report of a past date leaves later records out on purpose.
         let now = Timestamp::now().max(*as_of);

@@ -8,14 +8,15 @@ use rayon::prelude::*;
 use records::time::days_between;
 use records::{Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
-use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
+use trend::{Assessment, FleetPrior, Series, State};
 
 use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
 use crate::assess::quantities::follow::{FollowedQuantities, follow};
 use crate::assess::quantities::subject::{UnitFacts, Units};
-use crate::assess::quantities::{peers, rows, values};
+use crate::assess::quantities::values::{self, FleetValues};
+use crate::assess::quantities::{peers, rows};
 use crate::assess::tail_wide_steps::TailWide;
 use crate::assess::trend_row::RowSources;
 use crate::error::Error;
@@ -102,24 +103,28 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
-    assess_histories(config, installations, load_histories(store)?, Some(store), ask)
+    let (histories, values) = values::load(store)?;
+    assess_histories(config, installations, histories, Some((store, values)), ask)
 }
 
-/// Assesses the selected units of some histories, with what their store holds in addition to gaps.
+/// Assesses the selected units of some histories, with the followed values and what else their store holds.
 fn assess_histories(
     config: &Config,
     installations: &Installations,
     mut histories: Histories,
-    store: Option<&Store>,
+    mut stored: Option<(&Store, FleetValues)>,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
+    if let Some((_, values)) = &mut stored {
+        values::drop_old(values, &histories, as_of);
+    }
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    if let Some(store) = store {
-        fleet.add_diagnostics(store, as_of)?;
+    if let Some((store, values)) = stored {
+        fleet.add_diagnostics(store, &values, as_of)?;
     }
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc))
@@ -159,10 +164,12 @@ pub(crate) fn assess_run(
     units: &BTreeSet<UnitKey>,
     run: RunFacts<'_>,
 ) -> Result<RunAssessments, Error> {
-    let mut histories = load_histories(store)?;
+    let (mut histories, mut values) = values::load(store)?;
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
+    values::drop_old(&mut values, &histories, as_of);
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    let recent = fleet.add_diagnostics(store, as_of)?;
+    let recent = fleet.add_diagnostics(store, &values, as_of)?;
+    drop(values);
     let (mut now, tail_wide) = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
@@ -212,14 +219,16 @@ pub(crate) struct ReportAssessments {
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
 
-/// Assesses the selected units at the date, and at earlier dates given in days before.
+/// Assesses the selected units at the date, and at earlier dates given in days before, from the histories and values of the
+/// store.
 pub(crate) fn assess_for_report(
     config: &Config,
     installations: &Installations,
+    store: &Store,
     histories: &mut Histories,
+    values: &FleetValues,
     ask: &UnitSelection,
     days_before: &[i64],
-    store: &Store,
 ) -> Result<ReportAssessments, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, histories) else {
         return Ok(ReportAssessments::default());
@@ -228,7 +237,7 @@ pub(crate) fn assess_for_report(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let mut fleet = FleetContext::new(config, installations, histories, &days)?;
-    fleet.add_diagnostics(store, as_of)?;
+    fleet.add_diagnostics(store, values, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
@@ -274,6 +283,10 @@ pub fn assess(
     let mut histories = histories.map_or_else(|| load_histories(&store()?), Ok)?;
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
     let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    // A unit that never flew has an assessment all the same.
+    for unit in &selected {
+        histories.units.entry(unit.clone()).or_default();
+    }
     let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
     // One assessment for each query, without data later than its date and without the tail-wide steps.
     let row = |(query, unit): (&AsOfQuery, &UnitKey)| {
@@ -283,7 +296,7 @@ pub fn assess(
     Ok(StoreAssessment { now, ..StoreAssessment::default() })
 }
 
-/// The unit a query means; one that never flew has a name all the same.
+/// The unit that a query means.
 fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
     let named = (query.part_number.clone(), query.serial_number.clone());
     if query.part_number.is_some() || histories.units.contains_key(&named) {
@@ -381,9 +394,14 @@ impl<'a> FleetContext<'a> {
 
     /// Adds what the store holds besides gaps: followed quantities, and wrong mappings. Returns the diagnostics of the last
     /// months, which show them.
-    fn add_diagnostics(&mut self, store: &Store, as_of: Timestamp) -> Result<RecentDiagnostics, Error> {
+    fn add_diagnostics(
+        &mut self,
+        store: &Store,
+        values: &FleetValues,
+        as_of: Timestamp,
+    ) -> Result<RecentDiagnostics, Error> {
         let facts = UnitFacts { units: &self.units, limits: self.limits };
-        self.followed = follow(&values::read(store, as_of)?, facts, as_of);
+        self.followed = follow(values, facts, as_of);
         self.moved = recorder_changes(&self.followed.changes, as_of);
         for (row, state) in self.followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
             self.conditions.entry(row.unit()).or_default().push(state.to_owned());
@@ -486,37 +504,33 @@ impl<'a> FleetContext<'a> {
     }
 
     fn trend(&self, name: &UnitKey, as_of: Timestamp) -> Result<Assessment, Error> {
-        let nothing = (&History::default(), Series::new([], &UsageDefaults::default())?);
-        let (_, series) = self.units.get(name).unwrap_or(&nothing);
+        let (_, series) = &self.units[name];
         let prior = self.prior(name, as_of);
         Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
     fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide<'_>) -> TrendRow {
-        let no_history = History::default();
-        let unit = self.units.get(name);
-        let series = unit.map(|(_, series)| series);
-        let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
+        let (history, series) = &self.units[name];
         let index = self.installations.as_ref();
         let installed = index.and_then(|index| index.installed(name, as_of));
-        let done = series.map_or(&[][..], |series| series.maintenance_until(as_of.as_microsecond()));
+        let done = series.maintenance_until(as_of.as_microsecond());
         let renewed = done.iter().rev().find(|event| event.renews);
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
         RowSources {
             name,
-            history: unit.map_or(&no_history, |(history, _)| history),
+            history,
             series,
             limits: self.limits,
             trend,
             as_of,
             wide,
-            usage_axis: prior.map(|prior| prior.axis.to_string()),
+            prior: self.prior(name, as_of).filter(|_| trend.flights > 0),
             installed,
             removal: index.and_then(|index| index.removal(name, as_of)),
             fault: self.mapping_faults.iter().find(|fault| fault.units.contains(name)),
             inspection: installed
                 .and_then(|stay| inspections::latest(&self.inspections, name, stay, renewed, as_of)),
-            conditions: self.conditions.get(name).cloned().unwrap_or_default(),
+            conditions: self.conditions.get(name).map_or(&[], Vec::as_slice),
         }
         .row()
     }

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 use jiff::Timestamp;
 use job::Config;
-use records::{Installation, Installations, PartNumber, Quantity, QuantityRow};
+use records::{Installation, Installations, PartNumber, QuantityRow};
 use store::{LogOutcome, LogRecord, Store};
 use trend::Forecast;
 
+use crate::assess::quantities::values::{FleetValues, READ};
 use crate::assess::trends::{self, ReportAssessments, StoreAssessment, UnitSelection};
 use crate::error::Error;
 use crate::findings::work_requests;
@@ -46,12 +47,12 @@ pub fn compose(
     accounts.iter().for_each(|log| *logs_known.entry(log.tail_number.clone()).or_default() += 1);
     let failed = accounts.into_iter().filter(|log| log.outcome == LogOutcome::Error);
     let mut log_errors: Vec<ReportLogErrorRow> = failed.map(log_error).collect();
-    let StoreContents { mut histories, mut extras, store_version } =
+    let StoreContents { mut histories, mut extras, values, store_version } =
         StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { fleet, drawn, before, past, priors } =
-        trends::assess_for_report(config, installations, &mut histories, ask, &days, store)?;
+        trends::assess_for_report(config, installations, store, &mut histories, &values, ask, &days)?;
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
@@ -69,6 +70,7 @@ pub fn compose(
         checks: checks.as_deref().unwrap_or(&[]),
         installations: &InstallationIndex::new(installations),
         quantities: by_unit(&followed.rows, |row| row.unit()),
+        values: &values,
     };
     let unit = |(row, drawn): (TrendRow, &Forecast)| {
         let name = row.unit();
@@ -141,6 +143,7 @@ struct ReportComposer<'a> {
     checks: &'a [InspectionRow],
     installations: &'a InstallationIndex<'a>,
     quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
+    values: &'a FleetValues,
 }
 
 impl ReportComposer<'_> {
@@ -171,7 +174,7 @@ impl ReportComposer<'_> {
             events: events(&row, &installations),
             past_forecasts: self.past(&row, &name),
             inspections: checks.map(|check| compared(check, &row, history.flights())).collect(),
-            quantities: self.quantities(&name, history, &extras),
+            quantities: self.quantities(&name),
             flights: flights(history, extras),
             installations,
             work_requests: Vec::new(),
@@ -180,14 +183,14 @@ impl ReportComposer<'_> {
     }
 
     /// The followed quantities other than the gap, with the values of the flights.
-    fn quantities(&self, name: &Name, history: &History, extras: &[FlightExtras]) -> Vec<QuantityView> {
+    fn quantities(&self, name: &Name) -> Vec<QuantityView> {
+        let values = self.values.get(name).map_or(&[][..], Vec::as_slice);
         let view = |of: &&QuantityRow| {
-            let index = Quantity::ALL.iter().position(|quantity| quantity.as_str() == of.quantity)?;
-            let value = |flown: &FlownRow| extras[flown.row as usize].quantities[index];
-            Some(QuantityView { row: (*of).clone(), values: history.flights().iter().map(value).collect() })
+            let index = READ.iter().position(|(quantity, _)| quantity.as_str() == of.quantity)?;
+            let values = values.iter().map(|of_flight| of_flight.values[index].0).collect();
+            Some(QuantityView { row: (*of).clone(), values })
         };
-        let of_unit = self.quantities.get(name).into_iter().flatten();
-        of_unit.filter(|of| of.quantity != Quantity::GapM.as_str()).filter_map(view).collect()
+        self.quantities.get(name).into_iter().flatten().filter_map(view).collect()
     }
 
     /// The forecasts that were made for the date of the report, and the level found.

@@ -6,17 +6,17 @@ use arrow::array::{Array, AsArray, ListArray, RecordBatch};
 use arrow::datatypes::Float64Type;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
-use records::Quantity;
 use records::report_rows::ReportFlight;
 use records::row_schema::NoColumn;
 use store::{Query, Store};
 
+use crate::assess::quantities::values::{FleetValues, FlightValues, ValueColumns};
 use crate::error::Error;
 use crate::fleet::builder;
 use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::TextColumn;
-use crate::fleet::unit_rows::{RowsByUnit, at, number, of_store};
+use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
 
 /// Columns of numbers that a page shows; an assessment needs load reversals alone of them.
 const NUMBERS: [&str; 8] = [
@@ -38,6 +38,8 @@ pub(super) struct StoreContents {
     pub(super) histories: Histories,
     /// Further columns of each unit's flights, by departure: each flight's `row` is its place among them.
     pub(super) extras: BTreeMap<UnitKey, Vec<FlightExtras>>,
+    /// Values of their followed quantities.
+    pub(super) values: FleetValues,
     pub(super) store_version: u64,
 }
 
@@ -49,8 +51,6 @@ pub(super) struct FlightExtras {
     /// Rejection code, or the most severe flag.
     pub(super) reason: Option<Box<str>>,
     pub(super) flags: Box<[Box<str>]>,
-    /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
-    pub(super) quantities: [f32; Quantity::ALL.len()],
 }
 
 impl StoreContents {
@@ -59,24 +59,28 @@ impl StoreContents {
         let until_utc = last.and_then(|last| last.checked_add(SignedDuration::from_micros(1)).ok());
         let mut columns = builder::stored_columns();
         columns.extend(NUMBERS.into_iter().chain(["reason"]).chain(PROFILE));
-        columns.extend(Quantity::ALL.map(Quantity::as_str));
+        columns.extend(ValueColumns::names());
         columns.sort_unstable();
         columns.dedup();
         let scan = store.scan_columns(&Query { until_utc, ..Query::default() }, &columns)?;
-        let (histories, extras) = builder::histories(of_store(&scan, add)?, true);
-        Ok(Self { histories, extras, store_version: scan.version() })
+        let (histories, further) = builder::histories(of_store(&scan, add)?, true);
+        let apart = |(name, rows): (UnitKey, Vec<_>)| {
+            let (extras, values) = rows.into_iter().unzip();
+            ((name.clone(), extras), (name, values))
+        };
+        let (extras, values) = further.into_iter().map(apart).unzip();
+        Ok(Self { histories, extras, values, store_version: scan.version() })
     }
 }
 
 fn add(
-    rows: &mut RowsByUnit<(StoredFlight, FlightExtras)>,
+    rows: &mut RowsByUnit<(StoredFlight, (FlightExtras, FlightValues))>,
     chunk: &TableBatch,
     batch: &RecordBatch,
 ) -> Result<(), ingest::Error> {
     let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
     let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
-    let quantities = Quantity::ALL.map(|quantity| column(quantity.as_str()));
-    let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let values = ValueColumns::of(chunk)?;
     let reasons = TextColumn::of(chunk, &["reason"])?;
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
     let profiles =
@@ -92,7 +96,7 @@ fn add(
             load_p95_n,
             load_reversals,
         ] = std::array::from_fn(|k| at(&numbers[k], row));
-        FlightExtras {
+        let extras = FlightExtras {
             shown: ReportFlight {
                 unit_hours,
                 gap_p05_m,
@@ -107,8 +111,8 @@ fn add(
             },
             reason: reasons.get(row).map(Into::into),
             flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
-            quantities: std::array::from_fn(|k| number(&quantities[k], row) as f32),
-        }
+        };
+        (extras, values.row(row))
     })
 }
 

@@ -12,7 +12,8 @@ const BATCH: usize = 8;
 const PRIOR_BATCHES: f64 = 5.0;
 const MAX_INFLATION: f64 = 8.0;
 
-/// Standard errors of a variance by the median of as many normal deviates, times the root of their number: two of 1.17 √2.
+/// Two standard errors, 2 · 1.17 · √2, of a variance that the median of one normal deviate gives; of n deviates, as many
+/// over √n.
 const CERTAIN: f64 = 3.3;
 
 /// With at most this many values, a jump may pass for noise: the factor of stated variances is then limited.
@@ -75,19 +76,17 @@ impl Noise {
     ///
     /// The flights after a step agree with each other from the third on.
     pub(crate) fn are_sound(&self, values: &[f64], sds: f64) -> Vec<bool> {
-        let agreeing = |at: usize, rate: f64| {
+        let is_agreeing = |at: usize, rate: f64| {
             let near = at.saturating_sub(NEIGHBOURS)..(at + 1 + NEIGHBOURS).min(values.len());
             let agrees = |other: &usize| {
                 let moved = values[at] - values[*other] - rate * (at as f64 - *other as f64);
                 let variance = self.errors[at].powi(2) + self.errors[*other].powi(2);
                 moved * moved <= sds * sds * variance
             };
-            near.filter(|other| *other != at && agrees(other)).count()
+            near.filter(|other| *other != at && agrees(other)).nth(AGREEING - 1).is_some()
         };
         let is_sound = |at: usize| {
-            values.len() <= AGREEING
-                || agreeing(at, 0.0) >= AGREEING
-                || agreeing(at, local_rate(values, at)) >= AGREEING
+            values.len() <= AGREEING || is_agreeing(at, 0.0) || is_agreeing(at, local_rate(values, at))
         };
         (0..values.len()).map(is_sound).collect()
     }

@@ -27,16 +27,8 @@ pub struct Observation {
     pub is_doubtful: bool,
 }
 
-/// Defaults for unknown usage, and the start of a unit's own hours.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UsageDefaults {
-    /// Length of a flight that states none and has no hour meter, hours.
-    pub nominal_flight_hours: f64,
-    /// The unit's hours when its first flight here began, if known.
-    pub unit_hours_at_start: Option<f64>,
-    /// Where the unit's hours are known from.
-    pub source: UsageSource,
-}
+/// Length of a flight that states none and has no hour meter, hours.
+const USUAL_FLIGHT_HOURS: f64 = 1.5;
 
 /// Where the hours of a unit are known from, the most complete source first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, strum::Display)]
@@ -50,12 +42,6 @@ pub enum UsageSource {
     /// The lengths of the logged flights alone: flights without a log are missing.
     #[default]
     LoggedFlights,
-}
-
-impl Default for UsageDefaults {
-    fn default() -> Self {
-        Self { nominal_flight_hours: 1.5, unit_hours_at_start: None, source: UsageSource::default() }
-    }
 }
 
 /// A gap and its stated standard error.
@@ -104,7 +90,7 @@ pub struct MaintenanceEvent {
 /// 1. Between two flights of one installation that both state the tail's hours, usage is their
 ///    difference: an actuator also wears in flights that left no row.
 /// 2. Where the meter is missing, or runs backwards, and on the first flight of an installation, usage
-///    is the flight's own hours, and the nominal ones where it states none.
+///    is the flight's own hours, and the usual ones where it states none.
 /// 3. Hours beyond the flight's own belong to flights without a row. They count as flights and as
 ///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
 /// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the larger gap, then the
@@ -112,8 +98,10 @@ pub struct MaintenanceEvent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
+    /// The unit's hours when its first flight here began, if known.
+    pub unit_hours_at_start: Option<f64>,
     /// Where the unit's usage is known from.
-    pub usage: UsageDefaults,
+    pub source: UsageSource,
     maintenance: Vec<MaintenanceEvent>,
     /// Rows that cannot be right.
     pub faults: RowFaults,
@@ -142,21 +130,18 @@ impl Series {
     ///
     /// # Errors
     /// [`Error::Observation`] for hours, a gap or a standard error that is not finite, or a standard error that is not
-    /// positive, [`Error::Setting`] for unusable nominal hours.
-    pub fn new(rows: impl IntoIterator<Item = Observation>, usage: &UsageDefaults) -> Result<Self, Error> {
-        let nominal = usage.nominal_flight_hours;
-        if !(nominal.is_finite() && nominal > 0.0) {
-            return Err(Error::Setting { name: "nominal_flight_hours", value: nominal });
-        }
+    /// positive.
+    pub fn new(rows: impl IntoIterator<Item = Observation>) -> Result<Self, Error> {
         let (rows, faults) = in_order(rows)?;
-        let mut meter = UsageAccumulator { nominal_flight_hours: nominal, ..UsageAccumulator::default() };
+        let mut meter = UsageAccumulator::default();
         let flights: Vec<Flight> = rows.iter().map(|row| meter.add_flight(row)).collect();
         debug_assert!(
             flights.is_sorted_by_key(|flight| flight.departure_us),
             "flights are in order of departure"
         );
         debug_assert!(flights.is_sorted_by(|a, b| a.hours <= b.hours), "hours do not decrease");
-        Ok(Self { flights, usage: *usage, maintenance: Vec::new(), faults })
+        let (unit_hours_at_start, source) = (None, UsageSource::default());
+        Ok(Self { flights, unit_hours_at_start, source, maintenance: Vec::new(), faults })
     }
 
     /// The same with the recorded maintenance of the unit, in any order.
@@ -253,7 +238,6 @@ fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
 /// The unit's usage so far, and the hour meter it was last read against.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct UsageAccumulator {
-    nominal_flight_hours: f64,
     hours: f64,
     flights: f64,
     reversals: f64,
@@ -270,7 +254,7 @@ impl UsageAccumulator {
     fn add_flight(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
         let metered = self.metered(row);
-        let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(self.nominal_flight_hours);
+        let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(USUAL_FLIGHT_HOURS);
         self.hours = metered.unwrap_or(before + own);
         self.anchor = match row.tail_hours_end {
             Some(end) => Some((row.installation, end, self.hours)),

@@ -13,7 +13,7 @@ use crate::measured::exceedance::{Exceedance, exceedance};
 use crate::measured::level::{Level, measured_level};
 use crate::measured::record::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED, Record, records};
 use crate::measured::rise::{Rise, rise};
-use crate::settings::Settings;
+use crate::settings::{CHANGE_WATCH_DAYS, Settings};
 use crate::statement::types::ChangePoint;
 
 /// The level rose or fell at once by more than wear and errors explain.
@@ -91,17 +91,17 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
     let last = sound.last()?;
     let present = measured_level(sound, settings.limit_m)?;
     // The last record first: a line through few records may follow it.
-    let mut found = jump_at(sound, sound.len() - 1, (last.gap_m, last.error_m), &present, settings);
+    let mut found = jump_at(sound, sound.len() - 1, last.gap_m, last.error_m, &present, settings);
     let mut to = sound.len();
     while found.is_none() {
         let now = measured_level(&sound[..to], settings.limit_m)?;
         let from = to - now.window.min(to);
         let first = sound.get(from)?;
         let days = last.departure_us.saturating_sub(first.departure_us) as f64 / DAY_US as f64;
-        if from == 0 || (sound.len() - from > JUMP_RECORDS && days > settings.change_watch_days) {
+        if from == 0 || (sound.len() - from > JUMP_RECORDS && days > CHANGE_WATCH_DAYS) {
             return None;
         }
-        found = jump_at(sound, from, (now.at(first.hours), now.se_m), &present, settings);
+        found = jump_at(sound, from, now.at(first.hours), now.se_m, &present, settings);
         to = from;
     }
     found
@@ -111,7 +111,8 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
 fn jump_at(
     sound: &[Record],
     from: usize,
-    (after_m, after_se_m): (f64, f64),
+    after_m: f64,
+    after_se_m: f64,
     present: &Level,
     settings: &Settings,
 ) -> Option<Jump> {

@@ -99,18 +99,16 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
     let (sound, errors): (Vec<QuantityValue>, Vec<f64>) = sound.unzip();
     let inflation = inflation(&sound.iter().map(|v| v.value).collect::<Vec<_>>(), &errors, USUAL_INFLATION);
     let weights: Vec<f64> = errors.iter().map(|error| (inflation * error * error).recip()).collect();
-    let (first, last) = (sound.first()?, sound.last()?);
     let mut model = Model::new(&sound, &weights);
     if sound.len() >= MIN_FLIGHTS {
         model.select();
     }
     let (beta, covariance) = model.solve()?;
-    let at = |index: usize, value: &QuantityValue| model.row(index, value);
-    let (x_first, x_last) = (at(0, first), at(sound.len() - 1, last));
+    let (x_first, x_last) = (model.row(0), model.row(sound.len().checked_sub(1)?));
     let variance = |x: &Row| (x.transpose() * covariance * x)[(0, 0)].max(0.0);
     let moved = x_last - x_first;
-    let steps = model.steps.iter().enumerate().map(|(k, &at)| {
-        let (column, departure_us) = (FIRST_STEP + k, sound[at].departure_us);
+    let steps = model.steps.iter().enumerate().map(|(k, step)| {
+        let (column, departure_us) = (FIRST_STEP + k, sound[step.place].departure_us);
         QuantityStep {
             departure_us,
             size: beta[column],
@@ -135,61 +133,98 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
 struct Model<'a> {
     values: &'a [QuantityValue],
     weights: &'a [f64],
-    /// Middle and half the span of the usage, hours; the span zero where usage is constant.
-    usage_hours: (f64, f64),
+    /// The drift of each value, from −1 to 1 over the span of the usage.
+    drifts: Vec<f64>,
+    /// Half the span of the usage, hours; zero where usage is constant.
+    half_span_hours: f64,
     has_drift: bool,
-    steps: Vec<usize>,
+    all: Sums,
+    /// The steps by place, each with the sums from it on.
+    steps: Vec<Sums>,
+}
+
+/// Weighted sums from a place on. The normal equations need no others: a step is one from its place on, and zero before.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    place: usize,
+    one: f64,
+    drift: f64,
+    drift_square: f64,
+    value: f64,
+    drift_value: f64,
 }
 
 impl<'a> Model<'a> {
     fn new(values: &'a [QuantityValue], weights: &'a [f64]) -> Self {
         let low = values.iter().map(|v| v.usage_hours).fold(f64::INFINITY, f64::min);
         let high = values.iter().map(|v| v.usage_hours).fold(f64::NEG_INFINITY, f64::max);
-        let usage_hours = (0.5 * (low + high), 0.5 * (high - low));
-        Self { values, weights, usage_hours, has_drift: false, steps: Vec::new() }
+        let (middle, half_span_hours) = (0.5 * (low + high), 0.5 * (high - low));
+        let drifts = values.iter().map(|v| (v.usage_hours - middle) / half_span_hours).collect();
+        let (has_drift, all, steps) = (false, Sums::default(), Vec::new());
+        let mut model = Self { values, weights, drifts, half_span_hours, has_drift, all, steps };
+        model.all = model.sums_from(0);
+        model
     }
 
-    /// Regressors of a value.
-    fn row(&self, index: usize, value: &QuantityValue) -> Row {
-        let (middle, half) = self.usage_hours;
+    fn sums_from(&self, place: usize) -> Sums {
+        let mut sums = Sums { place, ..Sums::default() };
+        let weighted_drifts = self.drifts[place..].iter().zip(&self.weights[place..]);
+        for (value, (drift, weight)) in self.values[place..].iter().zip(weighted_drifts) {
+            sums.one += weight;
+            sums.drift += weight * drift;
+            sums.drift_square += weight * drift * drift;
+            sums.value += weight * value.value;
+            sums.drift_value += weight * value.value * drift;
+        }
+        sums
+    }
+
+    /// Columns of the selected regressors.
+    fn columns(&self) -> impl Iterator<Item = usize> + Clone {
+        let drift = self.has_drift.then_some(DRIFT);
+        std::iter::once(0).chain(drift).chain(FIRST_STEP..FIRST_STEP + self.steps.len())
+    }
+
+    /// Regressors of the value at an index.
+    fn row(&self, index: usize) -> Row {
         let mut row = Row::zeros();
         row[0] = 1.0;
         if self.has_drift {
-            row[DRIFT] = (value.usage_hours - middle) / half;
+            row[DRIFT] = self.drifts[index];
         }
-        for (k, &step) in self.steps.iter().enumerate() {
-            row[FIRST_STEP + k] = f64::from(u8::from(index >= step));
+        for (k, step) in self.steps.iter().enumerate() {
+            row[FIRST_STEP + k] = f64::from(u8::from(index >= step.place));
         }
         row
     }
 
-    /// Normal matrix and right side.
-    fn normal(&self) -> (Square, Row) {
-        let mut sums = (Square::zeros(), Row::zeros());
-        for (index, value) in self.values.iter().enumerate() {
-            let (row, weight) = (self.row(index, value), self.weights[index]);
-            sums.0.ger(weight, &row, &row, 1.0);
-            sums.1.axpy(weight * value.value, &row, 1.0);
+    /// Coefficients and their covariance, with or without a drift; none where regressors are dependent. A regressor that is
+    /// not selected has the coefficient zero.
+    fn solve_with(&self, has_drift: bool) -> Option<(Row, Square)> {
+        // Of the symmetric matrix, the lower half is read.
+        let (mut normal, mut right) = (Square::identity(), Row::zeros());
+        let steps = self.steps.iter().enumerate().map(|(k, step)| (FIRST_STEP + k, step));
+        for (column, sums) in std::iter::once((0, &self.all)).chain(steps) {
+            // Of two steps, both are one from the later on.
+            normal.row_mut(column).columns_range_mut(..column + 1).fill(sums.one);
+            normal[(column.max(DRIFT), column.min(DRIFT))] = if has_drift { sums.drift } else { 0.0 };
+            right[column] = sums.value;
         }
-        // Regressors that are not selected have coefficient zero.
-        if !self.has_drift {
-            sums.0[(DRIFT, DRIFT)] = 1.0;
+        if has_drift {
+            normal[(DRIFT, DRIFT)] = self.all.drift_square;
+            right[DRIFT] = self.all.drift_value;
         }
-        (FIRST_STEP + self.steps.len()..COLUMNS).for_each(|column| sums.0[(column, column)] = 1.0);
-        sums
-    }
-
-    /// Coefficients and their covariance; none where regressors are dependent.
-    fn solve(&self) -> Option<(Row, Square)> {
-        let (normal, right) = self.normal();
         let factor = normal.cholesky()?;
         Some((factor.solve(&right), factor.inverse()))
     }
 
+    fn solve(&self) -> Option<(Row, Square)> {
+        self.solve_with(self.has_drift)
+    }
+
     /// The same with a drift; none where usage is constant.
     fn solve_with_drift(&self) -> Option<(Row, Square)> {
-        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
-        with.solve().filter(|_| self.usage_hours.1 > 0.0)
+        self.solve_with(true).filter(|_| self.half_span_hours > 0.0)
     }
 
     /// Adds the regressor with the largest gain as long as one is significant, then removes those that are not.
@@ -209,8 +244,8 @@ impl<'a> Model<'a> {
         if drift_gain + STEP_GAIN - DRIFT_GAIN >= step_gain {
             self.has_drift = true;
         } else {
-            self.steps.push(at);
-            self.steps.sort_unstable();
+            let before = self.steps.partition_point(|step| step.place < at);
+            self.steps.insert(before, self.sums_from(at));
         }
         true
     }
@@ -224,18 +259,20 @@ impl<'a> Model<'a> {
     /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.
     fn best_step(&self) -> (f64, usize) {
         let Some((beta, covariance)) = self.solve() else { return (0.0, 0) };
-        let mut best = (0.0, 0);
+        let (mut best, columns) = ((0.0, 0), self.columns());
+        let over_columns = |term: &dyn Fn(usize) -> f64| columns.clone().map(term).sum::<f64>();
         let (mut residual, mut weight, mut shared) = (0.0, 0.0, Row::zeros());
         for (index, value) in self.values.iter().enumerate().rev() {
-            let row = self.row(index, value);
+            let row = self.row(index);
             let w = self.weights[index];
-            residual += w * (value.value - row.dot(&beta));
+            residual += w * (value.value - over_columns(&|c| row[c] * beta[c]));
             weight += w;
             shared.axpy(w, &row, 1.0);
             if !self.is_free(index) {
                 continue;
             }
-            let own = weight - (shared.transpose() * covariance * shared)[(0, 0)];
+            let of_column = |c: usize| over_columns(&|other| shared[other] * covariance[(other, c)]);
+            let own = weight - over_columns(&|c| of_column(c) * shared[c]);
             if own > 1e-9 * weight && residual * residual / own > best.0 {
                 best = (residual * residual / own, index);
             }
@@ -245,7 +282,7 @@ impl<'a> Model<'a> {
 
     /// Whether a further step may be at an index: far enough from both ends and from the other steps.
     fn is_free(&self, index: usize) -> bool {
-        let from_others = self.steps.iter().all(|&step| index.abs_diff(step) >= LEAST_AFTER);
+        let from_others = self.steps.iter().all(|step| index.abs_diff(step.place) >= LEAST_AFTER);
         index >= LEAST_BEFORE && self.values.len() - index >= LEAST_AFTER && from_others
     }
 
@@ -256,9 +293,11 @@ impl<'a> Model<'a> {
             let needed = if *column == DRIFT { DRIFT_GAIN } else { STEP_GAIN };
             beta[*column] * beta[*column] / covariance[(*column, *column)] / needed
         };
-        let drift = self.has_drift.then_some(DRIFT);
-        let selected = drift.into_iter().chain(FIRST_STEP..FIRST_STEP + self.steps.len());
-        let worst = selected.min_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|column| gain(column) < 1.0);
+        let worst = self
+            .columns()
+            .skip(1)
+            .min_by(|a, b| gain(a).total_cmp(&gain(b)))
+            .filter(|column| gain(column) < 1.0);
         match worst {
             Some(DRIFT) => self.has_drift = false,
             Some(column) => drop(self.steps.remove(column - FIRST_STEP)),
@@ -274,6 +313,6 @@ impl<'a> Model<'a> {
         }
         let (beta, covariance) = self.solve_with_drift()?;
         let (rate, se) = (beta[DRIFT], covariance[(DRIFT, DRIFT)].max(0.0).sqrt());
-        Some((rate / self.usage_hours.1, se / self.usage_hours.1))
+        Some((rate / self.half_span_hours, se / self.half_span_hours))
     }
 }

@@ -56,6 +56,14 @@ impl CommonCurve {
         Self { weeks: shrunk(curve) }
     }
 
+    /// Takes the curve off the values of a unit, in order of departure.
+    pub fn take_off(&self, values: &mut [QuantityValue]) {
+        for of_week in values.chunk_by_mut(|a, b| week(a) == week(b)) {
+            let deviation = self.at(of_week[0].departure_us);
+            of_week.iter_mut().for_each(|v| v.value -= deviation);
+        }
+    }
+
     /// Deviation in the week of a departure, µs since 1970 UTC; of a week that no three tails flew in, of the nearest.
     pub fn at(&self, departure_us: i64) -> f64 {
         let week = departure_us.div_euclid(WEEK_US);
@@ -66,9 +74,12 @@ impl CommonCurve {
     }
 }
 
+fn week(value: &QuantityValue) -> i64 {
+    value.departure_us.div_euclid(WEEK_US)
+}
+
 fn cells(unit: usize, tail: usize, values: &[QuantityValue]) -> impl Iterator<Item = Cell> {
-    let week = |v: &QuantityValue| v.departure_us.div_euclid(WEEK_US);
-    values.chunk_by(move |a, b| week(a) == week(b)).map(move |of_week| Cell {
+    values.chunk_by(|a, b| week(a) == week(b)).map(move |of_week| Cell {
         week: week(&of_week[0]),
         unit,
         tail,

@@ -63,7 +63,7 @@ fn differences(values: &[QuantityValue]) -> impl Iterator<Item = (f64, Vector2<f
 
 /// Robust regression through the origin by reweighted least squares; a covariate that never varies has slope zero.
 fn huber(rows: &[(f64, Vector2<f64>)]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    if rows.len() < MIN_DIFFERENCES {
+    if rows.len() < MIN_DIFFERENCES || rows.iter().all(|(_, x)| *x == Vector2::zeros()) {
         return None;
     }
     let mut beta = Vector2::zeros();

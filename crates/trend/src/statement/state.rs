@@ -8,7 +8,7 @@ use crate::data::series::DAY_US;
 use crate::measured::exceedance::Exceedance;
 use crate::measured::record::HYSTERESIS;
 use crate::measured::{Jump, Measured};
-use crate::settings::Settings;
+use crate::settings::{CHANGE_WATCH_DAYS, Settings};
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// Alert state of a unit, from least to most urgent.
@@ -241,9 +241,7 @@ pub(crate) fn alert_state(
     }
     match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
         // Counted to the last record: that no flight follows clears nothing.
-        Some(change)
-            if days_since(change.departure_us) - days.unwrap_or(0.0) <= settings.change_watch_days =>
-        {
+        Some(change) if days_since(change.departure_us) - days.unwrap_or(0.0) <= CHANGE_WATCH_DAYS => {
             (State::Watch, Reason::Changed { kind: change.kind, days: days_since(change.departure_us) })
         }
         _ => (State::Normal, Reason::Clear { records: level.records }),

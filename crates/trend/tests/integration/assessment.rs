@@ -1,6 +1,6 @@
 //! Statements about units whose truth is known.
 
-use trend::{Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess};
+use trend::{Assessment, Observation, Reason, Series, Settings, State, WearStatus, assess};
 
 use crate::histories::{self, DAY_US};
 use crate::random::Random;
@@ -9,7 +9,9 @@ use crate::random::Random;
 pub(crate) fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
     let measured_um = |day: i64| gap_um(2.0 * (day + 1) as f64) + Random::new(day as u64).normal();
     let rows = (0..days).map(|day| histories::row(day, DAY_US, 2.0, measured_um(day), 1.0));
-    Series::new(rows, &UsageDefaults { unit_hours_at_start: Some(0.0), ..UsageDefaults::default() }).unwrap()
+    let mut series = Series::new(rows).unwrap();
+    series.unit_hours_at_start = Some(0.0);
+    series
 }
 
 fn state_of(series: &Series, day: i64) -> Assessment {

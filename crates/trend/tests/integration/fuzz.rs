@@ -1,6 +1,6 @@
 //! Fuzz target of the assessment: any numbers and dates in the rows of a unit, any settings.
 
-use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, UsageDefaults, assess, forecast};
+use trend::{FleetPrior, Observation, SerialExecutor, Series, Settings, assess, forecast};
 
 use self::edits::number;
 use crate::histories::{self, DAY_US, series};
@@ -17,10 +17,10 @@ fn wearing(flights: i64) -> Vec<Observation> {
 }
 
 /// Rows, settings and date after the changes that the bytes describe.
-fn changed(bytes: &[u8]) -> (Vec<Observation>, Settings, UsageDefaults, i64) {
+fn changed(bytes: &[u8]) -> (Vec<Observation>, Settings, Option<f64>, i64) {
     let flights = 20 + usize::from(bytes.first().copied().unwrap_or_default());
     let mut rows = wearing(flights as i64);
-    let (mut settings, mut usage) = (Settings::for_limit(1e-4), UsageDefaults::default());
+    let (mut settings, mut unit_hours_at_start) = (Settings::for_limit(1e-4), None);
     let mut as_of_us = flights as i64 * DAY_US;
     for edit in bytes.get(1..).unwrap_or_default().chunks_exact(EDIT) {
         let bits: [u8; 8] = edit[4..].try_into().unwrap();
@@ -48,20 +48,20 @@ fn changed(bytes: &[u8]) -> (Vec<Observation>, Settings, UsageDefaults, i64) {
             202 => settings.horizon_hours = value,
             203 => settings.planning_horizon_hours = value,
             204 => settings.check_interval_hours = value,
-            205 => usage.nominal_flight_hours = value,
-            206 => usage.unit_hours_at_start = Some(value),
+            206 => unit_hours_at_start = Some(value),
             207 => as_of_us = whole,
             208 => settings.stale_after_days = value,
             _ => {}
         }
     }
-    (rows, settings, usage, as_of_us)
+    (rows, settings, unit_hours_at_start, as_of_us)
 }
 
 /// Assesses and forecasts. What is stated must be numbers in order, and probabilities between zero and one.
 fn assess_any(bytes: &[u8]) {
-    let (rows, settings, usage, as_of_us) = changed(bytes);
-    let Ok(series) = Series::new(rows, &usage) else { return };
+    let (rows, settings, unit_hours_at_start, as_of_us) = changed(bytes);
+    let Ok(mut series) = Series::new(rows) else { return };
+    series.unit_hours_at_start = unit_hours_at_start;
     let fleet = [40, 90].map(|n| histories::series(wearing(n)));
     let prior = bytes.len().is_multiple_of(2).then(|| {
         FleetPrior::learn(fleet.iter().chain([&series]), as_of_us, settings.limit_m, None, &SerialExecutor)

@@ -1,8 +1,6 @@
 //! Drawn histories with known truth: a calm unit, and what then happens to it.
 
-use trend::{
-    FleetPrior, MaintenanceEvent, Observation, SerialExecutor, Series, Settings, State, UsageDefaults,
-};
+use trend::{FleetPrior, MaintenanceEvent, Observation, SerialExecutor, Series, Settings, State};
 
 use crate::random::Random;
 
@@ -28,7 +26,7 @@ pub(crate) fn row(number: i64, period_us: i64, hours: f64, gap_um: f64, error_um
 
 /// The unit of some flights, with the usual defaults.
 pub(crate) fn series(rows: impl IntoIterator<Item = Observation>) -> Series {
-    Series::new(rows, &UsageDefaults::default()).unwrap()
+    Series::new(rows).unwrap()
 }
 
 /// A history that is being drawn.

@@ -1,7 +1,7 @@
 //! Usage and order of a unit's flights.
 
 use proptest::prelude::*;
-use trend::{Observation, Series, UsageDefaults};
+use trend::{Observation, Series};
 
 use crate::histories::{self, DAY_US};
 
@@ -59,7 +59,7 @@ fn a_refused_flight_is_usage() {
 #[test]
 fn numbers_that_cannot_be_are_refused_by_name() {
     let bad = Observation { gap_se_m: Some(0.0), ..row(1, 1, None, None) };
-    let text = Series::new([bad], &UsageDefaults::default()).unwrap_err().to_string();
+    let text = Series::new([bad]).unwrap_err().to_string();
     assert!(text.starts_with("gap_se_m of the flight departing at 86400000000 µs is 0"), "{text}");
 }
 

@@ -14,7 +14,7 @@ use crate::assess::quantities::attribution::common_steps;
 use crate::assess::quantities::limits::Treatment;
 use crate::assess::quantities::rows;
 use crate::assess::quantities::subject::{Subject, UnitFacts, fit_all};
-use crate::assess::quantities::values::{FleetValues, READ, by_position};
+use crate::assess::quantities::values::{FleetValues, READ, by_position, by_unit};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -38,16 +38,17 @@ pub struct FollowedQuantities {
 
 /// Follows all quantities of all units.
 pub(crate) fn follow(fleet: &FleetValues, facts: UnitFacts<'_>, as_of: Timestamp) -> FollowedQuantities {
-    let positions = by_position(fleet);
+    let units = by_unit(facts.units, fleet, as_of);
+    let positions = by_position(&units);
     let of_quantity = |index: usize| {
         let usual = Treatment::of(READ[index].0, &facts.limits.quantities(None));
-        let units = if usual.is_of_channel { &positions } else { fleet };
+        let units = if usual.is_of_channel { &positions } else { &units };
         let subjects = units.par_iter().filter_map(|(name, unit)| Subject::new(name, unit, facts, index));
         follow_quantity(subjects.collect(), usual.limit, as_of)
     };
-    let followed: Vec<FollowedQuantities> = (0..READ.len()).into_par_iter().map(of_quantity).collect();
     let mut all = FollowedQuantities::default();
-    for of_quantity in followed {
+    // One after the other: the values of one quantity of a whole fleet take hundreds of megabytes.
+    for of_quantity in (0..READ.len()).map(of_quantity) {
         all.rows.extend(of_quantity.rows);
         all.changes.extend(of_quantity.changes);
     }
@@ -93,17 +94,18 @@ fn follow_quantity(
     found
 }
 
-/// The subjects of each part.
-fn parts<'s, 'a>(subjects: &'s mut [Subject<'a>]) -> impl Iterator<Item = &'s mut [Subject<'a>]> {
-    subjects.chunk_by_mut(|a, b| a.name.0 == b.name.0)
+/// The subjects of each part, which workers share.
+fn parts<'s, 'a>(subjects: &'s mut [Subject<'a>]) -> impl ParallelIterator<Item = &'s mut [Subject<'a>]> {
+    let parts: Vec<_> = subjects.chunk_by_mut(|a, b| a.name.0 == b.name.0).collect();
+    parts.into_par_iter()
 }
 
 /// Takes temperature and load level off, by slopes that the units of a part share.
 fn adjust(subjects: &mut [Subject<'_>]) {
-    for part in parts(subjects) {
+    parts(subjects).for_each(|part| {
         let slopes = Slopes::fit(part.iter().map(|subject| subject.values.as_slice()));
         part.iter_mut().flat_map(|s| &mut s.values).for_each(|v| v.value = slopes.adjusted(v));
-    }
+    });
 }
 
 /// Takes steps off that a unit made with its move to another tail, whose sensors are others.
@@ -121,11 +123,11 @@ fn take_off_moves(subjects: &mut [Subject<'_>]) {
 
 /// Takes the curve that the units of a part share off each of them. Units that depart from it have no part in the curve.
 fn take_off_curves(subjects: &mut [Subject<'_>]) {
-    for part in parts(subjects) {
+    parts(subjects).for_each(|part| {
         let all = curve(part.iter());
         let follows = |subject: &Subject<'_>| {
             let mut left = subject.values.clone();
-            left.iter_mut().for_each(|v| v.value -= all.at(v.departure_us));
+            all.take_off(&mut left);
             subject.fitted(&left).is_none_or(|fit| {
                 fit.change == 0.0 && fit.rate_per_hour.is_none_or(|(rate, se)| rate.abs() <= DEPARTS_SE * se)
             })
@@ -133,8 +135,8 @@ fn take_off_curves(subjects: &mut [Subject<'_>]) {
         let follows: Vec<bool> = part.par_iter().map(follows).collect();
         let curve =
             curve(part.iter().zip(follows).filter_map(|(subject, follows)| follows.then_some(subject)));
-        part.iter_mut().flat_map(|s| &mut s.values).for_each(|v| v.value -= curve.at(v.departure_us));
-    }
+        part.iter_mut().for_each(|subject| curve.take_off(&mut subject.values));
+    });
 }
 
 /// The common curve of some units of a part.

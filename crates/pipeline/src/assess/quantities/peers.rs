@@ -48,8 +48,14 @@ struct Deviation<'a> {
 /// Differences of the selected units from their peers, in words: tails first, then units.
 pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> bool) -> Vec<String> {
     let (mut tails, mut units, mut named) = (Vec::new(), Vec::new(), BTreeSet::new());
+    // Of the other units, those on the tails of selected ones decide whether a difference is the tail's.
+    let selected = rows.iter().filter(|row| is_selected(row));
+    let with_selected: BTreeSet<&str> = selected.filter_map(|row| row.tail_number.as_deref()).collect();
+    let is_near = |row: &QuantityRow| {
+        is_selected(row) || row.tail_number.as_deref().is_some_and(|tail| with_selected.contains(tail))
+    };
     for quantity in COMPARED {
-        let found = deviations(rows, quantity);
+        let found = deviations(rows, quantity, is_near);
         let of_tails = of_tails(&found);
         let is_tails = |deviation: &&Deviation<'_>| {
             deviation.row.tail_number.as_deref().is_some_and(|tail| of_tails.contains_key(tail))
@@ -68,7 +74,12 @@ pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> 
     tails.into_iter().chain(units).collect()
 }
 
-fn deviations(rows: &[QuantityRow], quantity: Quantity) -> Vec<Deviation<'_>> {
+/// The deviations of the units that are asked for.
+fn deviations(
+    rows: &[QuantityRow],
+    quantity: Quantity,
+    is_asked: impl Fn(&QuantityRow) -> bool,
+) -> Vec<Deviation<'_>> {
     let mut parts = BTreeMap::<Option<&str>, Vec<(&QuantityRow, f64)>>::new();
     for row in rows.iter().filter(|row| row.quantity == quantity.as_str()) {
         let Some(level) = row.level.filter(|level| level.is_finite()) else { continue };
@@ -77,10 +88,11 @@ fn deviations(rows: &[QuantityRow], quantity: Quantity) -> Vec<Deviation<'_>> {
     let is_of_sensor = Treatment::of(quantity, &QuantityLimits::default()).is_of_sensor();
     let all: Vec<(&QuantityRow, f64)> = parts.values().flatten().copied().filter(|_| is_of_sensor).collect();
     let each = parts.values().flat_map(|units| units.iter().map(move |unit| (unit, units)));
-    each.filter_map(|(unit, units)| {
-        deviation(unit, units, quantity).or_else(|| deviation(unit, &all, quantity))
-    })
-    .collect()
+    each.filter(|(unit, _)| is_asked(unit.0))
+        .filter_map(|(unit, units)| {
+            deviation(unit, units, quantity).or_else(|| deviation(unit, &all, quantity))
+        })
+        .collect()
 }
 
 /// The deviation of a unit from the others on other tails; `None` for too few of them.

@@ -133,7 +133,7 @@ fn cause(subject: &Subject<'_>) -> String {
 
 /// Correlation with the gaps of the same flights.
 fn gap_correlation(subject: &Subject<'_>) -> Option<f64> {
-    let flights = subject.series()?.flights();
+    let flights = subject.series().flights();
     let pair = |v: &trend::quantity::QuantityValue| {
         let at = flights.binary_search_by_key(&v.departure_us, |f| f.departure_us).ok()?;
         Some((v.value, flights[at].gap?.gap_m))

@@ -9,8 +9,9 @@ use trend::quantity::changes::{self, QuantityChanges, QuantityStep};
 
 use crate::assess::limits::Limits;
 use crate::assess::quantities::limits::{Scale, Treatment};
-use crate::assess::quantities::values::{FlightValues, READ, UnitValues};
+use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ};
 use crate::findings::monitoring::median;
+use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{History, TailPosition, UnitKey};
 
 /// Units by name: their flights, and the same by usage with their maintenance.
@@ -27,10 +28,10 @@ pub(crate) struct UnitFacts<'a> {
 pub(crate) struct Subject<'a> {
     /// The unit.
     pub(crate) name: &'a UnitKey,
-    /// Its values.
-    unit: &'a UnitValues,
-    /// Its history and usage.
-    of_fleet: Option<&'a (&'a History, Series)>,
+    /// Its flights.
+    unit: &'a FollowedFlights<'a>,
+    /// Its history, and the same by usage.
+    of_fleet: &'a (&'a History, Series),
     pub(crate) quantity: Quantity,
     /// What limits are a share of, in the quantity's unit.
     pub(crate) scale: f64,
@@ -48,32 +49,38 @@ impl<'a> Subject<'a> {
     /// The series of one quantity, by its index in [`READ`], of one unit; none without a value.
     pub(crate) fn new(
         name: &'a UnitKey,
-        unit: &'a UnitValues,
+        unit: &'a FollowedFlights<'a>,
         facts: UnitFacts<'a>,
         index: usize,
     ) -> Option<Self> {
         let quantity = READ[index].0;
         let treatment = Treatment::of(quantity, &facts.limits.quantities(name.0.as_deref()));
-        let last = unit.flights.last()?;
-        let of_fleet = facts.units.get(name);
+        let (last, _) = unit.flights.last()?;
+        let of_fleet = facts.units.get(name)?;
         // The channels of a position have no hours and no maintenance of their own.
-        let series = of_fleet.map(|(_, series)| series).filter(|_| !treatment.is_of_channel);
-        let maintained_us = series.and_then(|s| Some(s.maintenance_until(last.departure_us).last()?.utc_us));
-        let hours = |us: i64| Some(series?.flights_until(us).last()?.hours);
-        let moved = unit.flights.iter().rposition(|f| f.place != last.place);
+        let series = Some(&of_fleet.1).filter(|_| !treatment.is_of_channel);
+        let maintained = series.and_then(|s| s.maintenance_until(last.departure_us()).last());
+        let moved = unit.flights.iter().rposition(|(flown, _)| flown.place != last.place);
         let begin = moved.filter(|_| treatment.is_of_position).map_or(0, |k| k + 1);
-        let followed =
-            unit.flights[begin..].iter().filter(|f| maintained_us.is_none_or(|us| f.departure_us >= us));
-        let value = |(k, flight): (usize, &FlightValues)| {
-            let (value, se) = value_of(quantity, flight, index, unit.usual_load_n)?;
+        let followed = unit.flights[begin..]
+            .iter()
+            .filter(|(flown, _)| maintained.is_none_or(|done| flown.departure_us() >= done.utc_us));
+        let mut by_usage = series.map_or(&[][..], Series::flights).iter().peekable();
+        let mut usage_hours = None;
+        let value = |(k, (flown, of_flight)): (usize, &(&FlightRow, &FlightValues))| {
+            let departure_us = flown.departure_us();
+            while let Some(flight) = by_usage.next_if(|flight| flight.departure_us <= departure_us) {
+                usage_hours = Some(flight.hours);
+            }
+            let (value, se) = value_of(quantity, of_flight, index, unit.usual_load_n)?;
             let known = |number: f32| number.is_finite().then_some(f64::from(number));
             Some(QuantityValue {
-                departure_us: flight.departure_us,
-                usage_hours: hours(flight.departure_us).unwrap_or(k as f64),
+                departure_us,
+                usage_hours: usage_hours.unwrap_or(k as f64),
                 value,
                 se,
-                temperature_c: known(flight.temperature_c),
-                ln_load: known(flight.load_p95_n).filter(|n| *n > 0.0).map(f64::ln),
+                temperature_c: known(of_flight.temperature_c),
+                ln_load: known(of_flight.load_p95_n).filter(|n| *n > 0.0).map(f64::ln),
             })
         };
         let values: Vec<QuantityValue> = followed.enumerate().filter_map(value).collect();
@@ -107,25 +114,25 @@ impl<'a> Subject<'a> {
     }
 
     /// The unit's usage.
-    pub(crate) fn series(&self) -> Option<&'a Series> {
-        self.of_fleet.map(|(_, series)| series)
+    pub(crate) fn series(&self) -> &'a Series {
+        &self.of_fleet.1
     }
 
     /// Name of a flight.
     pub(crate) fn flight_id(&self, departure_us: i64) -> Option<String> {
-        let history = self.of_fleet?.0;
+        let history = self.of_fleet.0;
         history.flight_id(history.at(Timestamp::from_microsecond(departure_us).ok()?)?).map(str::to_owned)
     }
 
     /// The tail at a departure.
     pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&'a str> {
-        let at = self.unit.flights.partition_point(|f| f.departure_us < departure_us);
-        self.unit.place(self.unit.flights.get(at)?).tail_number.as_deref()
+        let at = self.unit.flights.partition_point(|(flown, _)| flown.departure_us() < departure_us);
+        self.unit.place(self.unit.flights.get(at)?.0).tail_number.as_deref()
     }
 
     /// Where the last flight was flown.
     pub(crate) fn last_place(&self) -> Option<&'a TailPosition> {
-        Some(self.unit.place(self.unit.flights.last()?))
+        Some(self.unit.place(self.unit.flights.last()?.0))
     }
 
     /// Tail of the last flight.

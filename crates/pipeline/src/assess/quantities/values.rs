@@ -1,16 +1,20 @@
-//! Values of the followed quantities, read from the store.
+//! Values of the followed quantities, flight by flight, read in one scan with the histories.
 
 use std::collections::BTreeMap;
 
+use arrow::array::Float64Array;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
 use store::{Query, Store};
 
+use crate::assess::quantities::subject::Units;
 use crate::error::Error;
-use crate::findings::monitoring::median;
+use crate::fleet::builder;
+use crate::fleet::flight_row::FlightRow;
+use crate::fleet::histories::{Histories, History};
 use crate::fleet::places::{TailPosition, UnitKey};
-use crate::fleet::unit_rows::{RowsByUnit, UnitRows, at, number, of_store};
+use crate::fleet::unit_rows::{at, number, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
 const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
@@ -28,120 +32,152 @@ pub(crate) const READ: [(Quantity, &str); 9] = [
     (Quantity::Nis, "nis_se"),
 ];
 
-/// One flight of one unit, in as few bytes as its numbers take; NaN for none.
+/// Columns of temperature, and of the 5 % and 95 % quantiles of the load.
+const COVARIATES: [&str; 3] = ["temperature_c", "load_p05_n", "load_p95_n"];
+
+/// Values of one flight of one unit, in as few bytes as its numbers take; NaN for none.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlightValues {
-    pub(crate) departure_us: i64,
-    /// Index of the unit's positions.
-    pub(crate) place: u32,
     pub(crate) temperature_c: f32,
     pub(crate) load_p95_n: f32,
     /// Value and standard error, in the order of [`READ`].
     pub(crate) values: [(f32, f32); READ.len()],
 }
 
-/// Values of one unit, by departure.
-#[derive(Debug, Default)]
-pub(crate) struct UnitValues {
-    pub(crate) places: Vec<TailPosition>,
-    pub(crate) flights: Vec<FlightValues>,
+/// The columns of the values in some rows.
+pub(crate) struct ValueColumns {
+    covariates: [Float64Array; COVARIATES.len()],
+    quantities: Vec<(Float64Array, Float64Array)>,
+}
+
+impl ValueColumns {
+    /// Their names.
+    pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+        let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
+        COVARIATES.into_iter().chain(numbers)
+    }
+
+    /// Those of some rows of the store.
+    pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
+        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let [temperatures, lows, highs] = COVARIATES.map(numbers);
+        let of = |(quantity, error): (Quantity, &str)| Ok((numbers(quantity.as_str())?, numbers(error)?));
+        let quantities = READ.into_iter().map(of).collect::<Result<_, ingest::Error>>()?;
+        Ok(Self { covariates: [temperatures?, lows?, highs?], quantities })
+    }
+
+    /// The values of a row.
+    pub(crate) fn row(&self, row: usize) -> FlightValues {
+        let [temperatures, lows, highs] = &self.covariates;
+        let load_n = at(lows, row).zip(at(highs, row)).map(|(low, high)| low.abs().max(high.abs()));
+        FlightValues {
+            temperature_c: number(temperatures, row) as f32,
+            load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
+            values: std::array::from_fn(|k| {
+                let (values, errors) = &self.quantities[k];
+                (number(values, row) as f32, at(errors, row).unwrap_or(0.0) as f32)
+            }),
+        }
+    }
+}
+
+/// Values of all units, in the order of the last flights of their histories.
+pub(crate) type FleetValues = BTreeMap<UnitKey, Vec<FlightValues>>;
+
+/// Reads every unit's flights in the store, with their values.
+pub(crate) fn load(store: &Store) -> Result<(Histories, FleetValues), Error> {
+    let columns: Vec<&str> = builder::stored_columns().into_iter().chain(ValueColumns::names()).collect();
+    let scan = store.scan_columns(&Query::default(), &columns)?;
+    let parts = of_store(&scan, |rows, chunk, batch| {
+        let values = ValueColumns::of(chunk)?;
+        builder::add_stored(rows, chunk, batch, |row| values.row(row))
+    })?;
+    Ok(builder::histories(parts, true))
+}
+
+/// Frees the values of flights that are too old to be followed at a date.
+pub(crate) fn drop_old(values: &mut FleetValues, histories: &Histories, as_of: Timestamp) {
+    for (name, values) in values {
+        let old = histories.units.get(name).map_or(0, |history| before_window(history, as_of));
+        values.drain(..old);
+        values.shrink_to_fit();
+    }
+}
+
+/// Number of flights before the followed years.
+fn before_window(history: &History, as_of: Timestamp) -> usize {
+    let is_old = |since: Timestamp| history.flights().partition_point(|f| f.departure_utc() < since);
+    as_of.checked_sub(WINDOW).map_or(0, is_old)
+}
+
+/// The followed flights of a unit, or those at the position that it was the last to fly in, by departure.
+pub(crate) struct FollowedFlights<'a> {
+    history: &'a History,
+    position: Option<&'a TailPosition>,
+    pub(crate) flights: Vec<(&'a FlightRow, &'a FlightValues)>,
     /// Median 95 % load, N.
     pub(crate) usual_load_n: Option<f64>,
 }
 
-impl UnitValues {
-    fn new(places: Vec<TailPosition>, mut flights: Vec<FlightValues>) -> Self {
-        flights.sort_by_key(|flight| flight.departure_us);
-        let loads_n: Vec<f64> =
-            flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
-        let usual_load_n = (!loads_n.is_empty()).then(|| median(loads_n));
-        Self { places, flights, usual_load_n }
+impl<'a> FollowedFlights<'a> {
+    fn new(
+        history: &'a History,
+        position: Option<&'a TailPosition>,
+        flights: Vec<(&'a FlightRow, &'a FlightValues)>,
+    ) -> Self {
+        let loads_n = flights.iter().map(|(_, values)| f64::from(values.load_p95_n));
+        let usual_load_n = trend::quantity::median(loads_n.filter(|n| n.is_finite()).collect());
+        Self { history, position, flights, usual_load_n }
     }
 
     /// Where a flight was flown.
-    pub(crate) fn place(&self, flight: &FlightValues) -> &TailPosition {
-        &self.places[flight.place as usize]
+    pub(crate) fn place(&self, flown: &FlightRow) -> &'a TailPosition {
+        self.position.unwrap_or_else(|| self.history.place(flown))
     }
 }
 
-/// Values of all units.
-pub(crate) type FleetValues = BTreeMap<UnitKey, UnitValues>;
+/// Followed flights by unit.
+pub(crate) type FollowedUnits<'a> = BTreeMap<&'a UnitKey, FollowedFlights<'a>>;
 
-/// Reads the values of the last three years before a time, with it.
-pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error> {
-    let query = Query {
-        since_utc: until.checked_sub(WINDOW).ok(),
-        until_utc: until.checked_add(SignedDuration::from_micros(1)).ok(),
-        ..Query::default()
+/// The flights of each unit in the three years before a date, with it.
+pub(crate) fn by_unit<'a>(
+    units: &'a Units<'a>,
+    values: &'a FleetValues,
+    as_of: Timestamp,
+) -> FollowedUnits<'a> {
+    let followed = |(name, (history, _)): (&&'a UnitKey, &'a (&'a History, _))| {
+        let (history, values) = (*history, values.get(*name)?);
+        let dropped = history.flights().len() - values.len();
+        let first = before_window(history, as_of);
+        let flights = history.until(as_of).iter().skip(first).zip(values.iter().skip(first - dropped));
+        Some((*name, FollowedFlights::new(history, None, flights.collect())))
     };
-    let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
-    let keys = [
-        "tail_number",
-        "position",
-        "part_number",
-        "serial_number",
-        "departure_utc",
-        "temperature_c",
-        "load_p05_n",
-        "load_p95_n",
-    ];
-    let columns: Vec<&str> = keys.into_iter().chain(numbers).collect();
-    let parts = of_store(&store.scan_columns(&query, &columns)?, |rows, chunk, _| add(rows, chunk))?;
-    let unit = |(name, parts)| {
-        let rows = UnitRows::concatenated(parts, |flight: &mut FlightValues, places, _| {
-            flight.place = places[flight.place as usize];
-        });
-        (name, UnitValues::new(rows.places, rows.rows))
-    };
-    Ok(parts.into_iter().map(unit).collect())
-}
-
-fn add(rows: &mut RowsByUnit<FlightValues>, chunk: &TableBatch) -> Result<(), ingest::Error> {
-    let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-    let (temperatures, lows, highs) =
-        (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
-    let mut columns = Vec::with_capacity(READ.len());
-    for (quantity, error) in READ {
-        columns.push((numbers(quantity.as_str())?, numbers(error)?));
-    }
-    let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
-    rows.add_rows(chunk, |row, unit, place| {
-        let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
-        unit.rows.push(FlightValues {
-            departure_us: departures.value(row),
-            place,
-            temperature_c: number(&temperatures, row) as f32,
-            load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
-            values: std::array::from_fn(|k| {
-                let (values, errors) = &columns[k];
-                (number(values, row) as f32, at(errors, row).unwrap_or(0.0) as f32)
-            }),
-        });
-        Ok(())
-    })
+    units.iter().filter_map(followed).collect()
 }
 
 /// The same by position: all flights there, under the unit that flew there last.
-pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
-    type Place<'a> = (i64, Option<&'a UnitKey>, Vec<FlightValues>);
-    let mut positions: BTreeMap<&TailPosition, Place<'_>> = BTreeMap::new();
-    for (name, unit) in fleet {
-        for flight in &unit.flights {
-            let (last_us, last, flights) = positions.entry(unit.place(flight)).or_default();
-            flights.push(FlightValues { place: 0, ..*flight });
-            if last.is_none() || flight.departure_us > *last_us {
-                (*last_us, *last) = (flight.departure_us, Some(name));
+pub(crate) fn by_position<'a>(units: &FollowedUnits<'a>) -> FollowedUnits<'a> {
+    type Flown<'a> = (&'a FlightRow, &'a FlightValues);
+    let mut positions: BTreeMap<&TailPosition, (i64, Option<&'a UnitKey>, Vec<Flown<'a>>)> = BTreeMap::new();
+    for (name, unit) in units {
+        for of_place in unit.flights.chunk_by(|a, b| a.0.place == b.0.place) {
+            let [.., (newest, _)] = of_place else { continue };
+            let (last_us, last, flights) = positions.entry(unit.place(newest)).or_default();
+            flights.extend_from_slice(of_place);
+            if last.is_none() || newest.departure_us() > *last_us {
+                (*last_us, *last) = (newest.departure_us(), Some(*name));
             }
         }
     }
     // A unit that was the last one at two positions is at the later one.
-    let mut of_units: BTreeMap<&UnitKey, (i64, UnitValues)> = BTreeMap::new();
-    for (position, (last_us, name, flights)) in positions {
-        let Some(name) = name else { continue };
-        if of_units.get(name).is_some_and(|(known_us, _)| *known_us >= last_us) {
-            continue;
+    let mut of_units: BTreeMap<&UnitKey, (i64, FollowedFlights<'_>)> = BTreeMap::new();
+    for (position, (last_us, name, mut flights)) in positions {
+        let Some((name, unit)) = name.and_then(|name| units.get_key_value(name)) else { continue };
+        if of_units.get(name).is_none_or(|(known_us, _)| *known_us < last_us) {
+            flights.sort_by_key(|(flown, _)| flown.departure_us());
+            let flights = FollowedFlights::new(unit.history, Some(position), flights);
+            of_units.insert(name, (last_us, flights));
         }
-        of_units.insert(name, (last_us, UnitValues::new(vec![position.clone()], flights)));
     }
-    of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
+    of_units.into_iter().map(|(name, (_, flights))| (name, flights)).collect()
 }

@@ -7,9 +7,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, StringArray};
+use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, Float64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, TimestampMicrosecondType};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use ingest::Flights;
 use jiff::Timestamp;
@@ -167,64 +167,85 @@ impl Bookkeeping {
         batch: &RecordBatch,
         mut moved: impl FnMut([&str; 6], Timestamp),
     ) -> Result<RecordBatch, ArrowError> {
-        let schema = batch.schema();
-        let texts = |name: &str| cast(batch.column(schema.index_of(name)?), &DataType::Utf8);
-        let (tails, positions) = (texts("tail_number")?, texts("position")?);
-        let (tails, positions) = (tails.as_string::<i32>(), positions.as_string::<i32>());
-        let (parts, serials) = (texts("part_number")?, texts("serial_number")?);
-        let [mut parts, mut serials] = [&parts, &serials]
-            .map(|names| names.as_string::<i32>().iter().map(Option::unwrap_or_default).collect::<Vec<_>>());
-        let flights = if self.flights.is_empty() { None } else { Some(texts("flight_id")?) };
-        let flights = flights.as_ref().map(AsArray::as_string::<i32>);
-        let departures = batch.column(schema.index_of("departure_utc")?).clone();
+        let names = |column: &str| Names::of(batch, column);
+        let (tails, positions) = (names("tail_number")?, names("position")?);
+        let (parts, serials) = (names("part_number")?, names("serial_number")?);
+        let has_flights = !self.flights.is_empty();
+        let flights = has_flights.then(|| names("flight_id")).transpose()?;
+        let departures = batch.column(batch.schema_ref().index_of("departure_utc")?);
         let departures = departures.as_primitive::<TimestampMicrosecondType>();
-        let numbers = |name: &str| batch.column_by_name(name).map(numbers);
-        let [mut hours, mut flown, mut meters] =
-            ["unit_hours", "flight_hours", "tail_hours_end"].map(numbers);
-        let mut places: HashMap<(&str, &str), &[Installation]> = HashMap::new();
+        let numbers =
+            |name: &str, is_needed: bool| batch.column_by_name(name).filter(|_| is_needed).map(numbers);
+        let mut hours = numbers("unit_hours", true);
+        let mut flown = numbers("flight_hours", has_flights);
+        let mut meters = numbers("tail_hours_end", has_flights || hours.is_some());
+        let mut installed: HashMap<[Option<usize>; 2], Vec<(&Installation, bool)>> = HashMap::new();
+        let mut of_others: Vec<(usize, [&str; 2])> = Vec::new();
         for row in 0..batch.num_rows() {
             let Ok(at) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-            let (tail, position) = (tails.value(row), positions.value(row));
-            if let Some(flight) = flights.and_then(|flights| self.flights.of(tail, flights.value(row), at)) {
+            let flight = flights.as_ref().map(|flights| flights.get(row));
+            if let Some(flight) = flight.and_then(|flight| self.flights.of(tails.get(row), flight, at)) {
                 set(flown.as_mut(), row, flight.flight_hours);
                 set(meters.as_mut(), row, flight.tail_hours_end);
             }
-            let installations = places
-                .entry((tail, position))
-                .or_insert_with(|| self.installations.of_position(tail, position));
-            let Some(installation) = installations.iter().find(|installation| installation.covers(at)) else {
-                continue;
+            let at_place = || {
+                let installations = self.installations.of_position(tails.get(row), positions.get(row));
+                let is_known = |i: &Installation| self.parts.contains(i.part_number.as_str());
+                installations.iter().map(|i| (i, is_known(i))).collect()
             };
-            if !self.parts.contains(installation.part_number.as_str()) {
-                continue;
-            }
+            let at_place = installed.entry([tails.code(row), positions.code(row)]).or_insert_with(at_place);
+            let Some((installation, true)) = at_place.iter().find(|(i, _)| i.covers(at)) else { continue };
             let (part, serial) = installation.unit();
-            let (part, serial) = (part.as_str(), serial.as_str());
-            if (parts[row], serials[row]) != (part, serial) {
-                moved([tail, position, parts[row], serials[row], part, serial], at);
-                (parts[row], serials[row]) = (part, serial);
+            let (stored, unit) = ([parts.get(row), serials.get(row)], [part.as_str(), serial.as_str()]);
+            if stored != unit {
+                moved([tails.get(row), positions.get(row), stored[0], stored[1], unit[0], unit[1]], at);
+                of_others.push((row, unit));
             }
             if let Some(hours) = &mut hours {
                 hours[row] = installation.unit_hours(meters.as_ref().and_then(|meters| meters[row]));
             }
         }
-        let texts: [(_, ArrayRef); 2] = [
-            ("part_number", Arc::new(StringArray::from(parts))),
-            ("serial_number", Arc::new(StringArray::from(serials))),
-        ];
-        let numbers = [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)];
-        let numbers = numbers
-            .into_iter()
-            .filter_map(|(name, values)| Some((name, Arc::new(Float64Array::from(values?)) as ArrayRef)));
-        texts
-            .into_iter()
-            .chain(numbers)
-            .try_fold(batch.clone(), |batch, (name, column)| replaced(batch, name, &column))
+        let mut joined = batch.clone();
+        for (k, (column, stored)) in
+            [("part_number", &parts), ("serial_number", &serials)].into_iter().enumerate()
+        {
+            if !of_others.is_empty() {
+                let mut names: Vec<&str> = (0..batch.num_rows()).map(|row| stored.get(row)).collect();
+                of_others.iter().for_each(|(row, unit)| names[*row] = unit[k]);
+                joined = replaced(joined, column, &StringArray::from(names))?;
+            }
+        }
+        for (column, values) in [("unit_hours", hours), ("flight_hours", flown), ("tail_hours_end", meters)] {
+            if let Some(values) = values {
+                joined = replaced(joined, column, &Float64Array::from(values))?;
+            }
+        }
+        Ok(joined)
+    }
+}
+
+/// Names of a column, each with the code of its text.
+struct Names(DictionaryArray<Int32Type>);
+
+impl Names {
+    fn of(batch: &RecordBatch, column: &str) -> Result<Self, ArrowError> {
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let names = cast(batch.column(batch.schema_ref().index_of(column)?), &coded)?;
+        Ok(Self(names.as_dictionary().clone()))
+    }
+
+    fn code(&self, row: usize) -> Option<usize> {
+        self.0.key(row)
+    }
+
+    /// The name of a row; an empty one for none.
+    fn get(&self, row: usize) -> &str {
+        self.code(row).map_or("", |code| self.0.values().as_string::<i32>().value(code))
     }
 }
 
 /// A batch with another column in the place of that of a name, in its type.
-fn replaced(batch: RecordBatch, name: &str, column: &ArrayRef) -> Result<RecordBatch, ArrowError> {
+fn replaced(batch: RecordBatch, name: &str, column: &dyn Array) -> Result<RecordBatch, ArrowError> {
     let (schema, mut columns, _) = batch.into_parts();
     let place = schema.index_of(name)?;
     columns[place] = cast(column, schema.field(place).data_type())?;
@@ -248,8 +269,8 @@ fn with_new_paths(batch: RecordBatch, renamed: &BTreeMap<String, String>) -> Res
     }
     let paths = batch.column(batch.schema_ref().index_of("log_path")?).as_string::<i32>();
     let new = paths.iter().map(|path| path.map(|path| renamed.get(path).map_or(path, String::as_str)));
-    let paths: ArrayRef = Arc::new(new.collect::<StringArray>());
-    replaced(batch, "log_path", &paths)
+    let new: StringArray = new.collect();
+    replaced(batch, "log_path", &new)
 }
 
 /// Moved flights by place and units.

@@ -2,7 +2,7 @@
 
 use job::Config;
 use records::{Installation, Installations};
-use trend::{Observation, Series, UsageDefaults, UsageSource};
+use trend::{Observation, Series, UsageSource};
 
 use crate::error::Error;
 use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
@@ -46,12 +46,11 @@ impl<'a> UsageSources<'a> {
         let installations = self.installations.of(name);
         let installed = if is_booked { &installations[..] } else { &[] };
         let first = installations.iter().min_by_key(|installation| installation.installed_utc);
-        let unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
         let mut observations = observations(history, installed, &self.unlogged.of_unit(history, installed));
         let dropped = drop_contradicting(&mut observations);
-        let source = self.source(history);
-        let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
-        let mut series = Series::new(observations, &usage)?;
+        let mut series = Series::new(observations)?;
+        series.unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
+        series.source = self.source(history);
         series.faults.meter_readings = dropped;
         // None is recorded of a unit without a part number.
         let unit = name.0.clone().map(|part| (part, name.1.clone()));
