@@ -50,7 +50,7 @@ impl Action {
 }
 
 /// Reasons whose inspection is due at once: the next record alone would be too late.
-const DUE_NOW: [&str; 3] = ["unconfirmed", "jumped", "changed"];
+const DUE_NOW: [&str; 4] = ["unconfirmed", "repeated", "jumped", "changed"];
 
 impl TrendRow {
     /// The row with its action and due date; `at_limit` is what its part asks for in state `act`.

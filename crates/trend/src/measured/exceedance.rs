@@ -9,12 +9,18 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 pub(crate) enum Exceedance {
     /// One record alone, or flagged ones: the next sound one confirms or clears it.
     Unconfirmed { gap_m: f64, before_m: Option<f64>, records: usize },
+    /// So many of the last records, with others in between.
+    Repeated { records: usize, among: usize },
     /// Two records at least, or the level of the last records.
     Confirmed { records: usize },
     /// Confirmed before; neither two records below the limit nor maintenance have ended it, or the level is at 97 % of
     /// the limit or more.
     Held,
 }
+
+/// So many records at or above the limit among the last ones are no exception, though others came in between.
+const REPEATED: usize = 3;
+const REPEATED_AMONG: usize = 6;
 
 /// Records at or above the limit, one after the other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,7 +48,7 @@ pub(crate) fn exceedance(
     let mut run: Option<Run> = None;
     let mut ended_at = None;
     for (k, record) in records.iter().enumerate() {
-        if k > 0 && record.period != records[k - 1].period {
+        if k > 0 && record.renewals != records[k - 1].renewals {
             (run, ended_at) = (None, None);
         }
         let begin = || Run { first: k, before_m: before(&records, k), ..Run::default() };
@@ -72,15 +78,20 @@ pub(crate) fn exceedance(
         level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len())
     };
     let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
-    let last_period = |records: &[Record]| records.last().map(|record| record.period);
+    let last_renewals = |records: &[Record]| records.last().map(|record| record.renewals);
+    let near = records.rchunks(REPEATED_AMONG).next().unwrap_or_default();
+    let near_above = || near.iter().filter(|r| is_above(r) && Some(r.renewals) == last_renewals(all));
+    let rises = near.array_windows().filter(|[before, here]| !is_above(before) && is_above(here)).count();
+    let is_repeated = rises > 1 && near_above().count() >= REPEATED && near_above().any(|r| r.is_sound);
     let found = match (run, by_level) {
-        // The records of an earlier installation.
-        _ if last_period(&records) != last_period(all) => None,
+        // The records before a renewal.
+        _ if last_renewals(&records) != last_renewals(all) => None,
         (Some(run), _) if run.is_confirmed && run.below == 0 => {
             Some(Exceedance::Confirmed { records: run.above })
         }
         (Some(run), _) if run.is_confirmed => Some(Exceedance::Held),
         (_, Some(level)) => Some(Exceedance::Confirmed { records: level.records }),
+        _ if is_repeated => Some(Exceedance::Repeated { records: near_above().count(), among: near.len() }),
         (Some(run), None) => {
             let gap_m = records[run.first..].iter().map(|record| record.gap_m).fold(0.0, f64::max);
             Some(Exceedance::Unconfirmed { gap_m, before_m: run.before_m, records: run.above })

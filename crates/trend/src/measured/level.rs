@@ -107,7 +107,8 @@ impl Line {
 
 /// The level at the last record: by the longest window up to twelve records of its period that a line explains.
 ///
-/// A lone record far below a level of several records does not lower it: two of them do.
+/// A lone record far below a level of several records does not lower it, be it the first of a new installation: two of them
+/// do.
 pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<Level> {
     let level = level_at_end(sound)?;
     let (last, before) = sound.split_last()?;
@@ -115,7 +116,7 @@ pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<Level> {
         return Some(level);
     };
     let fall_m = rest.gap_m - last.gap_m;
-    let is_lone_fall = rest.period == last.period
+    let is_lone_fall = before.last().is_some_and(|record| record.renewals == last.renewals)
         && fall_m > (FALL_ERRORS * rest.se_m.hypot(last.error_m)).max(FALL_SHARE * limit_m);
     Some(if is_lone_fall { Level { window: rest.window + 1, ..rest } } else { level })
 }

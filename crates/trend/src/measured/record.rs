@@ -37,6 +37,8 @@ pub struct Record {
     pub(crate) is_sound: bool,
     /// A new one begins with each installation and after each renewal.
     pub(crate) period: u32,
+    /// Renewals before it. The gap goes with the unit from one installation to the next, and ends with a renewal.
+    pub(crate) renewals: u32,
 }
 
 /// The last records of a unit, and the renewing maintenance after the last of them.
@@ -46,14 +48,13 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
     seen.reverse();
     let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
     let errors = noise(&gaps, limit_m).errors;
-    let mut renewals =
-        data.maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
-    let (mut period, mut installation) = (0, None);
+    let mut dates = data.maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
+    let (mut period, mut renewals, mut installation) = (0, 0, None);
     let mut records = Vec::with_capacity(seen.len());
     for ((flight, flown, gap), error_m) in seen.into_iter().zip(errors) {
         let mut is_new = installation.is_some_and(|before| before != flown.installation);
-        while renewals.next_if(|utc_us| *utc_us <= flown.departure_us).is_some() {
-            is_new = true;
+        while dates.next_if(|utc_us| *utc_us <= flown.departure_us).is_some() {
+            (is_new, renewals) = (true, renewals + 1);
         }
         period += u32::from(is_new);
         installation = Some(flown.installation);
@@ -62,7 +63,7 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
         // No gap is below zero: such a record shows a fault, and nothing of the unit.
         let is_possible = gap_m > -(IMPOSSIBLE_ERRORS * error_m).max(IMPOSSIBLE_SHARE * limit_m);
         let is_sound = is_possible && !is_doubtful;
-        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound, period });
+        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound, period, renewals });
     }
-    (records, renewals.next())
+    (records, dates.next())
 }

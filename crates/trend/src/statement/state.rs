@@ -58,6 +58,8 @@ pub enum Reason {
     LimitHeld { gap_m: f64, limit_m: f64, latest_m: f64 },
     /// One record above the limit, or flagged ones.
     Unconfirmed { gap_m: f64, limit_m: f64, before_m: Option<f64>, records: usize },
+    /// Records above the limit come back, each followed by one below it.
+    Repeated { limit_m: f64, records: usize, among: usize },
     /// The early crossing by a wear law lies within the planning horizon.
     CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
     /// The early crossing by the line through the last records does.
@@ -127,6 +129,13 @@ impl fmt::Display for Reason {
                     Some(before_m) => write!(f, "the records before read {}", um(before_m)),
                     None => f.write_str("no record of this installation before"),
                 }
+            }
+            Self::Repeated { limit_m, records, among } => {
+                write!(
+                    f,
+                    "{records} of the last {among} records are at or above the limit of {}",
+                    um(limit_m)
+                )
             }
             Self::CrossesSoon { p05_hours: ..0.5, planning_horizon_hours: horizon } => {
                 write!(f, "may already be at the limit (5 % point); planning horizon {horizon:.0} FH")
@@ -255,6 +264,9 @@ fn exceeded(measured: &Measured, gap_m: f64, limit_m: f64) -> Option<(State, Rea
         Exceedance::Held => {
             let latest_m = measured.latest.map_or(gap_m, |record| record.gap_m);
             (State::Act, Reason::LimitHeld { gap_m, limit_m, latest_m })
+        }
+        Exceedance::Repeated { records, among } => {
+            (State::Plan, Reason::Repeated { limit_m, records, among })
         }
         Exceedance::Unconfirmed { gap_m, before_m, records } => {
             (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m, records })

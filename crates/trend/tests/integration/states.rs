@@ -48,7 +48,7 @@ fn wild_records(d: &mut Drawn) {
 }
 
 /// The kinds that must be acted on.
-pub(crate) const URGENT: [Kind; 28] = [
+pub(crate) const URGENT: [Kind; 31] = [
     ("one above the limit", Normal, &[young_or_old, |d| d.jump(1, 1)]),
     ("jump above the limit", Normal, &[young_or_old, |d| d.jump(2, 8)]),
     ("linear rise, now above", Normal, &[young_or_old, |d| d.rise((2, 40), (1.02, 1.3), LINE)]),
@@ -120,6 +120,26 @@ pub(crate) const URGENT: [Kind; 28] = [
             |d| d.rise((100, 300), (0.7, 0.8), LINE),
             |d| d.above((8, 30), (0.0, 0.0)),
         ],
+    ),
+    (
+        "one low record of another installation after an exceedance",
+        Act,
+        &[young_or_old, |d| d.jump(2, 8), Drawn::moved, |d| d.log(d.um)],
+    ),
+    (
+        "moved for one record and back, above throughout",
+        Act,
+        &[|d| d.jump(2, 8), Drawn::moved, |d| d.jump(1, 1)],
+    ),
+    (
+        "above and below in turn",
+        Plan,
+        &[young_or_old, |d| {
+            for _ in 0..d.count(3, 20) {
+                d.jump(1, 1);
+                d.log(d.um);
+            }
+        }],
     ),
 ];
 
