@@ -11,12 +11,14 @@ const BEFORE_ESTIMATOR: [(&str, &str); 3] = [
     ("channel_unmapped", "map the missing channel, or exclude the actuator from `{position}`"),
 ];
 
-/// Codes of a wrong sign, exchange, ratio, rate, selection or missing channel.
-const MAPPING: [&str; 7] = [
+/// Codes of a wrong sign, exchange, ratio, rate, selection, load or missing channel; a worn place may leave motion
+/// unexplained as well.
+const MAPPING: [&str; 8] = [
     "load_sign_flipped",
     "positions_swapped",
     "position_ratio",
     "rate_too_low",
+    "motion_unexplained",
     "nothing_selected",
     "channel_zero",
     "channel_unmapped",

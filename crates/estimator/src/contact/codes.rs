@@ -29,8 +29,9 @@ pub enum Rejection {
     /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap. Or gap or stiffness
     /// would be negative.
     #[strum(
-        message = "check that the load is this actuator's; else use a flight with more load, or more travel, so \
-        that friction does not hold the screw within its gap"
+        message = "check that the load is this actuator's, and not late (`latency_s`); else use a flight with more \
+        load, or more travel, so that friction does not hold the screw within its gap; inspect a unit whose flights \
+        were estimated before"
     )]
     MotionUnexplained,
     /// Under nine seconds of sound samples, or too few in contact.
@@ -54,7 +55,8 @@ pub enum Rejection {
     /// The ratio of the two positions is not 1.
     #[strum(
         message = "check `lead_m_per_rev` of the part (of a rotary one `gear_ratio` of the channel), and unit and \
-        sign of the positions: screw against motor must have slope 1 (`freeplay check` shows it)"
+        sign of the positions, and `wraps_at` of one that starts again with each turn: screw against motor must \
+        have slope 1 (`freeplay check` shows it)"
     )]
     PositionRatio,
 }
