@@ -35,6 +35,9 @@ fn missing_key(message: &str) -> Option<Diagnostic> {
         "logs" => {
             "add a table `[logs]`, or write a complete configuration with `freeplay init DIR`".to_owned()
         }
+        "motor_position" | "screw_position" | "load" => {
+            format!("add a table `[channel.{key}]` with its `column` and `unit`")
+        }
         _ => format!("add a line `{key} = …` here"),
     };
     Some(Diagnostic::new("bad_toml", format!("`{key}` is missing")).hint(hint))

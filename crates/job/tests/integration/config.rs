@@ -68,6 +68,13 @@ fn all_unknown_keys_are_reported_at_once() {
 }
 
 #[test]
+fn a_missing_channel_asks_for_its_table() {
+    let found =
+        parse(&GOOD.replace("[channel.load]\ncolumn = \"{position}_load\"\nunit = \"N\"\n", "")).unwrap_err();
+    assert!(found[0].hint.as_ref().unwrap().contains("`[channel.load]`"), "{found:?}");
+}
+
+#[test]
 fn what_cannot_be_meant_is_refused_by_a_stable_code() {
     let cases = [
         ("unit = \"mm\"", "unit = \"N\"", "unit_contradicts"),
