@@ -26,6 +26,15 @@ pub(crate) struct StrokeProfile {
     pub(crate) mean_m: (f64, f64),
     /// The knots at which the screw spent time enough.
     pub(crate) places: Vec<GapAtPlace>,
+    /// By how much the gap at each knot exceeds that of the fit with one gap, m.
+    beyond_m: [f64; KNOTS],
+}
+
+impl StrokeProfile {
+    /// By how much the gap at a place from −1 to 1 exceeds that of the fit with one gap, m.
+    pub(crate) fn beyond_m(&self, place: f64) -> f64 {
+        dot(&self.beyond_m, &hats(place))
+    }
 }
 
 /// The profile of a flight whose gap varies along the stroke for certain.
@@ -68,6 +77,7 @@ pub(crate) fn stroke_profile(
     is_certain.then(|| StrokeProfile {
         mean_m: (mean_m, error_m(1.0, &shares)),
         places: visited().map(place).collect(),
+        beyond_m: std::array::from_fn(|knot| value_m(&only(knot)) - line.fit.beta[GAP]),
     })
 }
 
