@@ -26,14 +26,14 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
 /// Width of the loop of δX against the load at zero load and its standard error, m: what lies between the branch on which a
 /// load from above falls to zero and the one on which a load from below rises to it. Gap and friction wind-up together.
 ///
-/// Loads within 10 % of the 95 % load count, where the load changes by more than that from 0.1 s before to 0.1 s after.
+/// Loads within 5 % of the 95 % load count, where the load changes by more than 10 % of it from 0.1 s before to 0.1 s after.
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
     let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
-    let near_n = 0.1 * scaling.load_n;
+    let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
     let position = |side: f64, k: usize| {
         let load_n = blocks.load_n[k] - contact.search.line.at.load_zero_n;
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
-        let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -near_n;
+        let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
         let on_branch_m = || {
             blocks.without_slow_parts_m(scaling, k, &contact.search.line.fit.beta)
                 - load_n * contact.compliance_m_per_n
