@@ -9,13 +9,10 @@ use trend::quantity::changes::{self, QuantityChanges, QuantityStep};
 
 use crate::assess::limits::Limits;
 use crate::assess::quantities::limits::{Scale, Treatment};
-use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ};
+use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ, Units};
 use crate::findings::monitoring::median;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{History, TailPosition, UnitKey};
-
-/// Units by name: their flights, and the same by usage with their maintenance.
-pub(crate) type Units<'a> = std::collections::BTreeMap<&'a UnitKey, (&'a History, Series)>;
 
 /// Facts about a unit in addition to the values.
 #[derive(Clone, Copy)]

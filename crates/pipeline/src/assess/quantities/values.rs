@@ -7,8 +7,8 @@ use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
 use store::{Query, Store};
+use trend::Series;
 
-use crate::assess::quantities::subject::Units;
 use crate::error::Error;
 use crate::fleet::builder;
 use crate::fleet::flight_row::FlightRow;
@@ -80,6 +80,9 @@ impl ValueColumns {
         }
     }
 }
+
+/// Units by name: their flights, and the same by usage with their maintenance.
+pub(crate) type Units<'a> = BTreeMap<&'a UnitKey, (&'a History, Series)>;
 
 /// Values of all units, in the order of the last flights of their histories.
 pub(crate) type FleetValues = BTreeMap<UnitKey, Vec<FlightValues>>;
