@@ -25,7 +25,7 @@ impl Samples<'_> {
     ///
     /// # Errors
     /// [`Error::Lengths`] for channels of different length or a segment outside them.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), Error> {
         let (dx, load) = (self.dx_m.len(), self.load_n.len());
         let end = self.segments.iter().map(|s| s.end).max().unwrap_or(0);
         if dx != load || self.motor_m.len() != dx || end > dx {
