@@ -121,15 +121,15 @@ fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
     );
 }
 
-/// Positions in one file, loads in another.
-fn loads_apart(identity: impl Fn(&Path) -> Facts) -> TestFleet {
+/// Positions in one file, loads in another: of these, one row of each `every`.
+fn loads_apart(every: usize, identity: impl Fn(&Path) -> Facts) -> TestFleet {
     let fleet = one_tail();
     for log in logs(&fleet) {
         let [loads, positions] =
             ["loads", "positions"].map(|to| fleet.path(to).join(log.file_name().unwrap()));
         let is_load = |column: &str| column.ends_with("_load_n");
         let own = identity(&log);
-        rewrite(&log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
+        rewrite(&log, &loads, &own, |c| is_load(c) || c == "time_s", |row| row % every == 0);
         rewrite(&log, &positions, &own, |c| !is_load(c), |_| true);
     }
     fleet.configure("sample-data/logs/N412FP/*.parquet", "positions/*.parquet");
@@ -143,10 +143,10 @@ fn loads_apart(identity: impl Fn(&Path) -> Facts) -> TestFleet {
 /// The same numbers, also under a flight number that flies every day.
 #[test]
 fn loads_in_files_of_their_own_find_their_flights() {
-    let fleet = loads_apart(facts);
+    let fleet = loads_apart(1, facts);
     fleet.run_ok(&["run"]);
     assert_eq!(numbers(&fleet), plain());
-    let fleet = loads_apart(|log| facts_with(log, "flight_id", "FP100"));
+    let fleet = loads_apart(1, |log| facts_with(log, "flight_id", "FP100"));
     fleet.run_ok(&["run"]);
     // The fifth column is the flight id.
     let unnamed = |line: String| {
@@ -157,9 +157,23 @@ fn loads_in_files_of_their_own_find_their_flights() {
     assert!(found.eq(wanted));
 }
 
+/// Loads at half the rate: nearly the same numbers.
+#[test]
+fn loads_of_half_the_rate_give_nearly_the_same_gaps() {
+    let fleet = loads_apart(2, facts);
+    fleet.run_ok(&["run"]);
+    fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "half.parquet"]);
+    let truth = Table::read(&fleet.path("sample-data/truth.parquet")).by_flight("gap_m");
+    let found = Table::read(&fleet.path("half.parquet")).by_flight("gap_m").into_iter();
+    let mut errors: Vec<f64> = found.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
+    assert!(median < 0.008 && worst < 0.03, "a load at 50 Hz costs {median}, at most {worst}");
+}
+
 #[test]
 fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
-    let fleet = loads_apart(facts);
+    let fleet = loads_apart(1, facts);
     std::fs::write(&fleet.glob("loads/*.parquet")[0], b"PAR1 truncated").unwrap();
     std::fs::remove_file(&fleet.glob("positions/*.parquet")[1]).unwrap();
     let result = fleet.freeplay(&["run"]);
