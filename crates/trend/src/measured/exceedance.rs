@@ -9,7 +9,7 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 pub(crate) enum Exceedance {
     /// One record alone, or flagged ones: the next sound one confirms or clears it.
     Unconfirmed { gap_m: f64, before_m: Option<f64>, records: usize },
-    /// So many of the last records, with others in between.
+    /// Several of the last records, with others in between.
     Repeated { records: usize, among: usize },
     /// Two records at least, or the level of the last records.
     Confirmed { records: usize },
@@ -18,7 +18,7 @@ pub(crate) enum Exceedance {
     Held,
 }
 
-/// So many records at or above the limit among the last ones are no exception, though others came in between.
+/// Least number of records at or above the limit, among the last ones, that are no exception although others came in between.
 const REPEATED: usize = 3;
 const REPEATED_AMONG: usize = 6;
 
@@ -79,10 +79,7 @@ pub(crate) fn exceedance(
     };
     let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
     let last_renewals = |records: &[Record]| records.last().map(|record| record.renewals);
-    let near = records.rchunks(REPEATED_AMONG).next().unwrap_or_default();
-    let near_above = || near.iter().filter(|r| is_above(r) && Some(r.renewals) == last_renewals(all));
-    let rises = near.array_windows().filter(|[before, here]| !is_above(before) && is_above(here)).count();
-    let is_repeated = rises > 1 && near_above().count() >= REPEATED && near_above().any(|r| r.is_sound);
+    let repeated = repeated(&records, is_above);
     let found = match (run, by_level) {
         // The records before a renewal.
         _ if last_renewals(&records) != last_renewals(all) => None,
@@ -91,7 +88,7 @@ pub(crate) fn exceedance(
         }
         (Some(run), _) if run.is_confirmed => Some(Exceedance::Held),
         (_, Some(level)) => Some(Exceedance::Confirmed { records: level.records }),
-        _ if is_repeated => Some(Exceedance::Repeated { records: near_above().count(), among: near.len() }),
+        _ if repeated.is_some() => repeated,
         (Some(run), None) => {
             let gap_m = records[run.first..].iter().map(|record| record.gap_m).fold(0.0, f64::max);
             Some(Exceedance::Unconfirmed { gap_m, before_m: run.before_m, records: run.above })
@@ -99,6 +96,16 @@ pub(crate) fn exceedance(
         (None, None) => level.is_some_and(is_held).then_some(Exceedance::Held),
     };
     (found, events)
+}
+
+/// Records above the limit that come back after others below it, since the last renewal; one of them must be sound.
+fn repeated(records: &[Record], is_above: impl Fn(&Record) -> bool) -> Option<Exceedance> {
+    let of_life = records.chunk_by(|before, here| before.renewals == here.renewals).last()?;
+    let near = &of_life[of_life.len().saturating_sub(REPEATED_AMONG)..];
+    let above: Vec<&Record> = near.iter().filter(|record| is_above(record)).collect();
+    let rises = near.array_windows().filter(|[before, here]| !is_above(before) && is_above(here)).count();
+    let is_repeated = rises > 1 && above.len() >= REPEATED && above.iter().any(|record| record.is_sound);
+    is_repeated.then_some(Exceedance::Repeated { records: above.len(), among: near.len() })
 }
 
 /// The middle of the last three sound records before a record, in its period.
