@@ -134,7 +134,7 @@ impl KnownNames {
             what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
         let hint = match nearest(name, known.iter().map(String::as_str)) {
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
-            None => format!("list all units of {} with `freeplay trend`", self.place()),
+            None => format!("list all units of {} with `{}`", self.place(), self.listing()),
         };
         let searched = match self {
             Self::Store(..) => "the store and the installations table".to_owned(),
@@ -171,6 +171,14 @@ impl KnownNames {
             format!("the installations table does not know tail {tail}{near}")
         };
         format!("{table}; list the flights there with `freeplay query tail {tail}`")
+    }
+
+    /// The command that lists all units.
+    fn listing(&self) -> String {
+        match self {
+            Self::Store(..) => "freeplay trend".to_owned(),
+            Self::Estimates(file, _) => format!("freeplay trend --estimates {} --all", display_path(file)),
+        }
     }
 
     /// Where the departures are, as text.
