@@ -29,7 +29,7 @@ const PARTS: [&str; 2] = ["EMA-27-1040", "EMA-27-1060"];
 const HOURS: f64 = 2.0;
 /// Flights in one commit.
 const COMMIT: usize = 4_000;
-/// Of so many logs one has failed; below, of so many records one is refused.
+/// One log of this number has failed, and one record of the number below is refused.
 const ERROR_EVERY: usize = 997;
 const REFUSED_EVERY: usize = 19;
 

@@ -157,7 +157,7 @@ impl BlockMeans {
             && self.in_range_n.contains(&self.load_n[k])
     }
 
-    /// Whether the flight is much longer than an excerpt of so many blocks.
+    /// Whether the flight is much longer than an excerpt of `blocks` blocks.
     pub(crate) fn is_longer(&self, blocks: usize) -> bool {
         self.len() >= blocks * 3 / 2
     }

@@ -41,7 +41,7 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
 }
 
 /// The rows of all batches, sorted by the columns of `order`; rows that are equal in these keep their order. If `last` is
-/// given, only so many rows from the end.
+/// given, only this number of rows from the end.
 ///
 /// # Errors
 /// As [`frame`].

@@ -36,7 +36,7 @@ pub(crate) const PERIODIC: usize = 15;
 
 /// Share of the 95 % load below which flanks may be soft.
 pub(crate) const FIRM_SHARE: f64 = 0.12;
-/// So many blocks before a block, and one after it, must press the same flank as firmly.
+/// Number of blocks before a block that must press the same flank as firmly; one block after it must as well.
 const BEFORE: usize = 2;
 
 /// The mean of some blocks in contact on one flank.
