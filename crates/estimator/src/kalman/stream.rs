@@ -114,8 +114,8 @@ impl Stream {
 
     /// Pushes one sample after the other, and hands out each step.
     ///
-    /// The same numbers as [`Stream::push`]. A settled state waits in no memory from one sample to the next, which saves
-    /// more than half of the time.
+    /// The same numbers as [`Stream::push`]. While the gain is settled and no sample is missing, the state stays in
+    /// registers, which saves more than half of the time.
     ///
     /// # Errors
     /// As [`Stream::push`].
@@ -126,27 +126,23 @@ impl Stream {
         samples: impl Iterator<Item = (&'a f64, &'a f64)>,
         mut put: impl FnMut(&StreamStep),
     ) -> Result<(), Error> {
-        let mut settled = self.settled_state();
-        let mut before_n = self.held_load_n;
-        for (&y_m, &load_n) in samples {
-            let step;
-            match &mut settled {
-                Some((steady, x)) if is_complete(y_m, load_n) => {
-                    (step, *x) = steady.step(x, y_m, load_n);
+        let mut samples = samples.peekable();
+        loop {
+            if let Some((steady, mut x)) = self.settled_state() {
+                let mut before_n = self.held_load_n;
+                while let Some((&y_m, &load_n)) =
+                    samples.next_if(|(y_m, load_n)| is_complete(**y_m, **load_n))
+                {
+                    let step;
+                    (step, x) = steady.step(&x, y_m, load_n);
                     before_n = load_n;
+                    put(&step);
                 }
-                _ => {
-                    if let Some((_, x)) = settled {
-                        self.keep_state(x, before_n);
-                    }
-                    step = self.push_unsettled(y_m, load_n)?;
-                    settled = self.settled_state();
-                    before_n = self.held_load_n;
-                }
+                self.keep_state(x, before_n);
             }
-            put(&step);
+            let Some((&y_m, &load_n)) = samples.next() else { return Ok(()) };
+            put(&self.push_unsettled(y_m, load_n)?);
         }
-        Ok(())
     }
 
     /// The settled gain and the x(k+1/k) it is applied to, while it is.
