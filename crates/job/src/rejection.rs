@@ -65,6 +65,11 @@ pub const STIFFNESS_UNLIKE: &str = "stiffness_unlike";
 /// A fitted stiffness is another than the configured one beyond this factor.
 const STIFFNESS_FACTOR: f64 = 2.0;
 
+/// The codes that most flights of an actuator or a part number have where its mapping or a unit is wrong.
+pub fn fault_codes() -> impl Iterator<Item = &'static str> {
+    MAPPING.into_iter().chain(UNIT.map(|(code, _)| code)).chain([OF_PART])
+}
+
 /// Whether a fitted stiffness is not that of the part; both in N/m.
 pub fn is_stiffness_unlike(fitted_n_per_m: f64, configured_n_per_m: f64) -> bool {
     let ratio = fitted_n_per_m / configured_n_per_m;

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
+    Array, ArrayRef, AsArray, Float64Array, Int32Array, PrimitiveArray, RecordBatch, StringArray,
     TimestampMicrosecondArray, new_null_array,
 };
 use arrow::compute::cast;
@@ -48,20 +48,34 @@ pub struct TableBatch {
 /// What a user's table calls the columns that we know: our name → theirs.
 pub type ColumnAliases = BTreeMap<String, String>;
 
-/// The texts of a column: trimmed, an empty one none.
+/// The texts of a column, trimmed, an empty one none: one for each row, or one for each code where the table has codes.
 #[derive(Debug, Clone)]
-pub struct StringColumn(StringArray);
+pub struct StringColumn {
+    codes: Option<Int32Array>,
+    texts: StringArray,
+}
 
 impl StringColumn {
     /// The text of a row.
     pub fn get(&self, row: usize) -> Option<&str> {
-        let text = self.0.is_valid(row).then(|| trim_ascii_fast(self.0.value(row)))?;
+        let at = if self.codes.is_some() { self.code(row)? } else { row };
+        let text = self.texts.is_valid(at).then(|| trim_ascii_fast(self.texts.value(at)))?;
         (!text.is_empty()).then_some(text)
+    }
+
+    /// The code of a row's text, where the table has codes.
+    pub fn code(&self, row: usize) -> Option<usize> {
+        self.codes.as_ref().filter(|codes| codes.is_valid(row)).map(|codes| codes.value(row) as usize)
+    }
+
+    /// Whether two rows have the same text; one text may have several codes.
+    pub fn are_same(&self, a: usize, b: usize) -> bool {
+        if self.codes.is_some() { self.code(a) == self.code(b) } else { self.get(a) == self.get(b) }
     }
 }
 
 /// A text without the blanks around it, of which most have none.
-pub fn trim_ascii_fast(text: &str) -> &str {
+fn trim_ascii_fast(text: &str) -> &str {
     let is_bare = |end: Option<&u8>| end.is_some_and(u8::is_ascii_graphic);
     if is_bare(text.as_bytes().first()) && is_bare(text.as_bytes().last()) { text } else { text.trim() }
 }
@@ -102,13 +116,12 @@ impl TableBatch {
     /// # Errors
     /// When it is neither text, numbers nor times.
     pub fn texts(&self, column: Option<usize>) -> Result<StringColumn, Error> {
+        let coded = column.and_then(|column| self.batch.column(column).as_dictionary_opt::<Int32Type>());
+        if let Some((coded, texts)) = coded.and_then(|coded| Some((coded, coded.values().as_string_opt()?))) {
+            return Ok(StringColumn { codes: Some(coded.keys().clone()), texts: texts.clone() });
+        }
         let texts = self.cast(column, &DataType::Utf8)?;
-        Ok(StringColumn(texts.as_string().clone()))
-    }
-
-    /// A column of texts as the codes that it is stored as; none where it is not.
-    pub fn dictionary_column(&self, column: usize) -> Option<&DictionaryArray<Int32Type>> {
-        self.batch.column(column).as_dictionary_opt()
+        Ok(StringColumn { codes: None, texts: texts.as_string().clone() })
     }
 
     /// A column as finite numbers; without one, all none.

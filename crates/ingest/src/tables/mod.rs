@@ -9,6 +9,6 @@ mod installations;
 mod table;
 
 pub use cell::{name, number, utc};
-pub use column_batches::{ColumnAliases, StringColumn, TableBatch, TableSplits, trim_ascii_fast};
+pub use column_batches::{ColumnAliases, StringColumn, TableBatch, TableSplits};
 pub use installations::{aliases, installations};
 pub use table::Table;

@@ -5,17 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::time::days_between;
-use records::{Installations, QuantityChange, QuantityRow};
+use records::{Installations, QuantityChange, QuantityRow, UnitState};
 use store::{Query, Store};
-use trend::{Assessment, FleetPrior, Series, State};
+use trend::{Assessment, FleetPrior, Series};
 
 use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
 use crate::assess::quantities::follow::{FollowedQuantities, follow};
 use crate::assess::quantities::subject::UnitFacts;
-use crate::assess::quantities::values::{self, FleetValues, Units};
+use crate::assess::quantities::values::{self, FleetValues, Units, by_unit};
 use crate::assess::quantities::{peers, rows};
 use crate::assess::tail_wide_steps::TailWide;
 use crate::assess::trend_row::RowSources;
@@ -23,8 +22,9 @@ use crate::error::Error;
 use crate::findings::finding::Finding;
 use crate::findings::monitoring::coverage;
 use crate::findings::monitoring::mapping_faults::{self, MappingFault};
-use crate::findings::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
+use crate::findings::monitoring::recent::{RecentFlights, recent_flights};
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
+use crate::findings::monitoring::repeated_samples;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::join::open_store;
@@ -34,6 +34,7 @@ use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
 use crate::fleet::unit_rows;
+use crate::run::summary::RunSummary;
 use job::config::AsOf;
 use records::TrendRow;
 
@@ -104,104 +105,71 @@ pub fn assess_store(
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     let (histories, values) = values::load(store)?;
-    assess_histories(config, installations, histories, Some((store, values)), ask)
+    assess_histories(config, installations, histories, Some(values), ask)
 }
 
-/// Assesses the selected units of some histories, with the followed values and what else their store holds.
+/// Assesses the selected units of some histories, with the followed values that their store holds.
 fn assess_histories(
     config: &Config,
     installations: &Installations,
     mut histories: Histories,
-    mut stored: Option<(&Store, FleetValues)>,
+    mut values: Option<FleetValues>,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
-    if let Some((_, values)) = &mut stored {
+    if let Some(values) = &mut values {
         values::drop_old(values, &histories, as_of);
     }
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    if let Some((store, values)) = stored {
-        fleet.add_diagnostics(store, &values, as_of)?;
+    if let Some(values) = values {
+        fleet.add_diagnostics(&values, as_of);
     }
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc))
 }
 
-/// Assessments of the units of a run.
-#[derive(Debug, Default)]
-pub(crate) struct RunAssessments {
-    /// Assessments at the newest date in the store.
-    pub now: Vec<TrendRow>,
-    /// Changes against the states after the run before.
-    pub changes: Changes,
-    /// Recent diagnostics in addition to gaps, of all tails.
-    pub recent: RecentDiagnostics,
-    /// Followed quantities of all units, and what changed.
-    pub followed: FollowedQuantities,
-    /// Number of units of the fleet by state.
-    pub states: BTreeMap<&'static str, usize>,
-    /// Number of installed units whose newest gap is older than `trend.stale_after_days` before now.
-    pub stale_now: usize,
-    /// Units of the whole fleet in another state than `normal`, touched by the run or not.
-    pub work_list: Vec<TrendRow>,
-    /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
-    pub mapping_faults: Vec<MappingFault>,
-    /// Limits and hours that assessments of the fleet lack, in words.
-    pub notes: Vec<String>,
-    /// Findings about all units of the fleet, for alerts and work requests.
-    pub findings: Vec<Finding>,
-}
-
-/// Assesses the fleet after a run: the units whose records it changed, the work list of all units, and what differs from the
-/// states after the run before.
+/// Assesses the fleet after a run, and adds to its summary the `touched` units, the work list of all units, and what differs
+/// from the states after the run before. Returns the findings about all units, for alerts and work
+/// requests, and the states to store for the next run.
 pub(crate) fn assess_run(
     config: &Config,
     installations: &Installations,
     store: &Store,
-    units: &BTreeSet<UnitKey>,
-    run: RunFacts<'_>,
-) -> Result<RunAssessments, Error> {
+    touched: &BTreeSet<UnitKey>,
+    with_records: &BTreeSet<UnitKey>,
+    summary: &mut RunSummary,
+) -> Result<(Vec<Finding>, Vec<UnitState>), Error> {
     let (mut histories, mut values) = values::load(store)?;
-    let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
+    let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(Default::default()) };
     values::drop_old(&mut values, &histories, as_of);
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    let recent = fleet.add_diagnostics(store, &values, as_of)?;
+    summary.samples_repeated = repeated_samples::detect(&fleet.add_diagnostics(&values, as_of));
     drop(values);
     let (mut now, tail_wide) = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
-    let mut run = RunAssessments {
-        recent,
-        followed: fleet.followed.clone(),
-        mapping_faults: fleet.mapping_faults.clone(),
-        notes: fleet.notes(&now, None),
-        changes: changes(config, &store.states()?, &now, run),
-        ..RunAssessments::default()
-    };
-    run.followed.changes.extend(tail_wide);
-    run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
-    let states = now.iter().filter_map(|row| row.state);
-    states.for_each(|state| *run.states.entry(state).or_default() += 1);
-    let is_stale = |row: &&TrendRow| {
-        let newest = row.latest_utc.filter(|_| row.state.is_some());
-        newest.is_some_and(|at| days_between(at, Timestamp::now()) > config.document.trend.stale_after_days)
-    };
-    run.stale_now = now.iter().filter(is_stale).count();
-    let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
+    let mut quantity_changes = fleet.followed.changes.clone();
+    quantity_changes.extend(tail_wide);
+    quantity_changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
+    let run = RunFacts { run_id: &summary.run_id, with_records, moved: &summary.moved };
+    let Changes { changed, states } = changes(config, &store.states()?, &now, run);
     let causes: BTreeMap<UnitKey, &String> =
-        run.changes.changed.iter().map(|change| (change.unit(), &change.because)).collect();
+        changed.iter().map(|change| (change.unit(), &change.because)).collect();
     let gap = |row: &TrendRow| Finding {
         cause: causes.get(&row.unit()).map(|cause| (*cause).clone()),
         ..Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))
     };
-    let of_common = Finding::of_common_changes(&run.followed.changes, as_of);
-    run.findings =
-        now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).chain(of_common).collect();
-    run.work_list = now.iter().filter(needs_attention).cloned().collect();
-    now.retain(|row| units.contains(&row.unit()));
-    Ok(RunAssessments { now, ..run })
+    let of_common = Finding::of_common_changes(&quantity_changes, as_of);
+    let findings =
+        now.iter().map(gap).chain(Finding::of_quantities(&fleet.followed.rows)).chain(of_common).collect();
+    summary.notes.extend(fleet.notes(&now, None));
+    let newest_utc = now.iter().filter_map(|row| fleet.latest_flight(&row.unit(), as_of)).max();
+    summary.add_assessments(now, touched, config.document.trend.stale_after_days);
+    summary.add_quantity_changes(quantity_changes, newest_utc.unwrap_or(as_of));
+    (summary.changed, summary.mapping_faults) = (changed, fleet.mapping_faults);
+    Ok((findings, states))
 }
 
 /// Assessments of the selected units with everything that a report shows.
@@ -224,7 +192,6 @@ pub(crate) struct ReportAssessments {
 pub(crate) fn assess_for_report(
     config: &Config,
     installations: &Installations,
-    store: &Store,
     histories: &mut Histories,
     values: &FleetValues,
     ask: &UnitSelection,
@@ -237,7 +204,7 @@ pub(crate) fn assess_for_report(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let mut fleet = FleetContext::new(config, installations, histories, &days)?;
-    fleet.add_diagnostics(store, values, as_of)?;
+    fleet.add_diagnostics(values, as_of);
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
@@ -392,23 +359,22 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// Adds what the store holds besides gaps: followed quantities, and wrong mappings. Returns the diagnostics of the last
-    /// months, which show them.
-    fn add_diagnostics(
-        &mut self,
-        store: &Store,
-        values: &FleetValues,
-        as_of: Timestamp,
-    ) -> Result<RecentDiagnostics, Error> {
+    /// Adds what the values of flights show besides gaps: followed quantities, and wrong mappings. Returns the flights of the
+    /// last months, which show these.
+    fn add_diagnostics<'v>(&mut self, values: &'v FleetValues, as_of: Timestamp) -> RecentFlights<'v>
+    where
+        'a: 'v,
+    {
         let facts = UnitFacts { units: &self.units, limits: self.limits };
-        self.followed = follow(values, facts, as_of);
+        let units = by_unit(&self.units, values, as_of);
+        self.followed = follow(&units, facts, as_of);
         self.moved = recorder_changes(&self.followed.changes, as_of);
         for (row, state) in self.followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
             self.conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
-        let recent = recent_diagnostics(store, as_of)?;
+        let recent = recent_flights(&units, as_of);
         self.mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
-        Ok(recent)
+        recent
     }
 
     /// Assessments of some units, with what was found about them in addition to gaps.

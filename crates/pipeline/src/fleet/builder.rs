@@ -7,9 +7,8 @@ use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use rayon::prelude::*;
 
-use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight, signed_error};
+use crate::fleet::flight_row::{FlightExtras, FlightRow, signed_error};
 use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::row_keys::TextColumn;
 use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, number};
 
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
@@ -44,15 +43,12 @@ pub(crate) fn stored_columns() -> Vec<&'static str> {
 
 /// The histories of units, and what else `R` holds of each flight, by unit in the order of the flights.
 pub(crate) fn histories<R: Send>(
-    parts: PartsByUnit<(StoredFlight, R)>,
+    parts: PartsByUnit<R>,
     is_booked: bool,
 ) -> (Histories, BTreeMap<UnitKey, Vec<R>>) {
     let parts: Vec<_> = parts.into_iter().collect();
     let history = |(name, parts): (UnitKey, Vec<UnitRows<_>>)| {
-        let rows = UnitRows::concatenated(parts, |((flown, _), _), places, names| {
-            FlightRow::relocate(flown, places, names);
-        });
-        let (history, further) = History::of_rows(rows);
+        let (history, further) = History::of_rows(UnitRows::concatenated(parts));
         ((name.clone(), history), (name, further))
     };
     let (units, further): (Vec<_>, Vec<_>) = parts.into_par_iter().map(history).unzip();
@@ -63,12 +59,9 @@ pub(crate) fn histories<R: Send>(
 ///
 /// # Errors
 /// When a column that must be there is not, or has another type, and as [`add_stored`].
-pub(crate) fn add_external(
-    rows: &mut RowsByUnit<(StoredFlight, ())>,
-    chunk: &TableBatch,
-) -> Result<(), ingest::Error> {
+pub(crate) fn add_external(rows: &mut RowsByUnit<()>, chunk: &TableBatch) -> Result<(), ingest::Error> {
     chunk.column(&["serial_number", "serial"])?;
-    let flags = TextColumn::of(chunk, &["flags"])?;
+    let flags = chunk.texts(chunk.find(&["flags"]))?;
     // A record with any flag contradicts itself, so that it alone confirms nothing. A list without flags is written as `[]`.
     let other_gap_m = |row, gap_m| flags.get(row).filter(|flags| *flags != "[]").map(|_| gap_m);
     add(rows, chunk, other_gap_m, |_| ())
@@ -79,7 +72,7 @@ pub(crate) fn add_external(
 /// # Errors
 /// The first row without a serial number, or without a departure that a calendar has.
 pub(crate) fn add_stored<R>(
-    rows: &mut RowsByUnit<(StoredFlight, R)>,
+    rows: &mut RowsByUnit<R>,
     chunk: &TableBatch,
     batch: &RecordBatch,
     further: impl Fn(usize) -> R,
@@ -98,7 +91,7 @@ pub(crate) fn add_stored<R>(
 
 /// Adds the flights of some rows. `other_gap_m` gives the gap that contradicts that of a row, m.
 fn add<R>(
-    rows: &mut RowsByUnit<(StoredFlight, R)>,
+    rows: &mut RowsByUnit<R>,
     chunk: &TableBatch,
     other_gap_m: impl Fn(usize, f64) -> Option<f64>,
     further: impl Fn(usize) -> R,
@@ -109,7 +102,8 @@ fn add<R>(
     let gaps_m = chunk.numbers(Some(chunk.column(&["gap_m"])?))?;
     let (errors_m, reversals) = (numbers("gap_se_m")?, numbers("load_reversals")?);
     let (hours, meters) = (numbers("flight_hours")?, numbers("tail_hours_end")?);
-    let (flights, settings) = (TextColumn::of(chunk, &["flight_id"])?, TextColumn::of(chunk, &[SETTINGS])?);
+    let (flights, settings) =
+        (chunk.texts(chunk.find(&["flight_id"]))?, chunk.texts(chunk.find(&[SETTINGS]))?);
     rows.add_rows(chunk, |row, unit, place| {
         let wrong = |detail: String| chunk.error(row, Some(departure), detail);
         let departure_us = departures.is_valid(row).then(|| departures.value(row));
@@ -176,7 +170,7 @@ mod tests {
         assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
     }
 
-    type Rows = RowsByUnit<(StoredFlight, ())>;
+    type Rows = RowsByUnit<()>;
     type Add = fn(&mut Rows, &RecordBatch) -> Result<(), ingest::Error>;
 
     fn chunk(batch: &RecordBatch) -> TableBatch {
@@ -268,7 +262,7 @@ mod tests {
             let is_same = found.iter().all(|found| row_texts(found) == expected);
             assert!(is_same, "{rows_of_part} rows a part, {workers} workers");
         }
-        assert!(of_parts::<StoredFlight>(0, |_, _| Ok(())).unwrap().is_empty());
+        assert!(of_parts::<()>(0, |_, _| Ok(())).unwrap().is_empty());
     }
 
     /// Independent of the order of the workers, the first error of the table is returned.

@@ -104,7 +104,7 @@ impl History {
 
     /// The history of a unit's rows, each with what else `R` holds of it; sorted, so that it does not depend on the order of
     /// arrival.
-    pub(crate) fn of_rows<R>(rows: UnitRows<(StoredFlight, R)>) -> (Self, Vec<R>) {
+    pub(crate) fn of_rows<R>(rows: UnitRows<R>) -> (Self, Vec<R>) {
         let UnitRows { places, names, settings, mut rows } = rows;
         let place = |flown: &FlightRow| &places[flown.place as usize];
         let order = |((a, _), _): &(StoredFlight, R), ((b, _), _): &(StoredFlight, R)| {

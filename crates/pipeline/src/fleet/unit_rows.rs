@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use store::ColumnScan;
 
 use crate::error::Error;
+use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::places::{TailPosition, UnitKey, place_number};
 use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::settings_counts::SettingsCounts;
@@ -16,16 +17,16 @@ use crate::fleet::settings_counts::SettingsCounts;
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
 const SHARES: usize = 4;
 
-/// Rows of one unit, in the order of arrival.
+/// Flights of one unit, in the order of arrival, each with what else `R` holds of it.
 #[derive(Debug)]
 pub(crate) struct UnitRows<R> {
-    /// Where the unit was; a row holds the number of its place.
+    /// Where the unit was; a flight holds the number of its place.
     pub(crate) places: Vec<TailPosition>,
-    /// Flights' names one after the other, for readers that keep them.
+    /// Flights' names one after the other.
     pub(crate) names: String,
-    /// Gaps by the settings that they were estimated with, for readers that count them.
+    /// Gaps by the settings that they were estimated with.
     pub(crate) settings: SettingsCounts,
-    pub(crate) rows: Vec<R>,
+    pub(crate) rows: Vec<(StoredFlight, R)>,
 }
 
 impl<R> Default for UnitRows<R> {
@@ -36,9 +37,8 @@ impl<R> Default for UnitRows<R> {
 }
 
 impl<R> UnitRows<R> {
-    /// One after the other. `moved` is given each row, the new numbers of the places of its part, and the number of bytes of
-    /// names before that part.
-    pub(crate) fn concatenated(parts: Vec<Self>, moved: impl Fn(&mut R, &[u32], u32)) -> Self {
+    /// One after the other.
+    pub(crate) fn concatenated(parts: Vec<Self>) -> Self {
         let mut all = Self::default();
         all.rows.reserve_exact(parts.iter().map(|part| part.rows.len()).sum());
         all.names.reserve_exact(parts.iter().map(|part| part.names.len()).sum());
@@ -48,7 +48,7 @@ impl<R> UnitRows<R> {
             };
             let places: Vec<u32> = part.places.iter().map(number).collect();
             let names = all.names.len() as u32;
-            part.rows.iter_mut().for_each(|row| moved(row, &places, names));
+            part.rows.iter_mut().for_each(|((flown, _), _)| flown.relocate(&places, names));
             all.rows.append(&mut part.rows);
             all.names.push_str(&part.names);
             all.settings.add_all(&part.settings);
@@ -57,7 +57,7 @@ impl<R> UnitRows<R> {
     }
 }
 
-/// Rows by unit, while they come in. `R` is what is kept of a row.
+/// Flights by unit, while they come in.
 #[derive(Debug)]
 pub(crate) struct RowsByUnit<R> {
     /// Units by serial number; a serial number is unique only with its part number.

@@ -52,7 +52,7 @@ pub fn compose(
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { fleet, drawn, before, past, priors } =
-        trends::assess_for_report(config, installations, store, &mut histories, &values, ask, &days)?;
+        trends::assess_for_report(config, installations, &mut histories, &values, ask, &days)?;
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.

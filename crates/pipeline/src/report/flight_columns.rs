@@ -13,9 +13,7 @@ use store::{Query, Store};
 use crate::assess::quantities::values::{FleetValues, FlightValues, ValueColumns};
 use crate::error::Error;
 use crate::fleet::builder;
-use crate::fleet::flight_row::StoredFlight;
 use crate::fleet::histories::{Histories, UnitKey};
-use crate::fleet::row_keys::TextColumn;
 use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
 
 /// Columns of numbers that a page shows; an assessment needs load reversals alone of them.
@@ -74,14 +72,14 @@ impl StoreContents {
 }
 
 fn add(
-    rows: &mut RowsByUnit<(StoredFlight, (FlightExtras, FlightValues))>,
+    rows: &mut RowsByUnit<(FlightExtras, FlightValues)>,
     chunk: &TableBatch,
     batch: &RecordBatch,
 ) -> Result<(), ingest::Error> {
     let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
     let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
     let values = ValueColumns::of(chunk)?;
-    let reasons = TextColumn::of(chunk, &["reason"])?;
+    let reasons = chunk.texts(chunk.find(&["reason"]))?;
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
     let profiles =
         PROFILE.map(|name| batch.column_by_name(name).and_then(|column| column.as_list_opt::<i32>()));

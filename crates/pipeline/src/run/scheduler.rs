@@ -18,7 +18,6 @@ use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, PartNumber};
 use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
 
-use crate::assess::changes::RunFacts;
 use crate::assess::trends;
 use crate::error::Error;
 use crate::findings::FollowUp;
@@ -170,11 +169,8 @@ pub(crate) fn execute_run(
     units.extend(report.moved.iter().flat_map(|moved| [moved.former_unit(), moved.present_unit()]));
 
     (context.watch)(Event::Trends { units: units.len() });
-    let facts = RunFacts { run_id: &inputs.run_id, with_records: &with_records, moved: &report.moved };
-    let mut assessments = trends::assess_run(config, &inputs.installations, &store, &units, facts)?;
-    let findings = std::mem::take(&mut assessments.findings);
-    let states = std::mem::take(&mut assessments.changes.states);
-    report.add_assessments(assessments);
+    let (findings, states) =
+        trends::assess_run(config, &inputs.installations, &store, &units, &with_records, &mut report)?;
     if report.is_partial() {
         // A run that left logs out cannot determine which tails have no data.
         report.quiet.clear();

@@ -9,13 +9,12 @@ use records::{Diagnostic, Installations};
 use store::{LogOutcome, LogRecord, RunRecord};
 
 use crate::assess::changes::UnitChange;
-use crate::assess::trends::RunAssessments;
 use crate::error::is_passing;
 use crate::findings::monitoring::REPORTED_DAYS;
 use crate::findings::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
 use crate::findings::monitoring::mapping_faults::MappingFault;
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
-use crate::findings::monitoring::repeated_samples::{self, RepeatedSamples};
+use crate::findings::monitoring::repeated_samples::RepeatedSamples;
 use crate::findings::summary::FollowUpSummary;
 use crate::fleet::bookkeeping::installation_index::DateAhead;
 use crate::fleet::bookkeeping::join::MovedFlights;
@@ -23,6 +22,7 @@ use crate::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{Plan, StandingError, WorkItem};
 use records::{QuantityChange, TrendRow};
+use trend::State;
 
 /// Error of a log.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -221,20 +221,35 @@ impl RunSummary {
         }
     }
 
-    /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
-    pub(crate) fn add_assessments(&mut self, found: RunAssessments) {
-        let tails: BTreeSet<&str> = found.now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
-        let latest = found.recent.values().filter_map(|flights| Some(flights.last()?.departure_utc));
-        let newest = latest.max().unwrap_or_default();
-        self.recorder_moved = recorder_changes(&found.followed.changes, newest);
+    /// Adds the assessments of all units, and of those that the run touched as its own.
+    pub(crate) fn add_assessments(
+        &mut self,
+        mut now: Vec<TrendRow>,
+        touched: &BTreeSet<UnitKey>,
+        stale_after_days: f64,
+    ) {
+        let states = now.iter().filter_map(|row| row.state);
+        states.for_each(|state| *self.states.entry(state).or_default() += 1);
+        let is_stale = |row: &&TrendRow| {
+            let newest = row.latest_utc.filter(|_| row.state.is_some());
+            newest.is_some_and(|at| days_between(at, Timestamp::now()) > stale_after_days)
+        };
+        self.stale_now = now.iter().filter(is_stale).count();
+        let needs_attention =
+            |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
+        self.work_list = now.iter().filter(needs_attention).cloned().collect();
+        now.retain(|row| touched.contains(&row.unit()));
+        self.trends = now;
+    }
+
+    /// Adds the changes of quantities within the last month before the newest flight; of recorders, those on the aircraft
+    /// of the run's units.
+    pub(crate) fn add_quantity_changes(&mut self, changes: Vec<QuantityChange>, newest: Timestamp) {
+        let tails: BTreeSet<&str> = self.trends.iter().filter_map(|row| row.tail_number.as_deref()).collect();
+        self.recorder_moved = recorder_changes(&changes, newest);
         self.recorder_moved.retain(|moved| tails.contains(moved.tail_number.as_str()));
-        self.quantity_changes = found.followed.changes;
+        self.quantity_changes = changes;
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
-        self.samples_repeated = repeated_samples::detect(&found.recent);
-        (self.trends, self.changed, self.states) = (found.now, found.changes.changed, found.states);
-        self.stale_now = found.stale_now;
-        (self.work_list, self.mapping_faults) = (found.work_list, found.mapping_faults);
-        self.notes.extend(found.notes);
     }
 
     /// Adds what the status of all logs shows about the aircraft.

@@ -14,7 +14,7 @@ use crate::assess::quantities::attribution::common_steps;
 use crate::assess::quantities::limits::Treatment;
 use crate::assess::quantities::rows;
 use crate::assess::quantities::subject::{Subject, UnitFacts, fit_all};
-use crate::assess::quantities::values::{FleetValues, READ, by_position, by_unit};
+use crate::assess::quantities::values::{FollowedUnits, READ, by_position};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -37,12 +37,15 @@ pub struct FollowedQuantities {
 }
 
 /// Follows all quantities of all units.
-pub(crate) fn follow(fleet: &FleetValues, facts: UnitFacts<'_>, as_of: Timestamp) -> FollowedQuantities {
-    let units = by_unit(facts.units, fleet, as_of);
-    let positions = by_position(&units);
+pub(crate) fn follow(
+    units: &FollowedUnits<'_>,
+    facts: UnitFacts<'_>,
+    as_of: Timestamp,
+) -> FollowedQuantities {
+    let positions = by_position(units);
     let of_quantity = |index: usize| {
         let usual = Treatment::of(READ[index].0, &facts.limits.quantities(None));
-        let units = if usual.is_of_channel { &positions } else { &units };
+        let units = if usual.is_of_channel { &positions } else { units };
         let subjects = units.par_iter().filter_map(|(name, unit)| Subject::new(name, unit, facts, index));
         follow_quantity(subjects.collect(), usual.limit, as_of)
     };

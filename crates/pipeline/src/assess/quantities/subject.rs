@@ -156,15 +156,11 @@ fn value_of(
     index: usize,
     usual_load_n: Option<f64>,
 ) -> Option<(f64, f64)> {
-    let of = |quantity: Quantity| {
-        let at = READ.iter().position(|(q, _)| *q == quantity)?;
-        Some(f64::from(flight.values[at].0)).filter(|v| v.is_finite())
-    };
     let (value, se) = flight.values[index];
     let se = if se.is_finite() { f64::from(se.max(0.0)) } else { 0.0 };
     if quantity == Quantity::FrictionN
         && let (Some(dry_n), Some(share), Some(load_n)) =
-            (of(Quantity::FrictionDryN), of(Quantity::FrictionLoadShare), usual_load_n)
+            (flight.of(Quantity::FrictionDryN), flight.of(Quantity::FrictionLoadShare), usual_load_n)
     {
         return Some((dry_n + share * load_n, se));
     }

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use arrow::array::Float64Array;
-use ingest::tables::TableBatch;
+use ingest::tables::{StringColumn, TableBatch};
 use jiff::{SignedDuration, Timestamp};
+use job::rejection;
 use records::Quantity;
 use store::{Query, Store};
 use trend::Series;
@@ -40,12 +41,28 @@ const COVARIATES: [&str; 3] = ["temperature_c", "load_p05_n", "load_p95_n"];
 pub(crate) struct FlightValues {
     pub(crate) temperature_c: f32,
     pub(crate) load_p95_n: f32,
+    /// Which of [`rejection::fault_codes`] the record has as its reason; a larger number for none.
+    fault_code: u8,
     /// Value and standard error, in the order of [`READ`].
     pub(crate) values: [(f32, f32); READ.len()],
 }
 
+impl FlightValues {
+    /// The value of a quantity that is read; none of a flight without it.
+    pub(crate) fn of(&self, quantity: Quantity) -> Option<f64> {
+        let index = READ.iter().position(|(read, _)| *read == quantity)?;
+        Some(f64::from(self.values[index].0)).filter(|value| value.is_finite())
+    }
+
+    /// The reason of the record, where it is one of [`rejection::fault_codes`].
+    pub(crate) fn fault_code(&self) -> Option<&'static str> {
+        rejection::fault_codes().nth(usize::from(self.fault_code))
+    }
+}
+
 /// The columns of the values in some rows.
 pub(crate) struct ValueColumns {
+    reasons: StringColumn,
     covariates: [Float64Array; COVARIATES.len()],
     quantities: Vec<(Float64Array, Float64Array)>,
 }
@@ -54,7 +71,7 @@ impl ValueColumns {
     /// Their names.
     pub(crate) fn names() -> impl Iterator<Item = &'static str> {
         let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
-        COVARIATES.into_iter().chain(numbers)
+        COVARIATES.into_iter().chain(["reason"]).chain(numbers)
     }
 
     /// Those of some rows of the store.
@@ -63,16 +80,19 @@ impl ValueColumns {
         let [temperatures, lows, highs] = COVARIATES.map(numbers);
         let of = |(quantity, error): (Quantity, &str)| Ok((numbers(quantity.as_str())?, numbers(error)?));
         let quantities = READ.into_iter().map(of).collect::<Result<_, ingest::Error>>()?;
-        Ok(Self { covariates: [temperatures?, lows?, highs?], quantities })
+        let reasons = chunk.texts(chunk.find(&["reason"]))?;
+        Ok(Self { reasons, covariates: [temperatures?, lows?, highs?], quantities })
     }
 
     /// The values of a row.
     pub(crate) fn row(&self, row: usize) -> FlightValues {
         let [temperatures, lows, highs] = &self.covariates;
         let load_n = at(lows, row).zip(at(highs, row)).map(|(low, high)| low.abs().max(high.abs()));
+        let fault_code = |reason| rejection::fault_codes().position(|code| code == reason);
         FlightValues {
             temperature_c: number(temperatures, row) as f32,
             load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
+            fault_code: self.reasons.get(row).and_then(fault_code).map_or(u8::MAX, |number| number as u8),
             values: std::array::from_fn(|k| {
                 let (values, errors) = &self.quantities[k];
                 (number(values, row) as f32, at(errors, row).unwrap_or(0.0) as f32)
@@ -115,7 +135,7 @@ fn before_window(history: &History, as_of: Timestamp) -> usize {
 
 /// The followed flights of a unit, or those at the position that it was the last to fly in, by departure.
 pub(crate) struct FollowedFlights<'a> {
-    history: &'a History,
+    pub(crate) history: &'a History,
     position: Option<&'a TailPosition>,
     pub(crate) flights: Vec<(&'a FlightRow, &'a FlightValues)>,
     /// Median 95 % load, N.
@@ -143,12 +163,12 @@ impl<'a> FollowedFlights<'a> {
 pub(crate) type FollowedUnits<'a> = BTreeMap<&'a UnitKey, FollowedFlights<'a>>;
 
 /// The flights of each unit in the three years before a date, with it.
-pub(crate) fn by_unit<'a>(
-    units: &'a Units<'a>,
-    values: &'a FleetValues,
+pub(crate) fn by_unit<'v, 'a: 'v>(
+    units: &Units<'a>,
+    values: &'v FleetValues,
     as_of: Timestamp,
-) -> FollowedUnits<'a> {
-    let followed = |(name, (history, _)): (&&'a UnitKey, &'a (&'a History, _))| {
+) -> FollowedUnits<'v> {
+    let followed = |(name, (history, _)): (&&'a UnitKey, &(&'a History, _))| {
         let (history, values) = (*history, values.get(*name)?);
         let dropped = history.flights().len() - values.len();
         let first = before_window(history, as_of);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use job::rejection;
 use serde::Serialize;
 
-use crate::findings::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostics};
+use crate::findings::monitoring::recent::{PositionKey, RecentFlight, RecentFlights};
 use crate::fleet::histories::UnitKey;
 
 /// Latest flights of an actuator that count.
@@ -64,34 +64,34 @@ impl std::fmt::Display for MappingFault {
 #[derive(Default)]
 struct Tally<'a> {
     codes: Vec<Option<&'a str>>,
-    members: BTreeSet<&'a PositionKey>,
+    members: BTreeSet<PositionKey<'a>>,
 }
 
 /// The faults of the mapping, the widest scope first: a part number, a tail, an actuator.
 ///
 /// `stiffness` gives the configured stiffness of a part number, N/m.
 pub(crate) fn detect(
-    recent: &RecentDiagnostics,
+    recent: &RecentFlights<'_>,
     stiffness: impl Fn(&str) -> Option<f64>,
 ) -> Vec<MappingFault> {
-    type Scope = fn(&PositionKey) -> (Option<&String>, Option<&String>, Option<&String>);
+    type Scope = for<'k> fn(&PositionKey<'k>) -> [Option<&'k str>; 3];
     let scopes: [Scope; 3] = [
-        |key| (Some(&key.part_number), None, None),
-        |key| (None, Some(&key.tail_number), None),
-        |key| (None, Some(&key.tail_number), Some(&key.position)),
+        |key| [Some(key.part_number), None, None],
+        |key| [None, Some(key.tail_number), None],
+        |key| [None, Some(key.tail_number), Some(key.position)],
     ];
-    let (mut found, mut explained) = (Vec::new(), BTreeSet::<&PositionKey>::new());
+    let (mut found, mut explained) = (Vec::new(), BTreeSet::<PositionKey<'_>>::new());
     for (width, scope) in scopes.into_iter().enumerate() {
         let mut tallies: BTreeMap<_, Tally<'_>> = BTreeMap::new();
         for (key, flights) in recent.iter().filter(|(key, _)| !explained.contains(key)) {
             let tally = tallies.entry(scope(key)).or_default();
             let latest = &flights[flights.len().saturating_sub(LATEST)..];
-            let configured = stiffness(&key.part_number);
+            let configured = stiffness(key.part_number);
             tally.codes.extend(latest.iter().map(|flight| code(flight, configured)));
-            tally.members.insert(key);
+            tally.members.insert(*key);
         }
         let is_wide = width < 2;
-        for ((part, tail, position), tally) in tallies {
+        for (scope, tally) in tallies {
             let majority = rejection::majority(&tally.codes).filter(|_| tally.codes.len() >= MIN_FLIGHTS);
             let Some((reason, refused)) = majority else { continue };
             let remedy = match width {
@@ -99,11 +99,13 @@ pub(crate) fn detect(
                 _ => rejection::remedy(reason).filter(|_| rejection::is_mapping_fault(reason)),
             };
             let Some(remedy) = remedy.filter(|_| !is_wide || tally.members.len() > 1) else { continue };
-            let unit = |key: &&PositionKey| (Some(key.part_number.clone()), key.serial_number.clone());
+            let unit =
+                |key: &PositionKey<'_>| (Some(key.part_number.to_owned()), key.serial_number.to_owned());
+            let [part_number, tail_number, position] = scope.map(|name| name.map(str::to_owned));
             found.push(MappingFault {
-                part_number: part.cloned(),
-                tail_number: tail.cloned(),
-                position: position.cloned(),
+                part_number,
+                tail_number,
+                position,
                 reason: reason.to_owned(),
                 refused,
                 flights: tally.codes.len(),
@@ -117,12 +119,12 @@ pub(crate) fn detect(
 }
 
 /// Rejection of a flight, or the code of a stiffness that is not the configured one.
-fn code(flight: &FlightDiagnostics, configured_n_per_m: Option<f64>) -> Option<&str> {
+fn code(flight: &RecentFlight<'_>, configured_n_per_m: Option<f64>) -> Option<&'static str> {
     let unlike = || {
         let is_unlike = rejection::is_stiffness_unlike(flight.stiffness_n_per_m?, configured_n_per_m?);
         is_unlike.then_some(rejection::STIFFNESS_UNLIKE)
     };
-    flight.rejection.as_deref().or_else(unlike)
+    flight.rejection.or_else(unlike)
 }
 
 #[cfg(test)]
@@ -131,27 +133,26 @@ mod tests {
 
     use super::*;
 
-    fn key(tail: &str, position: &str, part: &str) -> PositionKey {
-        PositionKey {
-            tail_number: tail.into(),
-            position: position.into(),
-            part_number: part.into(),
-            serial_number: format!("{tail}{position}"),
-        }
+    fn key(
+        tail_number: &'static str,
+        position: &'static str,
+        part_number: &'static str,
+    ) -> PositionKey<'static> {
+        PositionKey { tail_number, position, part_number, serial_number: "" }
     }
 
-    fn flights(reasons: [Option<&str>; 5]) -> Vec<FlightDiagnostics> {
-        let flight = |(k, reason): (usize, Option<&str>)| FlightDiagnostics {
+    fn flights(rejections: [Option<&'static str>; 5]) -> Vec<RecentFlight<'static>> {
+        let flight = |(k, rejection): (usize, Option<&'static str>)| RecentFlight {
             departure_utc: Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k as i64),
-            rejection: reason.map(Into::into),
-            ..FlightDiagnostics::default()
+            rejection,
+            ..RecentFlight::default()
         };
-        reasons.into_iter().enumerate().map(flight).collect()
+        rejections.into_iter().enumerate().map(flight).collect()
     }
 
-    const SIGN: Option<&str> = Some("load_sign_flipped");
+    const SIGN: Option<&'static str> = Some("load_sign_flipped");
 
-    fn scopes(latest: &RecentDiagnostics) -> Vec<String> {
+    fn scopes(latest: &RecentFlights<'_>) -> Vec<String> {
         detect(latest, |_| Some(5e7)).iter().map(MappingFault::scope).collect()
     }
 

@@ -1,101 +1,70 @@
-//! Diagnostics of the last months in addition to gaps, by position: innovations and rejections.
+//! Flights of the last months, by position: their rejections, and what shows that two flights have the same samples.
 
 use std::collections::BTreeMap;
 
-use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
-use records::Status;
-use store::{Query, Store};
+use records::Quantity;
 
-use crate::error::Error;
-use crate::fleet::histories::TailPosition;
-use crate::fleet::row_keys::TextColumn;
-use crate::fleet::unit_rows::{RowsByUnit, at, of_store};
+use crate::assess::quantities::values::{FlightValues, FollowedUnits, READ};
+use crate::fleet::flight_row::FlightRow;
 
 /// Maximum age of the flights: some months.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 
 /// One flight of one place.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct FlightDiagnostics {
+pub(crate) struct RecentFlight<'a> {
     pub(crate) departure_utc: Timestamp,
-    pub(crate) flight_id: Box<str>,
-    pub(crate) nis: Option<f64>,
-    /// Stiffness fitted in the flight, N/m.
+    pub(crate) flight_id: &'a str,
+    /// Code of a rejection that may point to a fault of the mapping.
+    pub(crate) rejection: Option<&'static str>,
+    /// Stiffness fitted in the flight, N/m; none of a flight without a gap.
     pub(crate) stiffness_n_per_m: Option<f64>,
-    /// Rejection code of a flight without a gap.
-    pub(crate) rejection: Option<Box<str>>,
+    /// Bits of all quantities, of a flight with normalised innovations and a stiffness.
+    pub(crate) quantities: Option<[u32; READ.len()]>,
 }
 
-/// Where which unit sits.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct PositionKey {
-    pub(crate) tail_number: String,
-    pub(crate) position: String,
-    pub(crate) part_number: String,
-    pub(crate) serial_number: String,
+/// Where which unit sits; empty where its records have none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct PositionKey<'a> {
+    pub(crate) tail_number: &'a str,
+    pub(crate) position: &'a str,
+    pub(crate) part_number: &'a str,
+    pub(crate) serial_number: &'a str,
 }
 
 /// Flights of a unit at one position, by departure.
-pub(crate) type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
+pub(crate) type RecentFlights<'a> = BTreeMap<PositionKey<'a>, Vec<RecentFlight<'a>>>;
 
-/// The last months until a time, with it.
-pub(crate) fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
-    const COLUMNS: [&str; 10] = [
-        "tail_number",
-        "position",
-        "part_number",
-        "serial_number",
-        "flight_id",
-        "departure_utc",
-        "nis",
-        "stiffness_n_per_m",
-        "status",
-        "reason",
-    ];
-    let since_utc = until.checked_sub(LOOKED_BACK).ok();
-    let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
-    let query = Query { since_utc, until_utc, ..Query::default() };
-    let parts = of_store(&store.scan_columns(&query, &COLUMNS)?, |rows, chunk, _| add(rows, chunk))?;
-    let mut found = RecentDiagnostics::new();
-    for ((part_number, serial_number), parts) in parts {
-        for part in parts {
-            for (place, flight) in part.rows {
-                let TailPosition { tail_number, position } = part.places[place as usize].clone();
-                let key = PositionKey {
-                    tail_number: tail_number.unwrap_or_default(),
-                    position: position.unwrap_or_default(),
-                    part_number: part_number.clone().unwrap_or_default(),
-                    serial_number: serial_number.clone(),
-                };
-                found.entry(key).or_default().push(flight);
-            }
+/// The flights of the last months before a time.
+pub(crate) fn recent_flights<'a>(units: &FollowedUnits<'a>, until: Timestamp) -> RecentFlights<'a> {
+    let since_utc = until.checked_sub(LOOKED_BACK).unwrap_or(Timestamp::MIN);
+    let mut found = RecentFlights::new();
+    for ((part_number, serial_number), unit) in units {
+        let first = unit.flights.partition_point(|(flown, _)| flown.departure_utc() < since_utc);
+        for (flown, values) in &unit.flights[first..] {
+            let place = unit.place(flown);
+            let key = PositionKey {
+                tail_number: place.tail_number.as_deref().unwrap_or_default(),
+                position: place.position.as_deref().unwrap_or_default(),
+                part_number: part_number.as_deref().unwrap_or_default(),
+                serial_number,
+            };
+            let flight_id = unit.history.flight_id(flown).unwrap_or_default();
+            found.entry(key).or_default().push(recent_flight(flown, flight_id, values));
         }
     }
-    for flights in found.values_mut() {
-        flights.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
-    }
-    Ok(found)
+    found
 }
 
-fn add(rows: &mut RowsByUnit<(u32, FlightDiagnostics)>, chunk: &TableBatch) -> Result<(), ingest::Error> {
-    let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-    let texts = |name: &str| TextColumn::of(chunk, &[name]);
-    let (nis, stiffness) = (numbers("nis")?, numbers("stiffness_n_per_m")?);
-    let (flights, statuses, reasons) = (texts("flight_id")?, texts("status")?, texts("reason")?);
-    let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
-    rows.add_rows(chunk, |row, unit, place| {
-        let is_refused = statuses.get(row) == Some(Status::Refused.as_str());
-        if let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) {
-            let flight = FlightDiagnostics {
-                departure_utc,
-                flight_id: flights.get(row).unwrap_or_default().into(),
-                nis: at(&nis, row),
-                stiffness_n_per_m: at(&stiffness, row),
-                rejection: reasons.get(row).filter(|_| is_refused).map(Into::into),
-            };
-            unit.rows.push((place, flight));
-        }
-        Ok(())
-    })
+fn recent_flight<'a>(flown: &FlightRow, flight_id: &'a str, values: &FlightValues) -> RecentFlight<'a> {
+    let (stiffness_n_per_m, is_refused) = (values.of(Quantity::StiffnessNPerM), flown.gap_m().is_none());
+    let has_both = stiffness_n_per_m.and(values.of(Quantity::Nis)).is_some();
+    RecentFlight {
+        departure_utc: flown.departure_utc(),
+        flight_id,
+        rejection: values.fault_code().filter(|_| is_refused),
+        stiffness_n_per_m: stiffness_n_per_m.filter(|_| !is_refused),
+        quantities: has_both.then(|| values.values.map(|(value, _)| value.to_bits())),
+    }
 }

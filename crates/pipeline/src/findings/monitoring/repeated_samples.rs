@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use jiff::Timestamp;
 use serde::Serialize;
 
-use crate::findings::monitoring::recent::RecentDiagnostics;
+use crate::findings::monitoring::recent::RecentFlights;
 
-/// Two flights with the samples of one, by their normalised innovations and fitted stiffness.
+/// Two flights with the samples of one, by their normalised innovations, fitted stiffness and all other quantities.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct RepeatedSamples {
@@ -25,15 +25,15 @@ pub struct RepeatedSamples {
 type Flown<'a> = (&'a str, Timestamp, &'a str);
 
 /// The pairs of flights with equal estimates. Noise makes two records of one motion differ.
-pub(crate) fn detect(recent: &RecentDiagnostics) -> Vec<RepeatedSamples> {
-    let mut first = HashMap::<(u64, u64), (Flown<'_>, &str)>::new();
+pub(crate) fn detect(recent: &RecentFlights<'_>) -> Vec<RepeatedSamples> {
+    let mut first = HashMap::<_, (Flown<'_>, &str)>::new();
     let mut pairs = BTreeMap::<(Flown<'_>, Flown<'_>), BTreeSet<(&str, &str)>>::new();
     for (key, flights) in recent {
         for flight in flights {
-            let Some((nis, stiffness)) = flight.nis.zip(flight.stiffness_n_per_m) else { continue };
-            let flown = (key.tail_number.as_str(), flight.departure_utc, &*flight.flight_id);
-            let place = (flown, key.position.as_str());
-            let known = *first.entry((nis.to_bits(), stiffness.to_bits())).or_insert(place);
+            let Some(quantities) = flight.quantities else { continue };
+            let flown = (key.tail_number, flight.departure_utc, flight.flight_id);
+            let place = (flown, key.position);
+            let known = *first.entry(quantities).or_insert(place);
             if known != place {
                 pairs.entry((known.0, flown)).or_default().insert((known.1, place.1));
             }
