@@ -157,6 +157,11 @@ impl Flights {
         self.rows.iter().map(|row| &row.flight)
     }
 
+    /// The flights of an aircraft, in order of departure.
+    pub fn of_tail(&self, tail_number: &str) -> impl Iterator<Item = &Flight> {
+        self.by_tail.get(tail_number).into_iter().flatten().map(|row| &self.rows[*row].flight)
+    }
+
     /// blake3 of all cells that are read; empty without a table.
     pub fn digest(&self) -> &str {
         &self.digest

@@ -25,10 +25,9 @@ use crate::findings::monitoring::mapping_faults::{self, MappingFault};
 use crate::findings::monitoring::recent::{RecentFlights, recent_flights};
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::findings::monitoring::repeated_samples;
-use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
-use crate::fleet::bookkeeping::installation_index::InstallationIndex;
+use crate::fleet::bookkeeping::inspections;
 use crate::fleet::bookkeeping::join::open_store;
-use crate::fleet::bookkeeping::usage::UsageSources;
+use crate::fleet::bookkeeping::usage::OperatorTables;
 use crate::fleet::builder;
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
@@ -295,10 +294,7 @@ pub(crate) struct FleetContext<'a> {
     moved: Vec<RecorderChange>,
     /// Wrong mappings of all units.
     mapping_faults: Vec<MappingFault>,
-    /// Installations of the store's own units; of external tables none apply.
-    installations: Option<InstallationIndex<'a>>,
-    /// Inspections of the store's own units.
-    inspections: Vec<InspectionRow>,
+    tables: OperatorTables<'a>,
 }
 
 impl<'a> FleetContext<'a> {
@@ -310,10 +306,9 @@ impl<'a> FleetContext<'a> {
         histories: &'a mut Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
-        let books = UsageSources::read(config, installations)?;
-        let is_booked = histories.is_booked;
+        let tables = OperatorTables::read(config, installations, histories.is_booked)?;
         let read = |(name, history): (&UnitKey, &mut History)| {
-            let series = books.series(name, history, is_booked)?;
+            let series = tables.series(name, history)?;
             history.drop_secondary();
             Ok(series)
         };
@@ -333,8 +328,7 @@ impl<'a> FleetContext<'a> {
             conditions: BTreeMap::new(),
             moved: Vec::new(),
             mapping_faults: Vec::new(),
-            installations: is_booked.then(|| InstallationIndex::new(installations)),
-            inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
+            tables,
         })
     }
 
@@ -477,11 +471,11 @@ impl<'a> FleetContext<'a> {
 
     fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide<'_>) -> TrendRow {
         let (history, series) = &self.units[name];
-        let index = self.installations.as_ref();
-        let installed = index.and_then(|index| index.installed(name, as_of));
+        let index = self.tables.installations();
         let done = series.maintenance_until(as_of.as_microsecond());
         let renewed = done.iter().rev().find(|event| event.renews);
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
+        let installed = index.and_then(|index| index.installed(name, as_of));
         RowSources {
             name,
             history,
@@ -495,7 +489,7 @@ impl<'a> FleetContext<'a> {
             removal: index.and_then(|index| index.removal(name, as_of)),
             fault: self.mapping_faults.iter().find(|fault| fault.units.contains(name)),
             inspection: installed
-                .and_then(|stay| inspections::latest(&self.inspections, name, stay, renewed, as_of)),
+                .and_then(|stay| inspections::latest(&self.tables.inspections, name, stay, renewed, as_of)),
             conditions: self.conditions.get(name).map_or(&[], Vec::as_slice),
         }
         .row()

@@ -1,6 +1,6 @@
 //! Flights of the flights table that left no record: an actuator wears in them all the same.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use ingest::tables::flights::Flights;
 use jiff::{SignedDuration, Timestamp};
@@ -11,48 +11,24 @@ use crate::fleet::histories::History;
 /// Longest distance between the departures of a flight and a record of the same name: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
-/// The flights table, tail by tail.
-pub(crate) struct UnloggedFlights<'a> {
-    by_tail: BTreeMap<&'a str, Vec<&'a Flight>>,
-}
-
-impl<'a> UnloggedFlights<'a> {
-    pub(crate) fn of_table(table: &'a Flights) -> Self {
-        let mut by_tail: BTreeMap<&str, Vec<&Flight>> = BTreeMap::new();
-        for flight in table.iter() {
-            by_tail.entry(flight.tail_number.as_str()).or_default().push(flight);
-        }
-        for flights in by_tail.values_mut() {
-            flights.sort_by_key(|flight| flight.departure_utc);
-        }
-        Self { by_tail }
+/// Flights of a unit's installations for which it has no row, each with the index of its installation. None if none of
+/// the unit's rows lies in an installation: the table does not describe such a history.
+pub(crate) fn unlogged_flights<'a>(
+    table: &'a Flights,
+    history: &History,
+    installations: &[&Installation],
+) -> Vec<(usize, &'a Flight)> {
+    let is_elsewhere = |flown| history.installation(flown, installations).is_none();
+    if table.is_empty() || history.flights().iter().all(is_elsewhere) {
+        return Vec::new();
     }
-
-    /// Whether the flights table has flights of an aircraft.
-    pub(crate) fn has_tail(&self, tail: &str) -> bool {
-        self.by_tail.contains_key(tail)
-    }
-
-    /// Flights of a unit's installations for which it has no row, each with the index of its installation. None if none of
-    /// the unit's rows lies in an installation: the table does not describe such a history.
-    pub(crate) fn of_unit(
-        &self,
-        history: &History,
-        installations: &[&Installation],
-    ) -> Vec<(usize, &'a Flight)> {
-        if self.by_tail.is_empty()
-            || history.flights().iter().all(|f| history.installation(f, installations).is_none())
-        {
-            return Vec::new();
-        }
-        let known = &Known::of(history);
-        let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
-            let flights = self.by_tail.get(installation.tail_number.as_str()).map_or(&[][..], Vec::as_slice);
-            let missing = flights.iter().filter(|f| installation.covers(f.departure_utc) && !known.holds(f));
-            missing.map(move |&flight| (index, flight))
-        });
-        missing.collect()
-    }
+    let known = &Known::of(history);
+    let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
+        let flights = table.of_tail(installation.tail_number.as_str());
+        let missing = flights.filter(|f| installation.covers(f.departure_utc) && !known.holds(f));
+        missing.map(move |flight| (index, flight))
+    });
+    missing.collect()
 }
 
 /// Flights covered by a unit's rows.

@@ -1,38 +1,54 @@
-//! Accumulated usage of a unit: its rows, flights without a row, and recorded maintenance.
+//! The operator's tables, and the accumulated usage of a unit: its rows, flights without a row, and recorded maintenance.
 
+use ingest::Flights;
 use job::Config;
 use records::{Installation, Installations};
 use trend::{Observation, Series, UsageSource};
 
 use crate::error::Error;
 use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
+use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log;
-use crate::fleet::bookkeeping::unlogged_flights::UnloggedFlights;
+use crate::fleet::bookkeeping::unlogged_flights::unlogged_flights;
 use crate::fleet::histories::{History, UnitKey};
 
-/// Sources of usage in addition to rows: installations, maintenance, flights without a log.
-pub(crate) struct UsageSources<'a> {
+/// The operator's tables about units and flights.
+pub(crate) struct OperatorTables<'a> {
     maintenance: maintenance_log::MaintenanceLog,
-    unlogged: UnloggedFlights<'a>,
+    flights: &'a Flights,
     installations: InstallationIndex<'a>,
+    pub(crate) inspections: Vec<InspectionRow>,
+    /// Whether installations and inspections are those of the units: of external tables none apply.
+    is_booked: bool,
 }
 
-impl<'a> UsageSources<'a> {
-    pub(crate) fn read(config: &'a Config, installations: &'a Installations) -> Result<Self, Error> {
+impl<'a> OperatorTables<'a> {
+    pub(crate) fn read(
+        config: &'a Config,
+        installations: &'a Installations,
+        is_booked: bool,
+    ) -> Result<Self, Error> {
         let file = config.document.logs.maintenance.as_ref();
         let maintenance = file.map(|file| maintenance_log::read(&config.path(file))).transpose()?;
         Ok(Self {
             maintenance: maintenance.unwrap_or_default(),
-            unlogged: UnloggedFlights::of_table(&config.flights),
+            flights: &config.flights,
             installations: InstallationIndex::new(installations),
+            inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
+            is_booked,
         })
+    }
+
+    /// The installations that say where units are.
+    pub(crate) fn installations(&self) -> Option<&InstallationIndex<'a>> {
+        self.is_booked.then_some(&self.installations)
     }
 
     /// Where the hours of a unit are known from.
     fn source(&self, history: &History) -> UsageSource {
         let has_meter = || history.flights().iter().any(|f| !history.extras(f).tail_hours_end.is_nan());
-        if history.tails().any(|tail| self.unlogged.has_tail(tail)) {
+        if history.tails().any(|tail| self.flights.of_tail(tail).next().is_some()) {
             UsageSource::FlightsTable
         } else if has_meter() {
             UsageSource::TailHourMeter
@@ -42,11 +58,12 @@ impl<'a> UsageSources<'a> {
     }
 
     /// A unit's flights, added up.
-    pub(crate) fn series(&self, name: &UnitKey, history: &History, is_booked: bool) -> Result<Series, Error> {
+    pub(crate) fn series(&self, name: &UnitKey, history: &History) -> Result<Series, Error> {
         let installations = self.installations.of(name);
-        let installed = if is_booked { &installations[..] } else { &[] };
+        let installed = if self.is_booked { &installations[..] } else { &[] };
         let first = installations.iter().min_by_key(|installation| installation.installed_utc);
-        let mut observations = observations(history, installed, &self.unlogged.of_unit(history, installed));
+        let unlogged = unlogged_flights(self.flights, history, installed);
+        let mut observations = observations(history, installed, &unlogged);
         let dropped = drop_contradicting(&mut observations);
         let mut series = Series::new(observations)?;
         series.unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
