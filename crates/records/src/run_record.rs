@@ -6,7 +6,7 @@ use crate::stored_row;
 
 stored_row! {
     /// Status of one run, written when it begins and again when it ends.
-    #[derive(Debug, Clone, Default, PartialEq)]
+    #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
     pub struct RunRecord {
         /// Identifier of the run; the newest row of an identifier counts.
         pub run_id: String,

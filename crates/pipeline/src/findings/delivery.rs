@@ -10,7 +10,6 @@
 //! receiver may have the message. A channel that drops doubles, as a folder does, needs no claim: what was not marked
 //! is sent again.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jiff::Timestamp;
@@ -38,15 +37,6 @@ pub enum Attempt {
     Unknown(String),
 }
 
-/// Messages of a delivery that did not certainly arrive.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Delivery {
-    /// Messages that were not accepted, and why: the next run sends them again.
-    pub failed: Vec<AlertRecord>,
-    /// Messages that may have been received, new in this run.
-    pub unconfirmed: Vec<AlertRecord>,
-}
-
 /// Where rows are written, and how messages are sent.
 pub trait Courier {
     /// Error of the store.
@@ -65,53 +55,54 @@ pub trait Courier {
     fn is_stopped(&self) -> bool;
 }
 
-/// Sends every message that is due in a configured channel, oldest attempt first, and counts the messages in `summary`.
+/// Sends every message that is due in an enabled channel, oldest attempt first, and counts the messages in `summary`.
+/// Returns those that this run could not send, or that may have been received, each with its error.
 ///
 /// # Errors
 /// When the store cannot be written; what was not marked is `sending`.
 pub fn deliver<C: Courier>(
-    rows: Vec<AlertRecord>,
+    mut rows: Vec<AlertRecord>,
     channels: &Channels,
     run_id: &str,
     courier: &mut C,
     summary: &mut AlertSummary,
-) -> Result<Delivery, C::Error> {
-    let mut delivery = Delivery::default();
-    let mut due = BTreeMap::<String, Vec<AlertRecord>>::new();
-    for mut row in rows {
-        let Some(channel) = channels.get(&row.channel) else {
-            if !row.channel.is_empty() && row.status == AlertStatus::Pending {
-                *summary.without_channel.entry(row.channel).or_default() += 1;
-            }
-            continue;
-        };
-        if !channel.enabled {
-            continue;
-        }
-        match (row.status, is_repeatable(channel)) {
-            (AlertStatus::Sending, false) => {
-                row.error = Some("the run was killed while the message was sent".to_owned());
-                mark(&mut row, AlertStatus::Unconfirmed, run_id);
-                delivery.unconfirmed.push(row);
-            }
-            (AlertStatus::Unconfirmed, false) => summary.unconfirmed_before += 1,
-            (AlertStatus::Pending | AlertStatus::Sending | AlertStatus::Unconfirmed, _) => {
-                due.entry(row.channel.clone()).or_default().push(row);
-            }
-            _ => {}
+) -> Result<Vec<AlertRecord>, C::Error> {
+    let channel_of = |row: &AlertRecord| channels.get(&row.channel).filter(|channel| channel.enabled);
+    let mut killed = Vec::new();
+    for row in rows.iter_mut().filter(|row| row.status == AlertStatus::Sending) {
+        if channel_of(row).is_some_and(|channel| !is_repeatable(channel)) {
+            row.error = Some("the run was killed while the message was sent".to_owned());
+            mark(row, AlertStatus::Unconfirmed, run_id);
+            killed.push(row.clone());
         }
     }
-    if !delivery.unconfirmed.is_empty() {
-        courier.write(&delivery.unconfirmed)?;
+    if !killed.is_empty() {
+        courier.write(&killed)?;
     }
-    for (name, channel) in channels {
-        let Some(mut rows) = due.remove(name) else { continue };
-        // A message that always fails must not keep others back.
-        rows.sort_by_cached_key(|row| (row.attempts, row.as_of_utc, row.change_number, row.alert_id.clone()));
-        let delivery = &mut delivery;
-        ChannelDelivery { run_id, channel, courier, delivery, summary }.run(rows)?;
+    // A message that always fails must not keep others back.
+    rows.sort_by_cached_key(|row| (row.attempts, row.as_of_utc, row.change_number, row.alert_id.clone()));
+    for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
+        let due = rows.iter_mut().filter(|row| row.channel == *name && is_due(row, channel));
+        send_due(due, channel, run_id, courier)?;
     }
-    Ok(delivery)
+    for row in &rows {
+        match channel_of(row) {
+            Some(channel) => summary.count(row, run_id, is_due(row, channel)),
+            None if channels.contains_key(&row.channel) || row.status != AlertStatus::Pending => {}
+            None => *summary.without_channel.entry(row.channel.clone()).or_default() += 1,
+        }
+    }
+    rows.retain(|row| row.run_id == run_id && row.error.is_some() && channel_of(row).is_some());
+    Ok(rows)
+}
+
+/// Whether a message waits to be sent.
+fn is_due(row: &AlertRecord, channel: &AlertChannel) -> bool {
+    match row.status {
+        AlertStatus::Pending => true,
+        AlertStatus::Sending | AlertStatus::Unconfirmed => is_repeatable(channel),
+        _ => false,
+    }
 }
 
 /// Whether a message may be sent twice, so that it needs no claim: a file of one name is written once, and some receivers
@@ -120,58 +111,42 @@ fn is_repeatable(channel: &AlertChannel) -> bool {
     channel.resend_unconfirmed || channel.folder.is_some()
 }
 
-/// Delivery of one channel.
-struct ChannelDelivery<'a, C> {
-    run_id: &'a str,
-    channel: &'a AlertChannel,
-    courier: &'a mut C,
-    delivery: &'a mut Delivery,
-    summary: &'a mut AlertSummary,
-}
-
-impl<C: Courier> ChannelDelivery<'_, C> {
-    /// Sends messages in order. One commit marks a message and claims the next one; where no claim is needed, it
-    /// marks many.
-    fn run(mut self, rows: Vec<AlertRecord>) -> Result<(), C::Error> {
-        let (begun, mut failures) = (Instant::now(), 0);
-        let mut marked: Vec<AlertRecord> = Vec::new();
-        let mut rows = rows.into_iter();
-        while failures < MAX_FAILURES && begun.elapsed() < MAX_CHANNEL_TIME && !self.courier.is_stopped() {
-            let Some(mut row) = rows.next() else { break };
-            row.attempts += 1;
-            row.error = None;
-            if is_repeatable(self.channel) {
-                if marked.len() == MAX_MARKED {
-                    self.courier.write(&std::mem::take(&mut marked))?;
-                }
-            } else {
-                mark(&mut row, AlertStatus::Sending, self.run_id);
-                marked.push(row.clone());
-                self.courier.write(&std::mem::take(&mut marked))?;
-            }
-            self.send(&mut row);
-            failures = if row.error.is_some() { failures + 1 } else { 0 };
-            marked.push(row);
+/// Sends messages of one channel in order. One commit marks a message and claims the next one; where no claim is needed,
+/// it marks many.
+fn send_due<'r, C: Courier>(
+    due: impl Iterator<Item = &'r mut AlertRecord>,
+    channel: &AlertChannel,
+    run_id: &str,
+    courier: &mut C,
+) -> Result<(), C::Error> {
+    let (begun, mut failures) = (Instant::now(), 0);
+    let mut marked: Vec<AlertRecord> = Vec::new();
+    for row in due {
+        if failures == MAX_FAILURES || begun.elapsed() >= MAX_CHANNEL_TIME || courier.is_stopped() {
+            break;
         }
-        self.summary.waiting += rows.len();
-        if marked.is_empty() { Ok(()) } else { self.courier.write(&marked) }
-    }
-
-    /// Sends one message and counts it.
-    fn send(&mut self, row: &mut AlertRecord) {
-        let (status, error) = match self.courier.send(self.channel, row) {
+        row.attempts += 1;
+        row.error = None;
+        if is_repeatable(channel) {
+            if marked.len() == MAX_MARKED {
+                courier.write(&std::mem::take(&mut marked))?;
+            }
+        } else {
+            mark(row, AlertStatus::Sending, run_id);
+            marked.push(row.clone());
+            courier.write(&std::mem::take(&mut marked))?;
+        }
+        let (status, error) = match courier.send(channel, row) {
             Attempt::Sent => (AlertStatus::Sent, None),
             Attempt::NotSent(why) => (AlertStatus::Pending, Some(why)),
             Attempt::Unknown(why) => (AlertStatus::Unconfirmed, Some(why)),
         };
+        failures = if error.is_some() { failures + 1 } else { 0 };
         row.error = error;
-        mark(row, status, self.run_id);
-        match status {
-            AlertStatus::Sent => self.summary.sent += 1,
-            AlertStatus::Unconfirmed => self.delivery.unconfirmed.push(row.clone()),
-            _ => self.delivery.failed.push(row.clone()),
-        }
+        mark(row, status, run_id);
+        marked.push(row.clone());
     }
+    if marked.is_empty() { Ok(()) } else { courier.write(&marked) }
 }
 
 fn mark(row: &mut AlertRecord, status: AlertStatus, run_id: &str) {

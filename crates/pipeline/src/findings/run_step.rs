@@ -12,7 +12,7 @@ use store::Writer;
 use crate::error::Error;
 use crate::findings::alert_changes::{self, Channels};
 use crate::findings::channel;
-use crate::findings::delivery::{self, Attempt, Courier, Delivery};
+use crate::findings::delivery::{self, Attempt, Courier};
 use crate::findings::finding::Finding;
 use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use crate::findings::work_requests::requests;
@@ -56,9 +56,13 @@ impl FollowUp<'_> {
         let alerts = summary.alerts.insert(AlertSummary::default());
         let rows = self.detect(&findings, channels, writer, alerts, now)?;
         let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
-        let delivery = delivery::deliver(rows, channels, self.run_id, &mut courier, alerts)?;
-        (alerts.failed, alerts.unconfirmed) = (delivery.failed.len(), delivery.unconfirmed.len());
-        summary.errors.extend(diagnostics(&delivery));
+        summary.errors.extend(diagnostics(&delivery::deliver(
+            rows,
+            channels,
+            self.run_id,
+            &mut courier,
+            alerts,
+        )?));
         Ok(())
     }
 
@@ -135,30 +139,24 @@ impl FollowUp<'_> {
     }
 }
 
-/// One diagnostic for each channel and kind of failure.
-fn diagnostics(delivery: &Delivery) -> Vec<Diagnostic> {
-    let kinds = [
-        ("alert_not_sent", "not sent", &delivery.failed, "the next run sends them again"),
-        (
-            "alert_unconfirmed",
-            "perhaps not received",
-            &delivery.unconfirmed,
-            "compare `freeplay store alerts` with the receiver; `--resend ID` sends one again",
-        ),
-    ];
-    let mut found = Vec::new();
-    for (code, what, rows, hint) in kinds {
-        let mut by_channel = BTreeMap::<&str, Vec<&AlertRecord>>::new();
-        for row in rows {
-            by_channel.entry(&row.channel).or_default().push(row);
-        }
-        for (channel, rows) in by_channel {
-            let why = rows[0].error.as_deref().unwrap_or("no reason is known");
-            let what = format!("alerts `{channel}`: {} {what}: {why}", rows.len());
-            found.push(Diagnostic::new(code, what).hint(hint));
-        }
+/// One diagnostic for each kind of failure and channel.
+fn diagnostics(failed: &[AlertRecord]) -> Vec<Diagnostic> {
+    let mut of_channels = BTreeMap::<(bool, &str), Vec<&AlertRecord>>::new();
+    for row in failed {
+        let is_unconfirmed = row.status == AlertStatus::Unconfirmed;
+        of_channels.entry((is_unconfirmed, &row.channel)).or_default().push(row);
     }
-    found
+    let diagnostic = |((is_unconfirmed, channel), rows): ((bool, &str), Vec<&AlertRecord>)| {
+        let (code, what, hint) = if is_unconfirmed {
+            let hint = "compare `freeplay store alerts` with the receiver; `--resend ID` sends one again";
+            ("alert_unconfirmed", "perhaps not received", hint)
+        } else {
+            ("alert_not_sent", "not sent", "the next run sends them again")
+        };
+        let why = rows[0].error.as_deref().unwrap_or("no reason is known");
+        Diagnostic::new(code, format!("alerts `{channel}`: {} {what}: {why}", rows.len())).hint(hint)
+    };
+    of_channels.into_iter().map(diagnostic).collect()
 }
 
 /// Courier of a run: rows go to the store, messages to the configured channels.

@@ -1,6 +1,6 @@
 //! What a run did with alerts and work requests.
 
-use records::{Diagnostic, WorkRequest};
+use records::{AlertRecord, AlertStatus, Diagnostic, WorkRequest};
 use serde::Serialize;
 
 /// Alerts of a run.
@@ -24,6 +24,22 @@ pub struct AlertSummary {
     pub waiting: usize,
     /// Messages that were not sent to a channel that the configuration has no more, by its name.
     pub without_channel: std::collections::BTreeMap<String, usize>,
+}
+
+impl AlertSummary {
+    /// Counts a message of an enabled channel after a run's delivery.
+    pub(super) fn count(&mut self, row: &AlertRecord, run_id: &str, is_due: bool) {
+        let is_attempted = row.run_id == run_id && row.error.is_some();
+        let counter = match row.status {
+            AlertStatus::Sent if row.run_id == run_id => &mut self.sent,
+            AlertStatus::Unconfirmed if is_attempted => &mut self.unconfirmed,
+            AlertStatus::Unconfirmed if !is_due => &mut self.unconfirmed_before,
+            AlertStatus::Pending if is_attempted => &mut self.failed,
+            _ if is_due => &mut self.waiting,
+            _ => return,
+        };
+        *counter += 1;
+    }
 }
 
 /// Work requests after a run.

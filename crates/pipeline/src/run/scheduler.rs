@@ -30,7 +30,7 @@ use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
 use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
 use crate::run::memory_budget::MemoryBudget;
-use crate::run::summary::{self, KilledRun, RunSummary};
+use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::{PoolSettings, StepCount, WorkerPool};
 
 /// Longest wait of a finished flight for others of the same commit: each commit is a file and a log entry.
@@ -127,7 +127,7 @@ pub(crate) fn execute_run(
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let started_utc = Timestamp::now();
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
-    report.cut_short = killed.into_iter().map(KilledRun::from).collect();
+    report.cut_short = killed;
     report.unknown_units = unknown_units(config, &installations);
     report.dates_ahead = dates_ahead(&installations, started_utc);
     let config_path = config.file.display().to_string();

@@ -79,25 +79,6 @@ fn quiet<'a>(
     late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
 }
 
-/// An earlier run without an end: it was killed, or its disk failed.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct KilledRun {
-    /// Identifier of the run.
-    pub run_id: String,
-    /// When it began.
-    pub started_utc: Timestamp,
-    /// Logs it had finished.
-    pub done: i64,
-    /// Logs it had not processed.
-    pub not_reached: i64,
-}
-
-impl From<RunRecord> for KilledRun {
-    fn from(RunRecord { run_id, started_utc, done, not_reached, .. }: RunRecord) -> Self {
-        Self { run_id, started_utc, done, not_reached }
-    }
-}
-
 /// Summary of a run.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct RunSummary {
@@ -105,8 +86,8 @@ pub struct RunSummary {
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
-    /// Earlier runs that were killed.
-    pub cut_short: Vec<KilledRun>,
+    /// Earlier runs without an end: they were killed, or their disk failed.
+    pub cut_short: Vec<RunRecord>,
     /// Logs that match the patterns.
     pub found: usize,
     /// Logs that were processed before.
