@@ -6,5 +6,5 @@ mod limits;
 mod priors;
 pub mod quantities;
 mod tail_wide_steps;
-pub(crate) mod trend_row;
+mod trend_row;
 pub mod trends;

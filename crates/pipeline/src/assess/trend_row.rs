@@ -4,12 +4,11 @@ use jiff::Timestamp;
 use records::row_schema::NoColumn;
 use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
-use trend::{Assessment, FleetPrior, Reason, Series, State};
+use trend::{Assessment, Reason, Series, State};
 
-use crate::assess::limits::Limits;
 use crate::assess::tail_wide_steps::TailWide;
-use crate::findings::monitoring::mapping_faults::MappingFault;
-use crate::fleet::bookkeeping::inspections::InspectionRow;
+use crate::assess::trends::FleetContext;
+use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{History, TailPosition, UnitKey};
 
@@ -20,36 +19,41 @@ fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
     NoColumn(gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect())
 }
 
+impl FleetContext<'_> {
+    /// The trend row of a unit, from its assessment at a date.
+    pub(super) fn row(
+        &self,
+        name: &UnitKey,
+        trend: &Assessment,
+        as_of: Timestamp,
+        wide: &TailWide<'_>,
+    ) -> TrendRow {
+        let (history, series) = &self.units[name];
+        RowSources { fleet: self, name, history, series, trend, as_of, wide }.row()
+    }
+}
+
 /// What the trend row of a unit at a date is made from.
-pub(crate) struct RowSources<'a> {
-    pub(crate) name: &'a UnitKey,
-    pub(crate) history: &'a History,
-    pub(crate) series: &'a Series,
-    pub(crate) limits: Limits<'a>,
-    pub(crate) trend: &'a Assessment,
-    pub(crate) as_of: Timestamp,
-    pub(crate) wide: &'a TailWide<'a>,
-    pub(crate) prior: Option<&'a FleetPrior>,
-    /// The installation that the unit is in.
-    pub(crate) installed: Option<&'a Installation>,
-    /// The last installation of a unit that is in none.
-    pub(crate) removal: Option<&'a Installation>,
-    /// The wrong mapping of the unit.
-    pub(crate) fault: Option<&'a MappingFault>,
-    /// The latest inspection in its installation.
-    pub(crate) inspection: Option<&'a InspectionRow>,
-    /// States of other quantities than the gap.
-    pub(crate) conditions: &'a [String],
+struct RowSources<'a> {
+    fleet: &'a FleetContext<'a>,
+    name: &'a UnitKey,
+    history: &'a History,
+    series: &'a Series,
+    trend: &'a Assessment,
+    as_of: Timestamp,
+    wide: &'a TailWide<'a>,
 }
 
 impl RowSources<'_> {
-    /// The trend row.
-    pub(crate) fn row(self) -> TrendRow {
-        let Self { name, history, trend, as_of, removal, .. } = self;
+    fn row(self) -> TrendRow {
+        let Self { fleet, name, history, trend, as_of, .. } = self;
         let part = name.0.as_deref();
-        let limit_m = self.limits.stated_m(part);
-        // The installations table says where a unit is; of an external table, its last flight does.
-        let place = self.installed.or(removal).map(TailPosition::of);
+        let limit_m = fleet.limits.stated_m(part);
+        // The installations table says where a unit is, or was last; of an external table, its last flight does.
+        let tables = fleet.tables.installations();
+        let installed = tables.and_then(|tables| tables.installed(name, as_of));
+        let removal = tables.and_then(|tables| tables.removal(name, as_of));
+        let place = installed.or(removal).map(TailPosition::of);
         let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
         let flights = self.series.flights_until(trend.as_of_us);
         let gaps_m: Vec<f64> = flights.iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect();
@@ -66,6 +70,7 @@ impl RowSources<'_> {
         } else {
             (State::Unassessed, Reason::NoLimit)
         };
+        let prior = fleet.prior(name, as_of).filter(|_| trend.flights > 0);
         let caveats: Vec<String> = if removal.is_none() { self.caveats(cause).collect() } else { Vec::new() };
         let row = TrendRow {
             part_number: name.0.clone(),
@@ -92,11 +97,11 @@ impl RowSources<'_> {
             growth_probability: trend.growth_probability,
             wear_law: trend.law.map(|(law, _)| law.to_string()),
             wear_law_probability: trend.law.map(|(_, share)| share),
-            usage_axis: self.prior.map(|prior| prior.axis.to_string()),
+            usage_axis: prior.map(|prior| prior.axis.to_string()),
             trend_p_value: None,
             change_points: trend.changes.iter().filter_map(|change| self.change_point(change)).collect(),
             limit_m,
-            limit_applies_to: self.limits.applies_to(part),
+            limit_applies_to: fleet.limits.applies_to(part),
             crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
             crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
             crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
@@ -124,21 +129,23 @@ impl RowSources<'_> {
                     caveats.iter().fold(self.reason_of_state(cause), |all, caveat| format!("{all}; {caveat}"))
                 }
             }),
-            conditions: self.conditions.to_vec(),
+            conditions: fleet.conditions.get(name).cloned().unwrap_or_default(),
             action: None,
             due_utc: None,
             elapsed_hours: NoColumn(trend.elapsed_hours),
             caveats: NoColumn(caveats),
             sketch_m: sketched(&gaps_m),
         };
-        inspected(row, self.inspection, history.until(as_of)).with_action(self.limits.at_limit(part))
+        let inspection = installed.and_then(|stay| self.latest_inspection(stay));
+        inspected(row, inspection, history.until(as_of)).with_action(fleet.limits.at_limit(part))
     }
 
     /// What limits the trust in a state: wrong mappings, other settings, flags, age, and rows that cannot be right.
     fn caveats(&self, cause: Reason) -> impl Iterator<Item = String> {
         const LATEST: usize = 12;
         let Self { history, trend, as_of, .. } = self;
-        let mapping = self.fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
+        let fault = self.fleet.mapping_faults.iter().find(|fault| fault.units.contains(self.name));
+        let mapping = fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
         let settings = history.other_settings().map(|(others, last, all)| {
             format!(
                 "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
@@ -188,6 +195,14 @@ impl RowSources<'_> {
                 "{cause}; the actuators of {tail} changed together: its sensor or recorder is the likelier cause"
             ),
         }
+    }
+
+    /// The latest inspection in an installation and after the last renewal.
+    fn latest_inspection(&self, installed: &Installation) -> Option<&InspectionRow> {
+        let done = self.series.maintenance_until(self.as_of.as_microsecond());
+        let renewed = done.iter().rev().find(|event| event.renews);
+        let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
+        inspections::latest(&self.fleet.tables.inspections, self.name, installed, renewed, self.as_of)
     }
 
     fn change_point(&self, change: &trend::ChangePoint) -> Option<ChangePoint> {

@@ -17,7 +17,6 @@ use crate::assess::quantities::subject::UnitFacts;
 use crate::assess::quantities::values::{self, FleetValues, Units, by_unit};
 use crate::assess::quantities::{peers, rows};
 use crate::assess::tail_wide_steps::TailWide;
-use crate::assess::trend_row::RowSources;
 use crate::error::Error;
 use crate::findings::finding::Finding;
 use crate::findings::monitoring::coverage;
@@ -25,7 +24,6 @@ use crate::findings::monitoring::mapping_faults::{self, MappingFault};
 use crate::findings::monitoring::recent::{RecentFlights, recent_flights};
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::findings::monitoring::repeated_samples;
-use crate::fleet::bookkeeping::inspections;
 use crate::fleet::bookkeeping::join::open_store;
 use crate::fleet::bookkeeping::usage::OperatorTables;
 use crate::fleet::builder;
@@ -283,18 +281,18 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
 
 /// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
-    limits: Limits<'a>,
-    units: Units<'a>,
+    pub(super) limits: Limits<'a>,
+    pub(super) units: Units<'a>,
     priors: FleetPriors<'a>,
     /// Followed quantities of all units; nothing for external tables.
     followed: FollowedQuantities,
     /// Their states, by unit.
-    conditions: BTreeMap<UnitKey, Vec<String>>,
+    pub(super) conditions: BTreeMap<UnitKey, Vec<String>>,
     /// Recorder changes of whole aircraft.
     moved: Vec<RecorderChange>,
     /// Wrong mappings of all units.
-    mapping_faults: Vec<MappingFault>,
-    tables: OperatorTables<'a>,
+    pub(super) mapping_faults: Vec<MappingFault>,
+    pub(super) tables: OperatorTables<'a>,
 }
 
 impl<'a> FleetContext<'a> {
@@ -467,32 +465,6 @@ impl<'a> FleetContext<'a> {
         let (_, series) = &self.units[name];
         let prior = self.prior(name, as_of);
         Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
-    }
-
-    fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide<'_>) -> TrendRow {
-        let (history, series) = &self.units[name];
-        let index = self.tables.installations();
-        let done = series.maintenance_until(as_of.as_microsecond());
-        let renewed = done.iter().rev().find(|event| event.renews);
-        let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
-        let installed = index.and_then(|index| index.installed(name, as_of));
-        RowSources {
-            name,
-            history,
-            series,
-            limits: self.limits,
-            trend,
-            as_of,
-            wide,
-            prior: self.prior(name, as_of).filter(|_| trend.flights > 0),
-            installed,
-            removal: index.and_then(|index| index.removal(name, as_of)),
-            fault: self.mapping_faults.iter().find(|fault| fault.units.contains(name)),
-            inspection: installed
-                .and_then(|stay| inspections::latest(&self.tables.inspections, name, stay, renewed, as_of)),
-            conditions: self.conditions.get(name).map_or(&[], Vec::as_slice),
-        }
-        .row()
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.
