@@ -136,8 +136,6 @@ pub struct Plan {
     pub work: Vec<WorkItem>,
     /// Log records, by path, of the logs that still exist.
     pub accounts: BTreeMap<String, LogRecord>,
-    /// Existing logs by their digests; empty without work.
-    pub here: HashMap<Digests, String>,
     /// Deleted logs by the digest of their content: a log may have been renamed.
     pub gone: HashMap<String, Vec<LogRecord>>,
     /// Number of logs with stored records that were deleted, or that no pattern matches any more, and that lie nowhere else.
@@ -178,9 +176,6 @@ impl StandingError {
         }
     }
 }
-
-/// Digests of a log's content and of the settings that affect it.
-pub type Digests = (String, String);
 
 /// Plans a run from the logs found and the status of earlier ones.
 pub fn plan(
@@ -250,11 +245,6 @@ pub fn plan(
         ..Plan::default()
     };
     if !plan.work.is_empty() {
-        let here = |account: &LogRecord| Some((digests(account)?, account.log_path.clone()));
-        // Of copies, the one with records comes last and is kept.
-        let mut all: Vec<&LogRecord> = plan.accounts.values().collect();
-        all.sort_by_key(|account| account.estimated + account.refused);
-        plan.here = all.into_iter().filter_map(here).collect();
         for account in gone.into_iter().filter(|account| digests(account).is_some()) {
             plan.gone.entry(account.log_digest.clone().unwrap_or_default()).or_default().push(account);
         }
@@ -262,7 +252,7 @@ pub fn plan(
     plan
 }
 
-/// Digests of a log that was processed without an error.
+/// Digests of the content of a log that was processed without an error, and of the settings that affect it.
 pub(crate) fn digests(account: &LogRecord) -> Option<(String, String)> {
     let digests = account.log_digest.clone().zip(account.config_digest.clone());
     digests.filter(|_| account.outcome.is_success())

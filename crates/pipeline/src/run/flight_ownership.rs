@@ -190,11 +190,6 @@ impl<'a> OwnershipLedger<'a> {
             let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
             let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
             self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
-            let owner = self.plan.here.get(&digests).filter(|owner| **owner != account.log_path);
-            if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
-                let (log, owner) = (account.log_path.clone(), owner.clone());
-                report.duplicates.push(DuplicateLog { log, owner });
-            }
         }
         self.insert(account.clone());
         Ok(vec![LogResult { account, records: Vec::new(), moved_from: Vec::new() }])

@@ -233,8 +233,8 @@ impl RunInputs {
         ProcessedLog::in_error(account, diagnostic)
     }
 
-    /// The outcome of a log whose content is known under these settings. Its records are its own, those of a log that is
-    /// gone, whose place it takes, or none, when another existing log owns them.
+    /// The outcome of a log whose content is known under these settings. Its records are its own, or those of a log that is
+    /// gone, whose place it takes.
     pub(crate) fn known(&self, work: &WorkItem, account: &LogRecord) -> Option<ProcessedLog> {
         let digests = plan::digests(account)?;
         if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
@@ -247,10 +247,8 @@ impl RunInputs {
         };
         let counts = |before: &LogRecord| (before.estimated, before.refused);
         let own = work.before.as_ref().filter(is_known).map(counts);
-        let here = self.plan.here.get(&digests).and_then(|path| self.plan.accounts.get(path));
-        let is_copy = here.filter(is_known).map(|_| (0, 0));
         let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
-        let (estimated, refused) = own.or(is_copy).or_else(|| gone.filter(is_known).map(counts).next())?;
+        let (estimated, refused) = own.or_else(|| gone.filter(is_known).map(counts).next())?;
         let known = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account.clone() };
         Some(ProcessedLog::without_records(known, Vec::new()))
     }

@@ -20,8 +20,6 @@ const HOURS_A_DAY: f64 = 6.0;
 const DAYS_A_LOG: i32 = 5;
 const UNITS: i32 = 10;
 const DAYS: i32 = 400;
-/// Day of the last log.
-const LAST: i32 = DAYS - DAYS_A_LOG;
 const LIMIT_M: f64 = 150e-6;
 
 /// The nth unit wears by 20 + 2 n µm in 1,000 h.
@@ -129,35 +127,4 @@ fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, Trend
         assert!((expected - calculated).abs() <= 0.0501, "{month}: {expected} on the page, {calculated}");
     }
     assert!(shown.iter().map(|(_, expected)| expected).sum::<f64>() > 3.0, "{shown:?}");
-}
-
-/// Only flying leads to the limit, and usage is taken to go on after the last log: a later report from the same logs has
-/// the same dates.
-#[test]
-fn a_due_date_does_not_move_with_the_day_on_which_the_report_is_made() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = store(folder.path());
-    let due = |days: i32| {
-        let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1 + days)), ..UnitSelection::default() };
-        let installations = Installations::default();
-        let report = compose(&config(), &installations, &store, &ask, day(DAYS + days), "test").unwrap();
-        let age = format!("Newest log {}, {} days old", day(LAST).strftime("%-d %b"), DAYS - 1 + days - LAST);
-        let pages = report::fleet_pages(&report, &report::Peers::of(&report)).unwrap();
-        assert!(String::from_utf8_lossy(&pages[0].body).contains(&age), "{days}: {age}");
-        let of = |unit: UnitView| (unit.row.serial_number.clone(), unit.row);
-        report.units.into_iter().map(of).collect::<BTreeMap<_, _>>()
-    };
-    let first = due(0);
-    for days in [12, 28, 60, 90] {
-        for (serial, row) in due(days) {
-            let apart = |a: Option<Timestamp>, b: Option<Timestamp>| {
-                a.unwrap().duration_since(b.unwrap()).as_secs_f64().abs() / 86_400.0
-            };
-            // A date that is reached is `now`, and an old record has its reason.
-            let is_ahead = first[&serial].not_before_utc.unwrap() > row.as_of_utc;
-            let moved = if is_ahead { apart(row.not_before_utc, first[&serial].not_before_utc) } else { 0.0 };
-            let is_stated = row.reason_code == Some("stale") || !row.caveats.0.is_empty();
-            assert!(moved <= 2.0 || is_stated, "{serial} after {days} days: {moved} days, {row:?}");
-        }
-    }
 }
