@@ -1,6 +1,7 @@
 //! Acceptance of an estimate: its quality flags.
 
 use super::codes::QualityFlag;
+use super::fit::flank_fit::FlankFit;
 use super::fit::scaling::Scaling;
 use super::types::ContactEstimate;
 
@@ -10,20 +11,32 @@ const SEEN: f64 = 2.0;
 const HEAVY: f64 = 3.0;
 /// A gap under this share of the wind-up at the 95 % load is smaller than the errors of the model.
 const DETECTION_SHARE: f64 = 0.01;
-/// Largest relative standard error of a useful gap, in wind-ups.
+/// Largest standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
+/// Shares of the wind-up and of the gap that a useful gap's standard error does not both exceed.
+const VAGUE_OF_GAP: (f64, f64) = (0.05, 0.15);
+/// Factor between fitted and configured stiffness that three spreads of 15 % explain.
+const UNLIKE: f64 = 1.45;
+/// Scatter about the fit, as shares of the wind-up and of the gap, from which the load may be another actuator's.
+const POOR: (f64, f64) = (0.3, 0.25);
 
 /// Flags of an estimate of a part whose stiffness, N/m, is known.
 pub(crate) fn flags(
     found: &ContactEstimate,
     scaling: &Scaling,
     part_stiffness_n_per_m: f64,
-    is_soft: bool,
+    contact: &FlankFit,
 ) -> Vec<QualityFlag> {
     let agrees = agrees_with_midrange(found, scaling.unknown_force_n);
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * scaling.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
+    let windup_m = scaling.windup_m();
+    let exceeds = |length_m: f64, (of_windup, of_gap): (f64, f64)| {
+        length_m > of_windup * windup_m && length_m > of_gap * found.gap_m
+    };
+    // A gap that varies along the stroke explains scatter.
+    let is_poor = found.gap_profile.is_empty() && exceeds(contact.search.scale_m, POOR);
     let is_preloaded = found.preload_n.is_some();
     let doubts = [
         (QualityFlag::Preloaded, is_preloaded),
@@ -31,11 +44,12 @@ pub(crate) fn flags(
         (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees && !is_preloaded),
         (QualityFlag::EstimatorsDisagree, !agrees && !is_preloaded),
         (QualityFlag::GapVaries, !found.gap_profile.is_empty()),
-        // Three spreads of 15 %.
-        (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > 0.45),
+        (QualityFlag::StiffnessImplausible, compliance.max(compliance.recip()) > UNLIKE),
+        (QualityFlag::FitPoor, is_poor),
+        (QualityFlag::LoadJumps, contact.load_jumps),
         (QualityFlag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
-        (QualityFlag::SoftContact, is_soft && !is_preloaded),
-        (QualityFlag::Imprecise, found.gap_se_m > VAGUE * scaling.windup_m()),
+        (QualityFlag::SoftContact, contact.is_soft && !is_preloaded),
+        (QualityFlag::Imprecise, found.gap_se_m > VAGUE * windup_m || exceeds(found.gap_se_m, VAGUE_OF_GAP)),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()
 }

@@ -81,8 +81,12 @@ pub enum QualityFlag {
     BelowDetection,
     /// The published statistic at the fitted stiffness differs by more than both methods explain.
     EstimatorsDisagree,
-    /// The compliance 1/K differs from the part's by more than three spreads.
+    /// The fitted stiffness differs from the part's by a factor of more than 1.45: three spreads of 15 %.
     StiffnessImplausible,
+    /// δX scatters about the fit by more than three tenths of the wind-up and a quarter of the gap.
+    FitPoor,
+    /// The reading of the load cell jumps at zero load.
+    LoadJumps,
     /// The 95 % load is under three times the friction.
     FrictionHeavy,
     /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
@@ -91,7 +95,7 @@ pub enum QualityFlag {
     GapVaries,
     /// The gap is negative by more than two standard errors, which no gap can be.
     GapNegative,
-    /// The standard error exceeds a tenth of the wind-up.
+    /// The standard error exceeds a tenth of the wind-up, or a twentieth of it and three twentieths of the gap.
     Imprecise,
     /// Both flanks press at low load, so that there is no gap.
     Preloaded,

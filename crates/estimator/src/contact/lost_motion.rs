@@ -42,7 +42,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
     };
     let branch_m = |side: f64| {
         let inner = reach..blocks.len().saturating_sub(reach);
-        median_and_error_m(inner.filter_map(|k| position(side, k)))
+        median_and_error(inner.filter_map(|k| position(side, k)))
     };
     let (upper, lower) = (branch_m(1.0)?, branch_m(-1.0)?);
     Some((upper.0 - lower.0, upper.1.hypot(lower.1).hypot(contact.unexplained_m)))
@@ -66,7 +66,7 @@ fn travel_m<'a>(
     let line = &contact.search.line.fit;
     let beyond_m = |side: f64| {
         let of_flank = rows.clone().filter(|row| row.x[GAP] * side > 0.0);
-        median_and_error_m(of_flank.map(|row| (side * line.residual_m(row), row.stretch)))
+        median_and_error(of_flank.map(|row| (side * line.residual_m(row), row.stretch)))
     };
     let (upper, lower) = (beyond_m(1.0)?, beyond_m(-1.0)?);
     let line_m = line.beta[GAP] + 2.0 * load * line.beta[FORCE];
@@ -74,16 +74,16 @@ fn travel_m<'a>(
     Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))
 }
 
-/// The median of lengths, m, and its standard error with those of one stretch taken as one; none of fewer than five.
-fn median_and_error_m(lengths: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
-    let (mut lengths_m, mut stretches): (Vec<f64>, Vec<u32>) = lengths.unzip();
-    if lengths_m.len() < 5 {
+/// The median of values and its standard error, where those of one stretch count as one; none of fewer than five.
+pub(crate) fn median_and_error(values: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
+    let (mut values, mut stretches): (Vec<f64>, Vec<u32>) = values.unzip();
+    if values.len() < 5 {
         return None;
     }
     stretches.sort_unstable();
     stretches.dedup();
-    let median_m = median(&mut lengths_m);
-    lengths_m.iter_mut().for_each(|m| *m = (*m - median_m).abs());
+    let middle = median(&mut values);
+    values.iter_mut().for_each(|value| *value = (*value - middle).abs());
     // A median of a normal sample scatters so much more than its mean: √(π/2).
-    Some((median_m, 1.253_314_137_315_5 * MAD * median(&mut lengths_m) / (stretches.len() as f64).sqrt()))
+    Some((middle, 1.253_314_137_315_5 * MAD * median(&mut values) / (stretches.len() as f64).sqrt()))
 }

@@ -25,6 +25,7 @@ mod block_means;
 mod codes;
 mod fit;
 mod friction;
+mod load_jump;
 mod lost_motion;
 mod plot_data;
 mod stats;
@@ -134,7 +135,10 @@ fn look(
     workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, FlankFit), Rejection> {
     let (scaling, _) = prepare(samples, prior, workspace)?;
-    let contact = flank_fit::fit(workspace, &scaling)?;
+    let mut contact = flank_fit::fit(workspace, &scaling)?;
+    let load_zero_n = contact.search.line.at.load_zero_n;
+    let jump_n = load_jump::load_jump_n(samples, &workspace.whole, load_zero_n, scaling.load_n);
+    contact.add_load_jump(jump_n);
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
@@ -187,6 +191,6 @@ fn report(
         midrange_at_fit_m: flank_fit::midrange_at_fit_m(workspace, scaling, contact),
         flags: Vec::new(),
     };
-    found.flags = acceptance::flags(&found, scaling, prior.stiffness_n_per_m, contact.is_soft);
+    found.flags = acceptance::flags(&found, scaling, prior.stiffness_n_per_m, contact);
     found
 }

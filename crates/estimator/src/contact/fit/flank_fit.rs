@@ -56,11 +56,21 @@ pub(crate) struct FlankFit {
     pub(crate) is_soft: bool,
     /// Travel that neither gap nor wind-up accounts for, m: a part of the error of the gap and of the loop.
     pub(crate) unexplained_m: f64,
+    /// Whether a jump of the load cell's reading at zero load contributes most to the error of the gap.
+    pub(crate) load_jumps: bool,
     /// The fit of the whole flight with its rows, and the result of the search.
     pub(crate) search: SearchResult,
 }
 
 impl FlankFit {
+    /// Counts a jump of the load cell's reading at zero load, N, as an error of the gap: the fit moved both flanks inwards by
+    /// half of the jump over the stiffness.
+    pub(crate) fn add_load_jump(&mut self, jump_n: f64) {
+        let error_m = jump_n * self.compliance_m_per_n;
+        self.load_jumps = error_m > self.gap_m.1;
+        self.gap_m.1 = self.gap_m.1.hypot(error_m);
+    }
+
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         dot(&self.search.line.fit.beta[DRY..], &row.x[DRY..])
@@ -89,6 +99,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         compliance_m_per_n: search.line.fit.beta[FORCE] / scaling.load_n,
         is_soft: sigma > 2.3,
         unexplained_m: 0.0,
+        load_jumps: false,
         search,
     };
     if gap_m.0 < UNSEEN_GAP * windup_m {
