@@ -72,10 +72,9 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output
             None => "no completed run".to_owned(),
         },
     };
-    output
-        .diagnostic(&Diagnostic::new("run_overdue", what).hint(
-            "check the clock, that the timer starts `freeplay run` and that it exits with code 0 or 1",
-        ));
+    output.diagnostic(&Diagnostic::new("run_overdue", what).hint(
+        "check the clock, that the timer starts `freeplay run`, and that no run ends with code 2 or 3",
+    ));
     Ok(Code::LogsInError)
 }
 
