@@ -1,5 +1,5 @@
 //! Flights of an independent simulator (MuJoCo) with known gap, and the reference estimate of each;
-//! `tests/data/flights/README.md` documents them.
+//! `tests/data/flights/README.md` of the workspace documents them.
 
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ struct Log {
 
 impl Log {
     fn load(name: &str) -> Self {
-        let (truth, mut columns) = load("flights", "truth.json", name);
+        let (truth, mut columns) = load("../../tests/data/flights", "truth.json", name);
         let mut take = |column: &str| columns.remove(column).unwrap();
         let (motor_m, screw_m, load_n) = (take("motor_position_m"), take("screw_position_m"), take("load_n"));
         let dx_m: Vec<f64> = screw_m.iter().zip(&motor_m).map(|(screw, motor)| screw - motor).collect();

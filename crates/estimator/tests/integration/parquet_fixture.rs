@@ -1,4 +1,5 @@
-//! Reference data of `tests/data`: an entry of a JSON file, and Parquet columns as `f64` with missing values as NaN.
+//! Reference data, whose folders are given from the folder of this crate: an entry of a JSON file, and Parquet columns as
+//! `f64` with missing values as NaN.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,7 +13,7 @@ use serde_json::Value;
 
 /// The entry of a name in the JSON file of a folder, and the columns of its Parquet file.
 pub(crate) fn load(folder: &str, json: &str, name: &str) -> (Value, BTreeMap<String, Vec<f64>>) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(folder);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let all: Value = serde_json::from_reader(File::open(folder.join(json)).unwrap()).unwrap();
     (all[name].clone(), columns(&folder.join(format!("{name}.parquet"))))
 }

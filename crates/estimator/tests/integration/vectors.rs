@@ -18,7 +18,7 @@ pub(crate) struct Set {
 
 impl Set {
     pub(crate) fn load(name: &str) -> Self {
-        let (json, columns) = load("lkf", "vectors.json", name);
+        let (json, columns) = load("tests/data/lkf", "vectors.json", name);
         Self { json, columns }
     }
 
