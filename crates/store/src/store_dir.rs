@@ -141,19 +141,16 @@ fn make_folder(dir: &Path) -> Result<(), Error> {
     parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
-/// Whether the folder holds the tables of a store. A copy may have lost the marker alone.
-fn has_tables(location: &Location) -> Result<bool, Error> {
-    let mut tables = ["gaps", "logs", "runs"].iter();
-    tables.try_fold(true, |all, table| Ok(all && location.has(&format!("{table}/_delta_log"))?))
-}
-
 /// The format version, if the folder is a store of a known format. A store that lost its marker counts as one of the
 /// first format, so that the next writer writes the marker again.
 pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Error> {
     let file = location.display_path(&location.dir().join(MARKER));
-    // A bucket without the mark gets it where the store is opened for writing.
-    if !location.is_bucket() && !location.has(MARKER)? && has_tables(location)? {
-        return Ok(FIRST_FORMAT);
+    // A copy may have lost the marker alone. A bucket without it gets it where the store is opened for writing.
+    if !location.is_bucket() && !location.has(MARKER)? {
+        let store = Store::at(location.clone());
+        if store.tables().iter().try_fold(true, |all, table| Ok::<_, Error>(all && table.exists()?))? {
+            return Ok(FIRST_FORMAT);
+        }
     }
     if found != MARKER {
         return Err(Error::Foreign { dir: location.display_path(location.dir()), found: found.to_owned() });

@@ -187,42 +187,35 @@ impl Location {
     ///
     /// A file of that name with other content is damaged and is replaced: no commit can mean it.
     pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
-        let Some(bucket) = &self.bucket else {
-            return match durable_fs::create(path, &[content]) {
-                Ok(true) => Ok(()),
-                Ok(false) => durable_fs::replace(path, &[content]).map_err(Error::io(path, "written")),
-                Err(error) => Err(Error::io(path, "written")(error)),
-            };
-        };
-        match self.put(bucket, path, content, PutMode::Create) {
-            Err(object_io::Error::Exists { .. }) => {
-                Ok(self.put(bucket, path, content, PutMode::Overwrite)?)
-            }
-            done => Ok(done?),
+        if !self.put(path, content, PutMode::Create)? {
+            self.put(path, content, PutMode::Overwrite)?;
         }
+        Ok(())
     }
 
     /// Writes a whole file, in place of one of the same name.
     pub(crate) fn replace(&self, name: &str, content: &[u8]) -> Result<(), Error> {
-        let path = self.dir.join(name);
-        match &self.bucket {
-            Some(bucket) => Ok(self.put(bucket, &path, content, PutMode::Overwrite)?),
-            None => durable_fs::replace(&path, &[content]).map_err(Error::io(path, "written")),
-        }
+        self.put(&self.dir.join(name), content, PutMode::Overwrite).map(drop)
     }
 
-    fn put(
-        &self,
-        bucket: &BucketLocation,
-        path: &Path,
-        content: &[u8],
-        mode: PutMode,
-    ) -> Result<(), object_io::Error> {
+    /// Writes a whole file; `false` when it is to be created, and another file has that name.
+    fn put(&self, path: &Path, content: &[u8], mode: PutMode) -> Result<bool, Error> {
+        let Some(bucket) = &self.bucket else {
+            let written = match mode {
+                PutMode::Create => durable_fs::create(path, &[content]),
+                _ => durable_fs::replace(path, &[content]).map(|()| true),
+            };
+            return written.map_err(Error::io(path, "written"));
+        };
         let payload = PutPayload::from(content.to_vec());
         let options = PutOptions { mode, ..PutOptions::default() };
-        bucket.request(&self.key(bucket, path), async |location| {
-            bucket.client.put_opts(location, payload, options).await.map(drop)
-        })
+        let put = bucket.request(&self.key(bucket, path), async |location| {
+            bucket.client.put_opts(location, payload, options).await
+        });
+        match put {
+            Err(object_io::Error::Exists { .. }) => Ok(false),
+            put => Ok(put.map(|_| true)?),
+        }
     }
 
     /// Deletes a file.

@@ -4,8 +4,8 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread::ScopedJoinHandle;
 
 use arrow::array::{
     Array, ArrayRef, AsArray, BooleanArray, RecordBatch, Scalar, StringArray, TimestampMicrosecondArray,
@@ -144,28 +144,24 @@ pub(crate) fn read_each(
     read_file: impl Fn(&Path) -> Result<Vec<RecordBatch>, Error> + Sync,
 ) -> Result<Vec<RecordBatch>, Error> {
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(files.len());
-    let next = AtomicUsize::new(0);
-    let read = || {
-        let mut parts = Vec::new();
-        let take = || {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            files.get(at).map(|file| (at, file))
-        };
-        while let Some((at, file)) = take() {
-            parts.push((at, read_file(file)?));
+    let parts: Vec<OnceLock<Vec<RecordBatch>>> = files.iter().map(|_| OnceLock::new()).collect();
+    let left = Mutex::new(files.iter().zip(&parts));
+    let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let read = || -> Result<(), Error> {
+        while let Some((file, part)) = next() {
+            let batches = read_file(file)?;
+            part.get_or_init(|| batches);
         }
-        Ok::<_, Error>(parts)
+        Ok(())
     };
-    let mut parts = std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
         let others: Vec<_> = (1..threads).map(|_| scope.spawn(read)).collect();
-        let mut parts = read()?;
-        for other in others {
-            parts.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
-        }
-        Ok::<_, Error>(parts)
+        read()?;
+        let join =
+            |other: ScopedJoinHandle<'_, _>| other.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
+        others.into_iter().try_for_each(join)
     })?;
-    parts.sort_unstable_by_key(|(at, _)| *at);
-    let batches: Vec<RecordBatch> = parts.into_iter().flat_map(|(_, batches)| batches).collect();
+    let batches: Vec<RecordBatch> = parts.into_iter().filter_map(OnceLock::into_inner).flatten().collect();
     Ok(if batches.is_empty() { vec![RecordBatch::new_empty(Arc::clone(schema))] } else { batches })
 }
 

@@ -58,20 +58,14 @@ impl Store {
         self.newest(&self.logs, &[settled], |account: &LogRecord| account.log_path.clone())
     }
 
-    /// The data files of the records as of now, for engines that do not read Delta's log.
+    /// The data files of a table as of now, for engines that do not read Delta's log; by the name of the table: `gaps`,
+    /// `logs`, `runs`, `alerts` or `work`.
     ///
-    /// A listing of the folder would find superseded files too. There is always one at least.
+    /// A listing of the folder would find superseded files too. There is always one at least, except of a table that does
+    /// not exist.
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
-    pub fn files(&self) -> Result<Vec<PathBuf>, Error> {
-        self.table_files(self.gaps.name)
-    }
-
-    /// The same of a table by its name: `gaps`, `logs`, `runs`, `alerts` or `work`; empty where it does not exist.
-    ///
-    /// # Errors
-    /// As [`Store::files`].
     pub fn table_files(&self, name: &str) -> Result<Vec<PathBuf>, Error> {
         let Some(table) = self.existing_tables().into_iter().find(|table| table.name == name) else {
             return Ok(Vec::new());

@@ -14,9 +14,9 @@ fn files_that_hold_no_superseded_record_are_not_touched() {
     for flight in 0..4 {
         writer.commit(&[result(1, flight, 30e-6)]).unwrap();
     }
-    let before = writer.store().files().unwrap();
+    let before = writer.store().table_files("gaps").unwrap();
     writer.commit(&[result(1, 2, 31e-6)]).unwrap();
-    let after = writer.store().files().unwrap();
+    let after = writer.store().table_files("gaps").unwrap();
     assert_eq!(before.iter().filter(|file| after.contains(file)).count(), 4);
     assert_eq!(after.len(), 5);
 }

@@ -21,7 +21,7 @@ fn codes(store: &Store) -> Vec<String> {
 }
 
 fn data_file(writer: &Writer) -> PathBuf {
-    writer.store().files().unwrap().remove(0)
+    writer.store().table_files("gaps").unwrap().remove(0)
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn verify_finds_any_flipped_byte() {
 #[test]
 fn verify_names_a_file_that_is_gone_and_one_cut_short() {
     let (_dir, writer) = filled();
-    let files = writer.store().files().unwrap();
+    let files = writer.store().table_files("gaps").unwrap();
     fs::remove_file(&files[0]).unwrap();
     fs::write(&files[1], &fs::read(&files[1]).unwrap()[..100]).unwrap();
     let findings = writer.store().verify();
@@ -170,7 +170,7 @@ fn compaction_refuses_to_give_a_damaged_file_a_new_digest() {
 #[test]
 fn superseded_files_are_kept_for_readers_until_they_are_old() {
     let (dir, mut writer) = filled();
-    let before = writer.store().files().unwrap();
+    let before = writer.store().table_files("gaps").unwrap();
     writer.compact().unwrap();
     assert!(before.iter().all(|file| file.exists()));
     fs::write(dir.path().join("gaps/000000000099-half.parquet#4711"), "x").unwrap();

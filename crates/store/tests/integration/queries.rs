@@ -110,7 +110,7 @@ fn a_query_and_the_parts_of_a_scan_answer_what_asking_every_row_would() {
 #[test]
 fn a_flipped_byte_is_an_error_and_not_a_number_and_a_column_that_none_has_is_one_too() {
     let (dir, writer) = filled();
-    let file = writer.store().files().unwrap().remove(0);
+    let file = writer.store().table_files("gaps").unwrap().remove(0);
     let mut content = std::fs::read(&file).unwrap();
     content[100] ^= 1;
     std::fs::write(&file, content).unwrap();
@@ -128,7 +128,7 @@ fn a_flipped_byte_is_an_error_and_not_a_number_and_a_column_that_none_has_is_one
 fn files_that_cannot_hold_an_answer_are_not_opened() {
     let (dir, writer) = filled();
     // The newest file alone holds the fourth day; the others may as well not be there.
-    let files = writer.store().files().unwrap();
+    let files = writer.store().table_files("gaps").unwrap();
     for file in &files {
         let name = file.file_name().unwrap().to_str().unwrap();
         if !name.starts_with("000000000004-") {
@@ -159,7 +159,7 @@ fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
     assert!(!found.is_empty());
     let tails: Vec<&str> = found.iter().map(|r| r.flight.tail_number.as_str()).collect();
     // Without every other file the answer is the same: they are not opened.
-    for file in writer.store().files().unwrap() {
+    for file in writer.store().table_files("gaps").unwrap() {
         let version: usize = file.file_name().unwrap().to_str().unwrap()[..12].parse().unwrap();
         if version > 0 && !tails.contains(&format!("N{}", version - 1).as_str()) {
             std::fs::remove_file(file).unwrap();

@@ -115,7 +115,7 @@ fn runs_are_listed_by_start_with_their_end() {
 #[test]
 fn a_table_always_has_a_file() {
     let (_dir, mut writer) = fresh();
-    assert_eq!(writer.store().files().unwrap().len(), 1);
+    assert_eq!(writer.store().table_files("gaps").unwrap().len(), 1);
     let mut retired = result(1, 0, 30e-6);
     writer.commit(&[retired.clone()]).unwrap();
     writer.compact().unwrap();
@@ -125,7 +125,7 @@ fn a_table_always_has_a_file() {
     (retired.account.estimated, retired.account.refused) = (0, 0);
     writer.commit(&[retired]).unwrap();
     assert_eq!(writer.store().records(&Query::default()).unwrap(), []);
-    assert_eq!(writer.store().files().unwrap().len(), 1);
+    assert_eq!(writer.store().table_files("gaps").unwrap().len(), 1);
     writer.compact().unwrap();
     let again = writer.compact().unwrap();
     assert_eq!((again.before, again.after), (3, 3));
