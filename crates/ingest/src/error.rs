@@ -39,7 +39,13 @@ pub struct Error {
 impl Error {
     /// A failed read in place of what a parser made of it.
     pub(crate) fn new(file: &Path, kind: ErrorKind) -> Self {
-        let kind = transient::take_failed_read().map_or(kind, |source| ErrorKind::Unreadable { source });
+        let failed_read = match &kind {
+            ErrorKind::NotParquet { detail } | ErrorKind::Decode { detail, .. } => {
+                object_io::system_error(detail)
+            }
+            _ => None,
+        };
+        let kind = failed_read.map_or(kind, |source| ErrorKind::Unreadable { source });
         Self { file: file.to_owned(), kind: Box::new(kind) }
     }
 

@@ -1,4 +1,4 @@
-//! Local files that a program writes under a name of its own before it renames them.
+//! Local files: one that a program writes under a name of its own before it renames it, and errors of the system.
 
 use std::fs::{self, File};
 use std::io;
@@ -14,6 +14,13 @@ pub fn create_fresh(path: &Path) -> io::Result<File> {
         _ => {}
     }
     File::create_new(path)
+}
+
+/// The error of the system that the text of another error ends with, in the form of the standard library:
+/// `(os error 24)`. Libraries that read files keep the error below their own, or its text alone.
+pub fn system_error(text: &str) -> Option<io::Error> {
+    let number = text.rsplit_once("(os error ")?.1.split_once(')')?.0.parse().ok()?;
+    Some(io::Error::from_raw_os_error(number))
 }
 
 #[cfg(all(test, unix))]

@@ -176,15 +176,10 @@ fn io_remedy(error: &std::io::Error) -> &'static str {
     }
 }
 
-/// The error of the system below an error of a library. Some libraries keep only its text, whose end is of the standard
-/// library: `(os error 24)`.
+/// The error of the system below an error of a library.
 fn os_error(error: &(dyn std::error::Error + 'static)) -> Option<std::io::Error> {
-    let number = |error: &dyn std::error::Error| {
-        let text = error.to_string();
-        text.rsplit_once("(os error ")?.1.split_once(')')?.0.parse().ok()
-    };
-    let number = std::iter::successors(Some(error), |error| error.source()).find_map(number)?;
-    Some(std::io::Error::from_raw_os_error(number))
+    let below = std::iter::successors(Some(error), |error| error.source());
+    below.map(ToString::to_string).find_map(|text| object_io::system_error(&text))
 }
 
 /// First line of the message. The libraries add the location in their own code, which does not help users.

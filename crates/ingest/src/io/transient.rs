@@ -1,10 +1,7 @@
-//! Errors of local files: retried where they may pass by themselves, and remembered where they do not pass.
+//! Errors of local files: an operation is repeated where its error may pass by itself.
 //!
-//! A disk or a network share may fail a read once and serve the next. A parser that stands between the read and the
-//! caller turns the cause into "not Parquet" or "a page cannot be decoded". The cause is therefore kept per thread
-//! until the next read succeeds, and [`Error`](crate::Error) reports it in place of what the parser made of it.
+//! A disk or a network share may fail a read once and serve the next.
 
-use std::cell::RefCell;
 use std::io;
 use std::time::Duration;
 
@@ -16,10 +13,6 @@ const DELAYS: [Duration; 3] =
 const INPUT_OUTPUT_ERRORS: [i32; 2] = [5, 121];
 /// `ENFILE` and `EMFILE`: the system, or the process, has as many files open as it may.
 const TOO_MANY_OPEN_FILES: [i32; 2] = [23, 24];
-
-thread_local! {
-    static FAILED_READ: RefCell<Option<io::Error>> = const { RefCell::new(None) };
-}
 
 /// Whether the same operation may succeed later although nothing is changed here.
 pub(crate) fn is_transient(error: &io::Error) -> bool {
@@ -51,34 +44,15 @@ fn is_one_of(error: &io::Error, numbers: [i32; 2]) -> bool {
     cfg!(unix) && error.raw_os_error().is_some_and(|number| numbers.contains(&number))
 }
 
-/// Repeats an operation while its error is transient, and remembers the error of this thread, since it is no finding about
-/// the content of the file. That a file is missing is an answer.
+/// Repeats an operation while its error is transient.
 pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
-    let mut delays = DELAYS.into_iter();
-    loop {
-        let result = operation();
-        let Err(error) = &result else {
-            FAILED_READ.take();
-            return result;
-        };
-        if is_transient(error)
-            && let Some(delay) = delays.next()
-        {
-            std::thread::sleep(delay);
-            continue;
+    for delay in DELAYS {
+        match operation() {
+            Err(error) if is_transient(&error) => std::thread::sleep(delay),
+            result => return result,
         }
-        let number = error.raw_os_error();
-        if is_transient(error) || number.is_some() && error.kind() != io::ErrorKind::NotFound {
-            let copy = number.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
-            FAILED_READ.set(Some(copy));
-        }
-        return result;
     }
-}
-
-/// The error that the latest read of this thread ended with; it is forgotten.
-pub(crate) fn take_failed_read() -> Option<io::Error> {
-    FAILED_READ.take()
+    operation()
 }
 
 #[cfg(test)]
@@ -101,17 +75,12 @@ mod tests {
     }
 
     #[test]
-    fn one_failure_is_not_seen_and_a_lasting_one_is_remembered_once() {
+    fn one_failure_is_not_seen() {
         let mut tries = 0;
         let once = with_retry(|| {
             tries += 1;
             if tries == 1 { Err(io::Error::from_raw_os_error(INPUT_OUTPUT_ERRORS[0])) } else { Ok(tries) }
         });
-        assert_eq!((once.unwrap(), take_failed_read().is_none()), (2, true));
-        with_retry(|| Err::<(), _>(io::ErrorKind::TimedOut.into())).unwrap_err();
-        assert_eq!(take_failed_read().unwrap().kind(), io::ErrorKind::TimedOut);
-        assert!(take_failed_read().is_none());
-        with_retry(|| Err::<(), _>(io::ErrorKind::NotFound.into())).unwrap_err();
-        assert!(take_failed_read().is_none());
+        assert_eq!(once.unwrap(), 2);
     }
 }

@@ -39,8 +39,11 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
     let ErrorKind::NotParquet { detail } = error else { return error };
     let mut head = [0; foreign_format::HEAD_BYTES];
     let fetched = source.want(once(0..head.len() as u64));
-    let length = fetched.ok().and_then(|()| read_at::read_at(&source.file, &mut head, 0).ok());
-    match &head[..length.unwrap_or(0)] {
+    let length = match fetched.and_then(|()| Ok(read_at::read_at(&source.file, &mut head, 0)?)) {
+        Ok(length) => length,
+        Err(error) => return error,
+    };
+    match &head[..length] {
         [b'P', b'A', b'R', b'E', ..] => ErrorKind::Encrypted { column: None },
         [b'P', b'A', b'R', b'1', ..] => {
             not_parquet(format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: ")))
