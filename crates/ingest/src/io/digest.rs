@@ -6,52 +6,40 @@ use std::ops::Range;
 
 use crate::io::read_at;
 
-/// As much as stays in the cache between reading and hashing.
-const BUFFER_BYTES: usize = 1 << 17;
+/// Bytes that are read and hashed at a time: the hash takes sixteen pieces of 1 KiB side by side, but fewer at the ends of
+/// what it is fed with.
+const BUFFER_BYTES: usize = 1 << 19;
 
 /// A digest that stretches are added to, one after the other as if they were one.
-///
-/// Wherever stretches end, the hash is fed with full buffers: it takes sixteen pieces of 1 KiB side by side, but only
-/// from places in the stream that are multiples of them.
 #[derive(Debug)]
 pub(crate) struct Digest {
     hash: blake3::Hasher,
     buffer: Vec<u8>,
-    filled: usize,
 }
 
 impl Digest {
     pub(crate) fn new() -> Self {
-        Self { hash: blake3::Hasher::new(), buffer: vec![0; BUFFER_BYTES], filled: 0 }
+        Self { hash: blake3::Hasher::new(), buffer: vec![0; BUFFER_BYTES] }
     }
 
     /// Adds a stretch of a file; an empty one adds nothing.
     pub(crate) fn take(&mut self, file: &File, stretch: Range<u64>) -> io::Result<()> {
-        let (mut at, mut left) = (stretch.start, stretch.end.saturating_sub(stretch.start));
-        while left > 0 {
-            let free = &mut self.buffer[self.filled..];
-            let bytes = usize::try_from(left).map_or(free.len(), |left| left.min(free.len()));
-            read_at::read_exact(file, &mut free[..bytes], at)?;
-            self.filled += bytes;
-            (at, left) = (at + bytes as u64, left - bytes as u64);
-            if self.filled == self.buffer.len() {
-                self.hash.update(&self.buffer);
-                self.filled = 0;
-            }
+        for at in stretch.clone().step_by(BUFFER_BYTES) {
+            let bytes = &mut self.buffer[..BUFFER_BYTES.min((stretch.end - at) as usize)];
+            read_at::read_exact(file, bytes, at)?;
+            self.hash.update(bytes);
         }
         Ok(())
     }
 
     /// Adds a text and its length.
     pub(crate) fn take_text(&mut self, text: &str) {
-        self.hash.update(&self.buffer[..std::mem::take(&mut self.filled)]);
         self.hash.update(&text.len().to_le_bytes());
         self.hash.update(text.as_bytes());
     }
 
     /// In hexadecimal.
-    pub(crate) fn end(mut self) -> String {
-        self.hash.update(&self.buffer[..self.filled]);
+    pub(crate) fn end(self) -> String {
         self.hash.finalize().to_hex().to_string()
     }
 }
