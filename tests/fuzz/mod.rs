@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use ingest::log::in_memory::ChannelArrays;
-use ingest::tables::Table;
+use ingest::tables::TableBatch;
 use job::Config;
 use pipeline::fleet::bookkeeping::maintenance_log;
 use pipeline::fleet::external_estimates;
@@ -69,8 +69,8 @@ fn fuzz_maintenance_and_estimates() {
         std::fs::write(&file, bytes).unwrap();
         let _ = maintenance_log::read(&file).map_err(|e| e.to_string());
         let _ = external_estimates::read(&file).map_err(|e| e.to_string());
-        let _ =
-            Table::read(&file).map(|table| external_estimates::queries(&table).map_err(|e| e.to_string()));
+        let _ = TableBatch::read(&file)
+            .map(|table| external_estimates::queries(&table).map_err(|e| e.to_string()));
     });
 }
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use ::records::Diagnostic;
 use ::records::row_schema::to_nullable_batch;
 use arrow::array::RecordBatch;
-use ingest::tables::{Table as Cells, TableBatch};
+use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use pipeline::assess::backtest;
 use pipeline::assess::trends::{self, UnitSelection};
@@ -93,7 +93,7 @@ pub(crate) fn trend(
     let found = config.with(py, |config, installations| {
         let chunks = estimates.map(chunks);
         let histories = chunks.map(|chunks| external_estimates::from_batches(&chunks)).transpose()?;
-        let queries = queries.map(|rows| Cells::of_batches("queries".as_ref(), &rows)).transpose()?;
+        let queries = queries.map(|rows| TableBatch::as_text("queries".as_ref(), &rows)).transpose()?;
         let queries = queries.as_ref().map(external_estimates::queries).transpose()?;
         Ok(trends::assess(config, installations, histories, queries.as_deref(), &ask)?.now)
     })?;

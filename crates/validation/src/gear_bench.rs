@@ -13,7 +13,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
 use estimator::contact::{self, ContactWorkspace, PartPrior};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
-use ingest::tables::{Table, number};
+use ingest::tables::{TableBatch, number};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::methods::{METHODS, load_lines_m, spread_m};
@@ -46,7 +46,7 @@ const LAST_SMALL_RAMP: f64 = 4.0;
 /// A file that cannot be read or lacks a column, as text.
 pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let text = |error: ingest::Error| error.diagnostic().to_string();
-    let manifest = Table::read(&folder.join("manifest.csv")).map_err(text)?;
+    let manifest = TableBatch::read(&folder.join("manifest.csv")).map_err(text)?;
     let column = |name: &str| manifest.column(&[name]).map_err(text);
     let (file, play) = (column("file")?, column("authors_phase_play_deg")?);
     let log = |row: usize| {

@@ -59,8 +59,7 @@ impl StringColumn {
     /// The text of a row.
     pub fn get(&self, row: usize) -> Option<&str> {
         let at = if self.codes.is_some() { self.code(row)? } else { row };
-        let text = self.texts.is_valid(at).then(|| trim_ascii_fast(self.texts.value(at)))?;
-        (!text.is_empty()).then_some(text)
+        text_at(&self.texts, at)
     }
 
     /// The code of a row's text, where the table has codes.
@@ -72,6 +71,12 @@ impl StringColumn {
     pub fn are_same(&self, a: usize, b: usize) -> bool {
         if self.codes.is_some() { self.code(a) == self.code(b) } else { self.get(a) == self.get(b) }
     }
+}
+
+/// The text of a row, trimmed; an empty one is none.
+pub(super) fn text_at(texts: &StringArray, row: usize) -> Option<&str> {
+    let text = texts.is_valid(row).then(|| trim_ascii_fast(texts.value(row)))?;
+    (!text.is_empty()).then_some(text)
 }
 
 /// A text without the blanks around it, of which most have none.
@@ -175,7 +180,7 @@ impl TableBatch {
         self.rows().map(cell).collect()
     }
 
-    fn cast(&self, column: Option<usize>, wanted: &DataType) -> Result<ArrayRef, Error> {
+    pub(super) fn cast(&self, column: Option<usize>, wanted: &DataType) -> Result<ArrayRef, Error> {
         let Some(column) = column else { return Ok(new_null_array(wanted, self.rows().len())) };
         let array = self.batch.column(column);
         cast(array, wanted).map_err(|_| {

@@ -10,8 +10,7 @@ use crate::error::Error;
 use crate::log::identity::{IdentityFields, date_alone, instant};
 use crate::mapping::{IdentityField, IdentityMapping};
 use crate::tables::cell::{self, name, not_negative};
-use crate::tables::column_batches::ColumnAliases;
-use crate::tables::table::Table;
+use crate::tables::column_batches::{ColumnAliases, TableBatch};
 
 /// A flight may seem to last longer than until the next departure by this factor and by these hours: clocks and rounding.
 const OVERLAP_SHARE: f64 = 1.25;
@@ -68,7 +67,7 @@ impl Flights {
     /// Every cell that cannot be read, or, when all can, every row that another one contradicts: a second flight of one id
     /// on one date without a time, and flight hours beyond the next departure.
     pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
-        let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
+        let table = TableBatch::read(file).map_err(|e| vec![e])?.with_aliases(names);
         let needed = table.columns(["tail_number", "flight_id", "departure_utc"])?;
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
         let ([tail, flight, departure], [hours, tail_hours, path, position]) = (needed, optional);

@@ -7,8 +7,7 @@ use records::{Alias, Installation, Installations};
 
 use crate::error::{Error, ErrorKind};
 use crate::tables::cell::{name, number, utc};
-use crate::tables::column_batches::ColumnAliases;
-use crate::tables::table::Table;
+use crate::tables::column_batches::{ColumnAliases, TableBatch};
 
 /// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
 /// removed_utc` and optionally `unit_hours_at_install`, `tail_hours_at_install`.
@@ -16,7 +15,7 @@ use crate::tables::table::Table;
 /// # Errors
 /// Every cell that cannot be read, or, when all can, every contradiction between rows.
 pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
-    let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
+    let table = TableBatch::read(file).map_err(|e| vec![e])?.with_aliases(names);
     let [tail, position, part, serial, installed] =
         table.columns(["tail_number", "position", "part_number", "serial_number", "installed_utc"])?;
     let [removed, unit_hours, tail_hours] =
@@ -45,7 +44,7 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
 /// # Errors
 /// A missing column, or the first cell that cannot be read.
 pub fn aliases(file: &Path) -> Result<Vec<Alias>, Error> {
-    let table = Table::read(file)?;
+    let table = TableBatch::read(file)?;
     let [former, serial] = [table.column(&["former_serial_number"])?, table.column(&["serial_number"])?];
     let [former_part, part] = ["former_part_number", "part_number"].map(|name| table.find(&[name]));
     let row = |row: usize| {

@@ -1,50 +1,47 @@
 //! Tables read whole, every cell as text.
 
-use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::RecordBatch;
+use arrow::array::{AsArray, RecordBatch, RecordBatchOptions};
 use arrow::compute::concat_batches;
-use arrow::datatypes::Schema;
+use arrow::datatypes::{DataType, Field, Schema};
 
 use crate::error::{Error, ErrorKind};
-use crate::tables::column_batches::{ColumnAliases, StringColumn, TableBatch, TableSplits};
+use crate::tables::column_batches::{ColumnAliases, TableBatch, TableSplits, text_at};
 
-/// A table in one batch, every cell text; an empty cell is none.
-#[derive(Debug, Clone)]
-pub struct Table {
-    whole: TableBatch,
-    columns: Vec<StringColumn>,
-}
-
-impl Table {
-    /// Reads a `.parquet` file as Parquet and anything else as CSV.
+impl TableBatch {
+    /// Reads a whole table as text, a `.parquet` file as Parquet and anything else as CSV; an empty cell is none.
     ///
     /// # Errors
     /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
         let table = TableSplits::open(file, None, &[])?;
         let parts = table.batches(0..table.len())?.map(|part| Ok(part?.batch));
-        Self::of_batches(file, &parts.collect::<Result<Vec<_>, Error>>()?)
+        Self::as_text(file, &parts.collect::<Result<Vec<_>, Error>>()?)
     }
 
     /// The same table from memory; `name` stands for its file in diagnostics.
     ///
     /// # Errors
     /// When a column is neither text, numbers nor times.
-    pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
+    pub fn as_text(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
+        let fail = |error| Error::new(name, ErrorKind::table(error));
         let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
-        let whole = concat_batches(&schema, batches).map_err(|e| Error::new(name, ErrorKind::table(e)))?;
-        let whole = TableBatch::new(name, whole, 0);
-        let columns = (0..whole.header.len()).map(|column| whole.texts(Some(column)));
-        Ok(Self { columns: columns.collect::<Result<_, _>>()?, whole })
+        let mut whole = Self::new(name, concat_batches(&schema, batches).map_err(fail)?, 0);
+        let texts = (0..whole.header.len()).map(|column| whole.cast(Some(column), &DataType::Utf8));
+        let texts = texts.collect::<Result<_, _>>()?;
+        let fields: Vec<_> = whole.header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
+        let rows = RecordBatchOptions::new().with_row_count(Some(whole.batch.num_rows()));
+        let schema = Arc::new(Schema::new(fields));
+        whole.batch = RecordBatch::try_new_with_options(schema, texts, &rows).map_err(fail)?;
+        Ok(whole)
     }
 
     /// The same table, whose columns go by a user's own names.
     #[must_use]
     pub(crate) fn with_aliases(mut self, names: &ColumnAliases) -> Self {
-        self.whole.names.clone_from(names);
+        self.names.clone_from(names);
         self
     }
 
@@ -67,9 +64,9 @@ impl Table {
         if errors.is_empty() { Ok(rows) } else { Err(errors) }
     }
 
-    /// The text of a cell.
+    /// The text of a cell of a table that was read whole.
     pub fn text(&self, row: usize, column: usize) -> Option<&str> {
-        self.columns.get(column)?.get(row)
+        text_at(self.batch.columns().get(column)?.as_string_opt()?, row)
     }
 
     /// A cell that must hold something, read as `T`.
@@ -101,13 +98,5 @@ impl Table {
             return Ok(None);
         };
         read(text).map(Some).map_err(|detail| self.error(row, Some(column), detail))
-    }
-}
-
-impl Deref for Table {
-    type Target = TableBatch;
-
-    fn deref(&self) -> &TableBatch {
-        &self.whole
     }
 }

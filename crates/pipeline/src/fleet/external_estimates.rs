@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
+use ingest::tables::{TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
 use crate::fleet::builder::{self, add_external};
@@ -49,7 +49,7 @@ pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn queries(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
+pub fn queries(table: &TableBatch) -> Result<Vec<AsOfQuery>, Error> {
     let serial = table.column(&["serial_number", "serial"])?;
     let as_of = table.column(&["as_of_utc"])?;
     let part = table.find(&["part_number"]);

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use ingest::tables::Table;
+use ingest::tables::TableBatch;
 use job::Config;
 use pipeline::State;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
@@ -30,7 +30,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         return quantities(args, &ask, &config, &installations, output);
     }
     let histories = args.external.estimates.as_deref().map(external_estimates::read).transpose()?;
-    let queries = args.queries.as_deref().map(|file| external_estimates::queries(&Table::read(file)?));
+    let queries = args.queries.as_deref().map(|file| external_estimates::queries(&TableBatch::read(file)?));
     let queries = queries.transpose()?;
     let found = trends::assess(&config, &installations, histories, queries.as_deref(), &ask)?;
     let mut nothing = "no unit was queried\n".to_owned();

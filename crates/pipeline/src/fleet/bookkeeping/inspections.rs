@@ -1,6 +1,6 @@
 //! Inspections table: free play measured in the hangar.
 
-use ingest::tables::{Table, name, number, utc};
+use ingest::tables::{TableBatch, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
 use job::config::limits::PLAUSIBLE_LIMIT_M;
@@ -100,7 +100,7 @@ fn plausible_play(text: &str) -> Result<f64, String> {
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be right.
 pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
     let Some(file) = &config.document.logs.inspections else { return Ok(None) };
-    let table = Table::read(&config.path(file))?;
+    let table = TableBatch::read(&config.path(file))?;
     let serial = table.column(&["serial_number", "serial"])?;
     let date = table.column(&["date_utc", "date"])?;
     let play = table.column(&["play_m"])?;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use ingest::tables::{Table, name, utc};
+use ingest::tables::{TableBatch, name, utc};
 use job::Config;
 use records::{Installations, PartNumber, SerialNumber};
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
-    let table = Table::read(file)?;
+    let table = TableBatch::read(file)?;
     let column = |name| table.column(&[name]);
     let (part, serial) = (column("part_number")?, column("serial_number")?);
     let (done, kind) = (column("utc")?, column("kind")?);
@@ -58,7 +58,7 @@ pub fn unknown_units(config: &Config, installations: &Installations) -> Vec<Unkn
     let logs = &config.document.logs;
     let mut unknown = BTreeSet::new();
     for file in [&logs.maintenance, &logs.inspections].into_iter().flatten() {
-        let Ok(table) = Table::read(&config.path(file)) else { continue };
+        let Ok(table) = TableBatch::read(&config.path(file)) else { continue };
         let Ok(serial) = table.column(&["serial_number", "serial"]) else { continue };
         let part = table.find(&["part_number"]);
         for row in table.rows() {
