@@ -1,9 +1,10 @@
 //! Durable local writes: content is synced before its name appears, and the folder before the call returns. And listings
 //! that fail when they are not complete.
 
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path as FsPath, PathBuf};
+use std::time::SystemTime;
 
 /// Makes the entries of a folder durable.
 pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
@@ -53,18 +54,30 @@ pub(crate) fn create_folder(dir: &FsPath) -> io::Result<()> {
     }
 }
 
-/// What is in a folder, in the order of names. An entry whose `stat` fails is an error, unless it was deleted meanwhile.
-pub(crate) fn entries(dir: &FsPath) -> io::Result<Vec<(PathBuf, Metadata)>> {
+/// A file of a folder or prefix. One that is truncated or replaced differs in its size or the time it was written.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Entry {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: u64,
+    pub(crate) written: SystemTime,
+}
+
+/// The files in a folder, in the order of names. A file whose `stat` fails is an error, unless it was deleted meanwhile.
+pub(crate) fn entries(dir: &FsPath) -> io::Result<Vec<Entry>> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(dir)? {
         let path = entry?.path();
         match std::fs::metadata(&path) {
-            Ok(data) => found.push((path, data)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", path.display()))),
+            Ok(data) if data.is_file() => {
+                found.push(Entry { path, bytes: data.len(), written: data.modified()? });
+            }
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(io::Error::new(error.kind(), format!("{}: {error}", path.display())));
+            }
+            _ => {}
         }
     }
-    found.sort_unstable_by(|a, b| a.0.cmp(&b.0));
+    found.sort_unstable_by(|a, b| a.path.cmp(&b.path));
     Ok(found)
 }
 

@@ -3,10 +3,9 @@
 //! Files have local paths in both: for a bucket, the path of the copy once the file was [fetched](Location::fetch). Data
 //! files never change under their names, so a copy is as good as the object; it is compared with its digest like any file.
 
-use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, UNIX_EPOCH};
 
 use deltalake::logstore::object_store::prefix::PrefixStore;
 use deltalake::logstore::object_store::{self, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
@@ -16,7 +15,7 @@ use object_io::{Address, Client, block_on};
 use tokio::runtime::{Builder, Handle, Runtime};
 use url::Url;
 
-use crate::delta::durable_fs;
+use crate::delta::durable_fs::{self, Entry};
 use crate::delta::log_storage::LogStorage;
 use crate::error::Error;
 
@@ -35,14 +34,6 @@ struct BucketLocation {
     client: Client,
     /// Deleted when the last location that uses it is dropped.
     _copies: Arc<tempfile::TempDir>,
-}
-
-/// A file of a folder or prefix. One that is truncated or replaced differs in its size or the time it was written.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Entry {
-    pub(crate) path: PathBuf,
-    pub(crate) bytes: u64,
-    pub(crate) written: SystemTime,
 }
 
 /// Runtime of Delta's asynchronous library: an own thread for a folder, so that a forked process that opens a store has
@@ -230,12 +221,7 @@ impl Location {
     /// The files of this folder itself, in the order of names.
     pub(crate) fn entries(&self) -> Result<Vec<Entry>, Error> {
         let Some(bucket) = &self.bucket else {
-            let found = durable_fs::entries(&self.dir).map_err(Error::io(&self.dir, "read"))?;
-            let entry = |(path, data): (PathBuf, Metadata)| {
-                let written = data.modified().map_err(Error::io(&path, "read"))?;
-                Ok(Entry { path, bytes: data.len(), written })
-            };
-            return found.into_iter().map(entry).collect();
+            return durable_fs::entries(&self.dir).map_err(Error::io(&self.dir, "read"));
         };
         let (prefix, mut found) = (joined(bucket.address.key(), ""), Vec::new());
         object_io::list(&bucket.address, |entry| {

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
-use crate::delta::location::{Entry, Location};
+use crate::delta::durable_fs::Entry;
+use crate::delta::location::Location;
 use crate::delta::log_storage::{DIGESTS, LOG, log_file, version};
 use crate::error::Error;
 

@@ -13,9 +13,8 @@
 
 use std::ffi::OsStr;
 use std::fmt;
-use std::fs::Metadata;
 use std::io;
-use std::path::{Path as FsPath, PathBuf};
+use std::path::Path as FsPath;
 use std::sync::Arc;
 
 use async_trait::async_trait;
@@ -28,7 +27,7 @@ use deltalake::logstore::object_store::{
 use futures::StreamExt;
 use futures::stream::{self, BoxStream};
 
-use crate::delta::durable_fs;
+use crate::delta::durable_fs::{self, Entry};
 
 /// Folder of the log.
 pub(crate) const LOG: &str = "_delta_log";
@@ -92,18 +91,16 @@ fn list_folder(
     offset: Option<&Path>,
 ) -> BoxStream<'static, Result<ObjectMeta>> {
     let prefix = prefix.cloned().unwrap_or_default();
-    let meta = |(path, data): (PathBuf, Metadata)| -> Result<Option<ObjectMeta>> {
-        let name = path.file_name().and_then(OsStr::to_str);
+    let meta = |entry: Entry| {
         // A number after a hash sign ends the name of a staged file.
-        let Some(name) = name.filter(|name| data.is_file() && !name.contains('#')) else { return Ok(None) };
-        let last_modified = data.modified().map_err(failed)?.into();
-        let location = prefix.clone().join(name);
-        Ok(Some(ObjectMeta { location, last_modified, size: data.len(), e_tag: None, version: None }))
+        let name = entry.path.file_name().and_then(OsStr::to_str).filter(|name| !name.contains('#'))?;
+        let (location, last_modified) = (prefix.clone().join(name), entry.written.into());
+        Some(ObjectMeta { location, last_modified, size: entry.bytes, e_tag: None, version: None })
     };
     let listed = || -> Result<Vec<ObjectMeta>> {
         match durable_fs::entries(&files.path_to_filesystem(&prefix)?) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-            found => found.map_err(failed)?.into_iter().filter_map(|entry| meta(entry).transpose()).collect(),
+            found => Ok(found.map_err(failed)?.into_iter().filter_map(meta).collect()),
         }
     };
     let is_after = |found: &ObjectMeta| offset.is_none_or(|offset| found.location > *offset);

@@ -6,7 +6,8 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::delta::location::{Entry, Location};
+use crate::delta::durable_fs::Entry;
+use crate::delta::location::Location;
 use crate::delta::log_storage::LOG;
 use crate::delta::snapshot::Snapshot;
 

@@ -17,8 +17,9 @@ use futures::TryStreamExt;
 use jiff::Timestamp;
 
 use crate::delta::data_file;
+use crate::delta::durable_fs::Entry;
 use crate::delta::file_stats::Stats;
-use crate::delta::location::{Entry, Location};
+use crate::delta::location::Location;
 use crate::delta::log_digests::{self, LogDigests};
 use crate::delta::log_storage::{LOG, log_file};
 use crate::delta::snapshot::{DataFile, Snapshot};
