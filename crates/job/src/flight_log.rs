@@ -64,9 +64,9 @@ impl FlightLog {
         let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
         let identity = identity_of(&log, files, config).map_err(in_log)?;
-        check_not_ahead(&identity, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
+        check_not_ahead(&identity.flight, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
         check_tail(&identity, display_name, config)?;
-        let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
+        let log = log.with_mapping(&config.mapping(&identity.flight.tail_number, None));
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(in_log)?;
@@ -104,7 +104,7 @@ impl FlightLog {
 
     /// The flight, as records name it.
     pub fn flight(&self) -> Flight {
-        flight_of(&self.identity)
+        self.identity.flight.clone()
     }
 
     /// The actuators of the log. A position that lacks a channel counts only where a unit is installed:
@@ -112,7 +112,7 @@ impl FlightLog {
     pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &ActuatorColumns> {
         let id = &self.identity;
         // Which columns a position has may depend on its part, so a position without a unit may lack some.
-        let booked = |at: &Position| installations.contains_position(&id.tail_number, at);
+        let booked = |at: &Position| installations.contains_position(&id.flight.tail_number, at);
         self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 
@@ -147,13 +147,13 @@ impl FlightLog {
             position: at.position.clone(),
             part_number: installation.unit().0.clone(),
             serial_number: installation.unit().1.clone(),
-            unit_hours: installation.unit_hours(self.identity.tail_hours_end),
+            unit_hours: installation.unit_hours(self.identity.flight.tail_hours_end),
             estimate,
             provenance: Provenance {
                 log_path: self.display_name.clone(),
                 log_digest: self.digest.clone(),
                 config_digest: config
-                    .digest(&self.identity.tail_number, &installation.part_number)
+                    .digest(&self.identity.flight.tail_number, &installation.part_number)
                     .to_string(),
                 program_version: stamp.program_version.clone(),
                 run_id: stamp.run_id.clone(),
@@ -174,7 +174,7 @@ impl FlightLog {
     ) -> Result<(&'u Installation, &'u Part), Diagnostic> {
         let id = &self.identity;
         let installation = installations
-            .installed_at(&id.tail_number, &at.position, id.departure_utc)
+            .installed_at(&id.flight.tail_number, &at.position, id.flight.departure_utc)
             .ok_or_else(|| no_installation(id, &at.position, installations))?;
         Ok((installation, part_of(config, &installation.part_number)?))
     }
@@ -272,7 +272,7 @@ pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, 
 
 /// Why no unit has a log's channels. The text is the same for all logs of one cause, so that it is reported once.
 fn no_installation(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
-    let (tail, at) = (&id.tail_number, id.departure_utc);
+    let (tail, at) = (&id.flight.tail_number, id.flight.departure_utc);
     if !installations.contains_tail(tail) {
         let near = nearest(tail.as_str(), installations.iter().map(|stay| stay.tail_number.as_str()));
         let near = near.map(|near| format!("nearest: {near}; ")).unwrap_or_default();
@@ -371,7 +371,7 @@ pub fn identify(
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
         let id = identity_of(&log, files, config).map_err(in_log)?;
         check_tail(&id, display_name, config)?;
-        Ok((flight_of(&id), id.position))
+        Ok((id.flight, id.position))
     })
 }
 
@@ -390,14 +390,14 @@ pub fn identify_companion(
         let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
         check_tail(&id, display_name, config)?;
-        Ok((flight_of(&id), id.position))
+        Ok((id.flight, id.position))
     })
 }
 
 /// A departure after the machine's clock is a wrong date in the log or a wrong clock; taken at its word it would move
 /// the date of every assessment, and with it silence the fleet.
-fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic> {
-    let departure_utc = identity.departure_utc;
+fn check_not_ahead(flight: &Flight, now: Timestamp) -> Result<(), Diagnostic> {
+    let departure_utc = flight.departure_utc;
     if departure_utc.duration_since(now) <= MAX_AHEAD {
         return Ok(());
     }
@@ -408,7 +408,7 @@ fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic
 
 /// A log may name only the tails that `logs.tails` allows for its folder.
 fn check_tail(identity: &Identity, display_name: &str, config: &Config) -> Result<(), Diagnostic> {
-    let tail = &identity.tail_number;
+    let tail = &identity.flight.tail_number;
     let Some(pattern) = config.document.logs.forbidden_by(display_name, tail) else { return Ok(()) };
     let what = format!("the log names tail {tail}, which `logs.tails` does not allow for `{pattern}`");
     let hint = "check who sent it; if it is right, add the tail to `logs.tails`";
@@ -431,7 +431,7 @@ fn map_actuators(
     config: &Config,
     installations: &Installations,
 ) -> Result<Vec<Mapped>, ingest::Error> {
-    let usual = config.mapping(&id.tail_number, None);
+    let usual = config.mapping(&id.flight.tail_number, None);
     let found = log.actuators(&usual.channels, id.position.as_ref());
     let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
     let mut failed = None;
@@ -440,14 +440,15 @@ fn map_actuators(
         Err(error) => failed = Some(error),
     }
     let installed: BTreeSet<&PartNumber> = installations
-        .units_on_tail(&id.tail_number, id.departure_utc)
+        .units_on_tail(&id.flight.tail_number, id.flight.departure_utc)
         .map(|installation| &installation.part_number)
         .collect();
     for part in installed.into_iter().filter(|part| config.has_overrides(part)) {
-        let mapping = config.mapping(&id.tail_number, Some(part));
+        let mapping = config.mapping(&id.flight.tail_number, Some(part));
         let Ok(found) = log.actuators(&mapping.channels, id.position.as_ref()) else { continue };
         let sits = |p: &ActuatorColumns| {
-            let installation = installations.installed_at(&id.tail_number, &p.position, id.departure_utc);
+            let installation =
+                installations.installed_at(&id.flight.tail_number, &p.position, id.flight.departure_utc);
             installation.is_some_and(|installation| installation.part_number == *part)
         };
         at.extend(found.into_iter().filter(sits).map(|p| (p.position.clone(), (p, Arc::clone(&mapping)))));
@@ -490,16 +491,6 @@ pub fn pieces_undeclared(
     )
 }
 
-fn flight_of(id: &Identity) -> Flight {
-    Flight {
-        tail_number: id.tail_number.clone(),
-        flight_id: id.flight_id.clone(),
-        departure_utc: id.departure_utc,
-        flight_hours: id.flight_hours,
-        tail_hours_end: id.tail_hours_end,
-    }
-}
-
 /// Runs work on one log; a panic becomes a diagnostic with its message and location.
 ///
 /// # Errors
@@ -526,11 +517,10 @@ mod tests {
     #[test]
     fn a_departure_more_than_a_day_after_the_clock_is_an_error() {
         let now: Timestamp = "2026-03-01T12:00:00Z".parse().unwrap();
-        let departure = |utc: &str| Identity {
+        let departure = |utc: &str| Flight {
             tail_number: TailNumber::new("N1").unwrap(),
             flight_id: FlightId::new("F1").unwrap(),
             departure_utc: utc.parse().unwrap(),
-            position: None,
             flight_hours: None,
             tail_hours_end: None,
         };

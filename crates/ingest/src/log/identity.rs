@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use jiff::tz::{AmbiguousOffset, TimeZone};
 use jiff::{SignedDuration, Timestamp, civil};
 use percent_encoding::percent_decode_str;
-use records::{FlightId, Position, TailNumber};
+use records::{Flight, FlightId, Position, TailNumber};
 
 use crate::error::ErrorKind;
 use crate::mapping::{IdentityField, IdentityMapping};
@@ -16,18 +16,10 @@ use crate::time::clock::{DAY_S, TimeOrigin};
 /// Identity of the flight of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
-    /// The aircraft.
-    pub tail_number: TailNumber,
     /// The flight.
-    pub flight_id: FlightId,
-    /// Departure, UTC.
-    pub departure_utc: Timestamp,
+    pub flight: Flight,
     /// Position of the only actuator in the log, where its columns do not name it.
     pub position: Option<Position>,
-    /// Length of the flight, hours.
-    pub flight_hours: Option<f64>,
-    /// The tail's total hours after the flight.
-    pub tail_hours_end: Option<f64>,
 }
 
 /// The stamps of a log, from the earliest to the latest.
@@ -211,17 +203,15 @@ pub(crate) fn read(
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
     let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, &"", &e);
-    Ok(Identity {
+    let flight = Flight {
         tail_number: TailNumber::new(tail).map_err(of(IdentityField::TailNumber))?,
         flight_id: FlightId::new(flight).map_err(of(IdentityField::FlightId))?,
         departure_utc,
-        position: text(IdentityField::Position)
-            .map(Position::new)
-            .transpose()
-            .map_err(of(IdentityField::Position))?,
         flight_hours: hours(IdentityField::FlightHours, text(IdentityField::FlightHours))?,
         tail_hours_end: hours(IdentityField::TailHoursEnd, text(IdentityField::TailHoursEnd))?,
-    })
+    };
+    let position = text(IdentityField::Position).map(Position::new).transpose();
+    Ok(Identity { flight, position: position.map_err(of(IdentityField::Position))? })
 }
 
 fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
@@ -346,10 +336,9 @@ mod tests {
             let facts = from_path(Path::new(path), expression).unwrap();
             let mapping = mapping(Some(format), Some("UTC"));
             let at = instant(&facts[&IdentityField::DepartureUtc], &mapping).unwrap();
-            let identity = read(&facts, &mapping, Some(at)).unwrap();
-            let found = [identity.tail_number.as_str(), identity.flight_id.as_str()];
-            assert_eq!(found, ["N412FP", flight]);
-            assert_eq!(identity.departure_utc.to_string(), departure);
+            let found = read(&facts, &mapping, Some(at)).unwrap().flight;
+            assert_eq!([found.tail_number.as_str(), found.flight_id.as_str()], ["N412FP", flight]);
+            assert_eq!(found.departure_utc.to_string(), departure);
         }
     }
 
@@ -396,7 +385,7 @@ mod tests {
         {
             let facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
             let found = read(&facts, &m, format!("{day}T23:59:00Z").parse().ok()).unwrap();
-            assert_eq!(found.tail_number.as_str(), tail, "{day}");
+            assert_eq!(found.flight.tail_number.as_str(), tail, "{day}");
         }
     }
 

@@ -137,12 +137,12 @@ pub fn write(
     let segments: Vec<String> = channels.segments.iter().map(|s| format!("{}..{}", s.start, s.end)).collect();
     let breaks: Vec<String> = channels.breaks.iter().map(|(row, s)| format!("{row}:{s}")).collect();
     let own = [
-        ("tail_number", identity.tail_number.to_string()),
-        ("flight_id", identity.flight_id.to_string()),
-        ("departure_utc", identity.departure_utc.to_string()),
+        ("tail_number", identity.flight.tail_number.to_string()),
+        ("flight_id", identity.flight.flight_id.to_string()),
+        ("departure_utc", identity.flight.departure_utc.to_string()),
         ("position", channels.position.to_string()),
-        ("flight_hours", number(identity.flight_hours)),
-        ("tail_hours_end", number(identity.tail_hours_end)),
+        ("flight_hours", number(identity.flight.flight_hours)),
+        ("tail_hours_end", number(identity.flight.tail_hours_end)),
         ("step_s", channels.step_s.to_string()),
         ("segments", segments.join(" ")),
         ("breaks", breaks.join(" ")),

@@ -120,7 +120,7 @@ fn hive_folders_say_which_flight_and_actuator_a_file_is() {
         let path =
             file(&format!("hive/tail=N1/off=2026-11-19T04%3A13%3A00Z/actuator={position}/part-0.parquet"));
         let identity = own_identity(&opened(&path, &m)).unwrap();
-        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
+        assert_eq!(identity.flight.departure_utc.to_string(), "2026-11-19T04:13:00Z");
         assert_eq!(identity.position, Some(Position::new(position).unwrap()));
         found.extend(actuators(&LogFiles::one(path), &m));
     }

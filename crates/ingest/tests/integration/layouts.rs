@@ -212,7 +212,7 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
         (IdentityField::FlightId, "flight".into()),
     ]);
     let found = |m: &Mapping| own_identity(&opened(&file, m)).unwrap();
-    assert_eq!(found(&m).tail_number.as_str(), "N2");
+    assert_eq!(found(&m).flight.tail_number.as_str(), "N2");
     m.identity.metadata = BTreeMap::from([
         (IdentityField::TailNumber, "PANDAS_ATTRS.reg".into()),
         (IdentityField::FlightHours, "fh".into()),
@@ -220,8 +220,8 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
     let offered = ingest::infer::propose(&file).unwrap().metadata;
     assert_eq!(offered[&IdentityField::TailNumber], "PANDAS_ATTRS.reg");
     let identity = found(&m);
-    assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), ("N3", "0413"));
-    assert_eq!(identity.flight_hours, Some(1.5));
+    assert_eq!((identity.flight.tail_number.as_str(), identity.flight.flight_id.as_str()), ("N3", "0413"));
+    assert_eq!(identity.flight.flight_hours, Some(1.5));
 }
 
 #[test]
@@ -329,7 +329,7 @@ pub(crate) fn identity(
 ) -> Result<String, records::Diagnostic> {
     let (_dir, file) = place(name);
     write(&file, columns);
-    own_identity(&opened(&file, m)).map(|identity| identity.departure_utc.to_string())
+    own_identity(&opened(&file, m)).map(|identity| identity.flight.departure_utc.to_string())
 }
 
 /// Istanbul is three hours ahead of UTC. The log begins at 23:59:50, and goes on after midnight.
@@ -371,7 +371,7 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
         let (_dir, file) = place("N1_x.parquet");
         write(&file, columns);
         let found = opened(&file, &m).identity(|_, _| row()).map_err(|e| e.diagnostic().message);
-        found.map(|identity| identity.departure_utc.to_string())
+        found.map(|identity| identity.flight.departure_utc.to_string())
     };
     assert_eq!(of_table("2026-11-06", &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
     assert!(of_table("2026-11-06", &[("t", instant(3))]).unwrap_err().contains("another day"));
@@ -491,7 +491,10 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
         for (path, (tail, leg, dx_mm, position)) in paths.iter().zip(flights) {
             let log = opened(path, &mapping);
             let identity = own_identity(&log).unwrap();
-            assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), (tail, leg));
+            assert_eq!(
+                (identity.flight.tail_number.as_str(), identity.flight.flight_id.as_str()),
+                (tail, leg)
+            );
             let found = log.actuators(&mapping.channels, None).unwrap();
             assert_eq!((found.len(), found[0].position.as_str()), (1, position));
             log.announce(&[(&mapping.channels, &found[0])]);

@@ -83,11 +83,12 @@ impl Normalization<'_> {
         let id = &opened.identity;
         let (installation, part) = opened.unit(at, self.config, self.installations)?;
         let channels = opened.channels(at, part)?;
-        let flight = format!("{}_{}", id.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight_id);
-        let names = [id.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
+        let flight =
+            format!("{}_{}", id.flight.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight.flight_id);
+        let names = [id.flight.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
         let file = self.folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
         self.claim(&file, opened)?;
-        let config_digest = self.config.digest(&id.tail_number, &installation.part_number);
+        let config_digest = self.config.digest(&id.flight.tail_number, &installation.part_number);
         let provenance = BTreeMap::from([
             ("source_log".to_owned(), opened.display_name().to_owned()),
             ("source_digest".to_owned(), opened.digest.clone()),

@@ -107,8 +107,8 @@ pub(super) fn actuator(
     let (installation, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: Option<&String>, unit: &'static str| ChannelCheck {
         log: name.to_owned(),
-        tail_number: id.tail_number.to_string(),
-        flight_id: id.flight_id.to_string(),
+        tail_number: id.flight.tail_number.to_string(),
+        flight_id: id.flight.flight_id.to_string(),
         position: at.position.to_string(),
         serial_number: Some(installation.serial_number.to_string()),
         channel,

@@ -154,11 +154,15 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
     let id = &opened.identity;
     let mut seen = LogCheck {
         name: name.to_owned(),
-        flight: [id.tail_number.to_string(), id.flight_id.to_string(), id.departure_utc.to_string()],
+        flight: [
+            id.flight.tail_number.to_string(),
+            id.flight.flight_id.to_string(),
+            id.flight.departure_utc.to_string(),
+        ],
         rows: opened.rows(),
         has_checksums: opened.is_checked().ok(),
         column_types: opened.column_types(),
-        departure_utc: id.departure_utc,
+        departure_utc: id.flight.departure_utc,
         positions: opened.actuators(installations).map(|at| at.position.clone()).collect(),
         digest: opened.digest.clone(),
         ..LogCheck::default()
