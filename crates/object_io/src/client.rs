@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::future::Future;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
+use std::time::Instant;
 
+use object_store::path::Path;
 use tokio::runtime::{Builder, Handle, Runtime};
 
 use crate::address::{Address, Client, Scheme};
@@ -49,5 +51,18 @@ impl Address {
         let built = cloud::client(self)?;
         clients.insert(name, Arc::clone(&built));
         Ok(built)
+    }
+
+    /// Asks the bucket about the object of this address.
+    ///
+    /// # Errors
+    /// As [`Address::client`] and [`Address::location`]; the error of the request.
+    pub async fn request<T>(
+        &self,
+        question: impl AsyncFnOnce(&Client, &Path) -> object_store::Result<T>,
+    ) -> Result<T, Error> {
+        let (client, location, clock) = (self.client()?, self.location()?, Instant::now());
+        let answer = question(&client, &location).await;
+        answer.map_err(|error| Error::of(self, clock.elapsed().as_secs_f64(), &error))
     }
 }

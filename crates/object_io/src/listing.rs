@@ -1,7 +1,6 @@
 //! Object listing, page by page, and metadata of one object.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use futures::StreamExt;
 use object_store::{ObjectMeta, ObjectStore, ObjectStoreExt};
@@ -47,15 +46,13 @@ pub fn list(folder: &Address, take: impl FnMut(ListEntry)) -> Result<(), Error> 
 /// # Errors
 /// As [`list`].
 pub fn list_first(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
-    let (client, location, clock) = (folder.client()?, folder.location()?, Instant::now());
-    block_on(async {
-        let mut found = client.list(Some(&location)).take(most);
+    block_on(folder.request(async |client, location| {
+        let mut found = client.list(Some(location)).take(most);
         while let Some(meta) = found.next().await {
-            let failed = |e| Error::of(folder, clock.elapsed().as_secs_f64(), &e);
-            take(ListEntry::of(folder, meta.map_err(failed)?));
+            take(ListEntry::of(folder, meta?));
         }
         Ok(())
-    })?
+    }))?
 }
 
 /// Metadata of one object.
@@ -64,7 +61,6 @@ pub fn list_first(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)
 /// [`Error::Missing`] when the object does not exist, else the error of the request.
 pub fn head(path: &Path) -> Result<ListEntry, Error> {
     let address = Address::parse_required(path)?;
-    let (client, location, clock) = (address.client()?, address.location()?, Instant::now());
-    let meta = block_on(client.head(&location))?;
-    Ok(ListEntry::of(&address, meta.map_err(|e| Error::of(&address, clock.elapsed().as_secs_f64(), &e))?))
+    let meta = block_on(address.request(async |client, location| client.head(location).await))??;
+    Ok(ListEntry::of(&address, meta))
 }

@@ -8,13 +8,12 @@ use std::iter::once;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use bytes::Bytes;
 use futures::{StreamExt, stream};
 use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt};
 
-use crate::address::{Address, Client};
+use crate::address::Address;
 use crate::byte_ranges::FetchedBlocks;
 use crate::client::block_on;
 use crate::error::Error;
@@ -26,7 +25,6 @@ const AT_ONCE: usize = 4;
 #[derive(Debug)]
 pub struct ObjectFile {
     address: Address,
-    client: Client,
     meta: ObjectMeta,
     file: File,
     had: Mutex<FetchedBlocks>,
@@ -39,12 +37,10 @@ impl ObjectFile {
     /// [`Error::Missing`], [`Error::Denied`], [`Error::Unreachable`]; [`Error::Spool`] when the
     /// temporary file cannot be created.
     pub fn open(address: &Address) -> Result<Self, Error> {
-        let (client, location, clock) = (address.client()?, address.location()?, Instant::now());
-        let meta = block_on(client.head(&location))?;
-        let meta = meta.map_err(|e| Error::of(address, clock.elapsed().as_secs_f64(), &e))?;
+        let meta = block_on(address.request(async |client, location| client.head(location).await))??;
         let file = tempfile::tempfile().map_err(|e| spool_error(address, e))?;
         file.set_len(meta.size).map_err(|e| spool_error(address, e))?;
-        Ok(Self { address: address.clone(), client, meta, file, had: Mutex::default() })
+        Ok(Self { address: address.clone(), meta, file, had: Mutex::default() })
     }
 
     /// The file: as long as the object, with content in the ranges that were [fetched](ObjectFile::ensure_range).
@@ -79,16 +75,18 @@ impl ObjectFile {
     }
 
     async fn fetch(&self, range: Range<u64>) -> Result<Bytes, Error> {
-        let clock = Instant::now();
         let options = GetOptions {
             if_match: self.meta.e_tag.clone(),
             range: Some(GetRange::Bounded(range.clone())),
             ..GetOptions::default()
         };
-        let failed = |e| Error::of(&self.address, clock.elapsed().as_secs_f64(), &e);
-        let answer = self.client.get_opts(&self.meta.location, options).await.map_err(failed)?;
-        let given = answer.range.clone();
-        let bytes = answer.bytes().await.map_err(failed)?;
+        let (given, bytes) = self
+            .address
+            .request(async |client, location| {
+                let answer = client.get_opts(location, options).await?;
+                Ok((answer.range.clone(), answer.bytes().await?))
+            })
+            .await?;
         if given == range {
             return Ok(bytes);
         }

@@ -41,24 +41,17 @@ pub struct Store {
 impl Store {
     pub(crate) fn at(location: Location) -> Self {
         let table = |name, schema| Table::new(&location, name, schema);
-        let gaps = table("gaps", GapRecord::schema());
-        let logs = table("logs", versioned::schema::<LogRecord>());
-        let runs = table("runs", versioned::schema::<RunRecord>());
-        let alerts = table("alerts", versioned::schema::<AlertRecord>());
-        let work = table("work", versioned::schema::<WorkEvent>());
-        let states = table("states", versioned::schema::<UnitState>());
-        let display_path = location.display_path(location.dir());
         Self {
-            gaps,
-            logs,
-            runs,
-            alerts,
-            work,
-            states,
+            gaps: table("gaps", GapRecord::schema()),
+            logs: table("logs", versioned::schema::<LogRecord>()),
+            runs: table("runs", versioned::schema::<RunRecord>()),
+            alerts: table("alerts", versioned::schema::<AlertRecord>()),
+            work: table("work", versioned::schema::<WorkEvent>()),
+            states: table("states", versioned::schema::<UnitState>()),
             join: None,
             parts_by_largest_gap: BTreeSet::new(),
             verified: Arc::default(),
-            display_path,
+            display_path: location.display_path(location.dir()),
             location,
         }
     }

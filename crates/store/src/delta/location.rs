@@ -142,7 +142,7 @@ impl Location {
                 Err(e) => Err(Error::io(path, "read")(e)),
             };
         };
-        match bucket.request(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
+        match bucket.request(&self.key(bucket, path), async |client, location| client.head(location).await) {
             Ok(meta) => Ok(Some(meta.size)),
             Err(object_io::Error::Missing { .. }) => Ok(None),
             Err(error) => Err(error.into()),
@@ -166,8 +166,8 @@ impl Location {
     /// Makes a file available under its local path: a file in a bucket is copied there.
     pub(crate) fn fetch(&self, path: &Path) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else { return Ok(()) };
-        let content = bucket.request(&self.key(bucket, path), async |location| {
-            bucket.client.get(location).await?.bytes().await
+        let content = bucket.request(&self.key(bucket, path), async |client, location| {
+            client.get(location).await?.bytes().await
         })?;
         let folder = path.parent().unwrap_or(&self.dir);
         let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(path, content));
@@ -200,8 +200,8 @@ impl Location {
         };
         let payload = PutPayload::from(content.to_vec());
         let options = PutOptions { mode, ..PutOptions::default() };
-        let put = bucket.request(&self.key(bucket, path), async |location| {
-            bucket.client.put_opts(location, payload, options).await
+        let put = bucket.request(&self.key(bucket, path), async |client, location| {
+            client.put_opts(location, payload, options).await
         });
         match put {
             Err(object_io::Error::Exists { .. }) => Ok(false),
@@ -213,7 +213,7 @@ impl Location {
     pub(crate) fn delete(&self, path: &Path) -> Result<(), Error> {
         match &self.bucket {
             Some(bucket) => Ok(bucket
-                .request(&self.key(bucket, path), async |location| bucket.client.delete(location).await)?),
+                .request(&self.key(bucket, path), async |client, location| client.delete(location).await)?),
             None => std::fs::remove_file(path).map_err(Error::io(path, "deleted")),
         }
     }
@@ -247,12 +247,9 @@ impl BucketLocation {
     fn request<T>(
         &self,
         key: &str,
-        question: impl AsyncFnOnce(&object_store::path::Path) -> object_store::Result<T>,
+        question: impl AsyncFnOnce(&Client, &object_store::path::Path) -> object_store::Result<T>,
     ) -> Result<T, object_io::Error> {
-        let address = self.address.with_key(key);
-        let (location, clock) = (address.location()?, std::time::Instant::now());
-        let answer = block_on(question(&location))?;
-        answer.map_err(|e| object_io::Error::of(&address, clock.elapsed().as_secs_f64(), &e))
+        block_on(self.address.with_key(key).request(question))?
     }
 }
 

@@ -13,15 +13,13 @@ use arrow::array::{
 };
 use arrow::compute::kernels::cmp::{gt_eq, lt_eq};
 use arrow::compute::{and, cast, nullif};
-use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowPredicate, ArrowPredicateFn, ArrowReaderMetadata, ArrowReaderOptions,
     ParquetRecordBatchReaderBuilder, RowFilter,
 };
-
-use records::row_schema::time_type;
 
 use crate::delta::data_file::GROUP_ROWS;
 use crate::delta::file_stats::Stats;
@@ -34,55 +32,39 @@ type Builder = ParquetRecordBatchReaderBuilder<File>;
 #[derive(Debug, Clone)]
 pub(crate) struct Condition {
     pub(crate) column: &'static str,
-    bounds: Bounds,
-}
-
-#[derive(Debug, Clone)]
-enum Bounds {
-    Texts(String, String),
-    /// µs since 1970 UTC.
-    Times(i64, i64),
+    /// The first and the last value: two texts, or two times in µs UTC.
+    bounds: ArrayRef,
 }
 
 impl Condition {
     /// Texts from `first` to `last`, byte by byte.
     pub(crate) fn texts(column: &'static str, first: &str, last: &str) -> Self {
-        Self { column, bounds: Bounds::Texts(first.to_owned(), last.to_owned()) }
+        Self { column, bounds: Arc::new(StringArray::from(vec![first, last])) }
     }
 
     /// Times in µs UTC.
     pub(crate) fn times(column: &'static str, first_us: i64, last_us: i64) -> Self {
-        Self { column, bounds: Bounds::Times(first_us, last_us) }
+        let bounds = TimestampMicrosecondArray::from(vec![first_us, last_us]).with_timezone("UTC");
+        Self { column, bounds: Arc::new(bounds) }
     }
 
     /// Whether a file may hold a matching row, by its statistics.
     pub(crate) fn may_be_in(&self, file: &Stats) -> bool {
-        match &self.bounds {
-            Bounds::Texts(first, last) => file.may_hold(self.column, first, last),
-            Bounds::Times(first, last) => {
-                let (earliest, latest) = file.times_us(self.column);
-                *first <= latest && earliest <= *last
-            }
+        if let Some(texts) = self.bounds.as_string_opt::<i32>() {
+            return file.may_hold(self.column, texts.value(0), texts.value(1));
         }
+        let times = self.bounds.as_primitive::<TimestampMicrosecondType>();
+        let (earliest, latest) = file.times_us(self.column);
+        times.value(0) <= latest && earliest <= times.value(1)
     }
 
     /// Mask of the matching values.
     pub(crate) fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
         // Another program may have given the values another form.
-        let (values, first, last): (_, ArrayRef, ArrayRef) = match &self.bounds {
-            Bounds::Texts(first, last) => {
-                let is_text = values.data_type() == &dictionary();
-                let values = if is_text { Arc::clone(values) } else { cast(values, &DataType::Utf8)? };
-                let [first, last] =
-                    [first, last].map(|text| Arc::new(StringArray::from(vec![text.as_str()])));
-                (values, first, last)
-            }
-            Bounds::Times(first, last) => {
-                let time = |us| TimestampMicrosecondArray::from(vec![us]).with_timezone("UTC");
-                (cast(values, &time_type())?, Arc::new(time(*first)), Arc::new(time(*last)))
-            }
-        };
-        and(&gt_eq(&values, &Scalar::new(first))?, &lt_eq(&values, &Scalar::new(last))?)
+        let is_coded = values.data_type() == &dictionary();
+        let values = if is_coded { Arc::clone(values) } else { cast(values, self.bounds.data_type())? };
+        let [first, last] = [0, 1].map(|at| Scalar::new(self.bounds.slice(at, 1)));
+        and(&gt_eq(&values, &first)?, &lt_eq(&values, &last)?)
     }
 
     /// The condition as a filter of rows while a file is decoded.
