@@ -30,5 +30,5 @@ pub use error::Error;
 pub use http_post::{Posted, check_url};
 pub use listing::{ListEntry, head, list, list_first};
 pub use local_file::{create_fresh, system_error};
-pub use object_file::{ObjectFile, read_all};
+pub use object_file::ObjectFile;
 pub use settings::{Settings, configure};

@@ -4,9 +4,7 @@
 //! fetched. It has no name and is deleted when the process ends. Readers must request a range before reading it.
 
 use std::fs::File;
-use std::iter::once;
 use std::ops::Range;
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use bytes::Bytes;
@@ -93,16 +91,6 @@ impl ObjectFile {
         let detail = format!("bytes {range:?} were requested, bytes {given:?} received");
         Err(Error::Unreachable { address: self.address.to_string(), tried_s: 0.0, detail })
     }
-}
-
-/// Fetches a whole object into an unnamed file, positioned at its start.
-///
-/// # Errors
-/// As [`ObjectFile::open`] and [`ObjectFile::ensure_range`].
-pub fn read_all(path: &Path) -> Result<File, Error> {
-    let object = ObjectFile::open(&Address::parse_required(path)?)?;
-    object.ensure_range(once(0..object.meta.size))?;
-    Ok(object.file)
 }
 
 fn spool_error(address: &Address, source: std::io::Error) -> Error {

@@ -5,6 +5,7 @@
 
 use std::fs::File;
 use std::io;
+use std::iter::once;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -39,9 +40,11 @@ impl ByteSource {
     }
 }
 
-/// A whole file, at its beginning: for tables, all of which is read.
-pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
-    if object_io::is_address(path) { Ok(object_io::read_all(path)?) } else { open_local(path) }
+/// A whole file: for tables, all of which is read.
+pub(crate) fn whole(path: &Path) -> Result<Arc<File>, ErrorKind> {
+    let source = ByteSource::open(path)?;
+    source.want(once(0..u64::MAX))?;
+    Ok(source.file)
 }
 
 /// Opens a regular file; opening a named pipe would wait for its writer for ever.

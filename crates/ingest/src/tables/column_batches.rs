@@ -260,7 +260,7 @@ fn parquet(
     let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
     let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
     let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
-    Ok((Arc::new(opened), footer, mask))
+    Ok((opened, footer, mask))
 }
 
 /// Rows of an open table, in batches.
@@ -293,7 +293,8 @@ fn groups(
 /// The rows of a CSV file, all of whose cells are text.
 fn csv(file: &Path) -> Result<Rows, ErrorKind> {
     let mut text = Vec::new();
-    let mut opened = whole(file)?;
+    let opened = whole(file)?;
+    let mut opened = opened.as_ref();
     transient::with_retry(|| {
         text.clear();
         opened.rewind()?;
