@@ -6,7 +6,10 @@
 pub enum Error {
     /// A number lies outside what the physics or the generator can use.
     #[error("`{key}` is {value}, which must be {must}")]
-    Value { key: String, value: f64, must: &'static str },
+    Value { key: String, value: f64, must: String },
+    /// The numbers of a specification cannot be listed.
+    #[error("the specification cannot be checked: {problem}")]
+    Unwritable { problem: String },
     /// A date is not written as year, month and day.
     #[error("`start_date` is \"{text}\", which must be a date such as \"2026-03-02\"")]
     Date { text: String },
@@ -31,31 +34,4 @@ pub enum Error {
     /// The plan has no flight of the requested index.
     #[error("flight {index} does not exist; the plan has {flights} flights, counted from 0")]
     NoSuchFlight { index: usize, flights: usize },
-}
-
-/// A number that must be finite and greater than zero.
-pub(crate) fn positive(key: &str, value: f64) -> Result<(), Error> {
-    check(key, value, value > 0.0, "greater than zero and finite")
-}
-
-/// A number that must be finite and not negative.
-pub(crate) fn not_negative(key: &str, value: f64) -> Result<(), Error> {
-    check(key, value, value >= 0.0, "zero or more and finite")
-}
-
-/// A number that must lie within bounds, both included.
-pub(crate) fn within(key: &str, value: f64, low: f64, high: f64, must: &'static str) -> Result<(), Error> {
-    check(key, value, (low..=high).contains(&value), must)
-}
-
-/// Any finite number.
-pub(crate) fn finite(key: &str, value: f64) -> Result<(), Error> {
-    check(key, value, true, "finite")
-}
-
-fn check(key: &str, value: f64, holds: bool, must: &'static str) -> Result<(), Error> {
-    if holds && value.is_finite() {
-        return Ok(());
-    }
-    Err(Error::Value { key: key.to_owned(), value, must })
 }

@@ -7,6 +7,7 @@ use crate::load::vibration::VibrationSource;
 use crate::plant::actuator_plant::Plant;
 use crate::plant::motor_controller::PositionLoop;
 use crate::plant::two_mass::{Forces, State, advance};
+use crate::ranges;
 use crate::sensors::channel_sampler::ChannelSampler;
 use crate::sensors::sensor::Sensors;
 
@@ -36,9 +37,7 @@ pub struct Flight {
 /// # Errors
 /// [`Error::Value`] for a parameter outside its range.
 pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> Result<Flight, Error> {
-    plant.check()?;
-    profile.check()?;
-    sensors.check()?;
+    check(plant, profile, sensors)?;
     let ([motor, screw, load], gap_m) = fly(plant, profile, sensors, seed);
     let rate_hz = profile.sample_rate_hz;
     Ok(Flight {
@@ -48,6 +47,16 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
         load_n: sensors.load.read_log(load, profile, seed, "load"),
         gap_m,
     })
+}
+
+/// Checks every parameter of a flight against its range.
+///
+/// # Errors
+/// [`Error::Value`] for a parameter outside its range.
+pub fn check(plant: &Plant, profile: &Profile, sensors: &Sensors) -> Result<(), Error> {
+    ranges::check("", plant)?;
+    ranges::check("profile", profile)?;
+    ranges::check("sensors", sensors)
 }
 
 /// Steps between two looks at what changes slowly in a plant: 10 ms.

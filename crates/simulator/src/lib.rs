@@ -17,6 +17,7 @@ mod fleet;
 mod flight;
 mod load;
 mod plant;
+mod ranges;
 mod seeded_streams;
 mod sensors;
 
@@ -27,11 +28,11 @@ pub use fleet::fleet_plan_types::{
     SimulatedFlight,
 };
 pub use fleet::fleet_spec::{
-    Aircraft, MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
+    MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
 };
 pub use fleet::planted_change::PlantedChange;
 pub use fleet::wear::WearLaw;
-pub use flight::{Flight, simulate};
+pub use flight::{Flight, check, simulate};
 pub use load::flight_profile::Profile;
 pub use load::turbulence::GustForm;
 pub use load::vibration::{Line, Vibration};

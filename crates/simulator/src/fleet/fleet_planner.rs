@@ -242,12 +242,6 @@ impl<'a> Planner<'a> {
         plant = plant.with_friction_factor((spread.friction * normal(&mut of_flight)).exp());
         let mut profile = spec.profile.clone();
         profile.load_n *= place.load_factor;
-        for aircraft in spec.aircraft.iter().filter(|aircraft| aircraft.tail == *tail) {
-            sensors.load.bias += aircraft.load_bias_n;
-            if let Some(buffet) = &aircraft.buffet {
-                profile.buffet = buffet.clone();
-            }
-        }
         let flight = ActuatorFlight {
             tail,
             position: &place.position,
@@ -255,7 +249,7 @@ impl<'a> Planner<'a> {
             serial_number: &unit.serial_number,
             number,
         };
-        spec.changes.iter().for_each(|change| change.apply(&flight, &mut plant, &mut sensors));
+        spec.all_changes().for_each(|change| change.apply(&flight, &mut plant, &mut profile, &mut sensors));
         profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
         PlannedActuator {
             position: place.position.clone(),

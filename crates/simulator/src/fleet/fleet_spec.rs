@@ -4,13 +4,13 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, finite, not_negative, positive, within};
+use crate::error::Error;
 use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
 use crate::fleet::planted_change::PlantedChange;
 use crate::fleet::wear::WearLaw;
 use crate::load::flight_profile::Profile;
-use crate::load::vibration::Vibration;
 use crate::plant::actuator_plant::Plant;
+use crate::ranges;
 use crate::sensors::sensor::Sensors;
 
 /// The fleet that made the sample data, as TOML text: three tails with four positions, twelve weeks of flights.
@@ -68,8 +68,8 @@ pub struct Spec {
     pub play_checks: Vec<PlayCheck>,
     /// Log files that do not arrive as recorded.
     pub log_faults: Vec<LogFault>,
-    /// Aircraft whose load cells or structure differ from the others'.
-    pub aircraft: Vec<Aircraft>,
+    /// Another name for `changes`, which are applied after these.
+    pub aircraft: Vec<PlantedChange>,
     /// Changes that come over the flights.
     pub changes: Vec<PlantedChange>,
 }
@@ -214,19 +214,6 @@ pub struct UnitSpec {
     pub wear: Option<WearLaw>,
 }
 
-/// What differs on all actuators of one tail.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Aircraft {
-    /// The tail.
-    pub tail: String,
-    /// Zero error of its load cells, N, added to the sensors' own. Default 0.
-    #[serde(default)]
-    pub load_bias_n: f64,
-    /// Vibration of its loads in place of the profile's. Default the profile's.
-    pub buffet: Option<Vibration>,
-}
-
 impl Spec {
     /// Midnight UTC that opens the plan, microseconds since 1970.
     pub(crate) fn start_us(&self) -> Result<i64, Error> {
@@ -246,20 +233,15 @@ impl Spec {
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.start_us()?;
         self.check_names()?;
-        self.check_flights()?;
-        self.profile.check()?;
-        self.sensors.check()?;
-        self.spread.check()?;
-        self.parts.iter().try_for_each(Part::check)?;
-        self.positions.iter().try_for_each(|place| self.check_position(place))?;
-        self.units.iter().try_for_each(|unit| self.check_unit(unit))?;
-        self.swaps.iter().try_for_each(|swap| self.check_swap(swap))?;
-        self.replacements.iter().try_for_each(|spare| self.check_replacement(spare))?;
-        self.reshims.iter().try_for_each(|shim| self.check_reshim(shim))?;
-        self.play_checks.iter().try_for_each(|check| self.check_play_check(check))?;
+        // Every seed is possible, but not every one is a number of TOML.
+        ranges::check("", &Self { seed: 0, ..self.clone() })?;
+        self.check_departures()?;
+        let mut positions = self.positions.iter();
+        positions.try_for_each(|place| self.part_index(&place.position, &place.part_number).map(drop))?;
+        self.units.iter().try_for_each(|unit| self.check_place("a unit", &unit.tail, &unit.position))?;
+        self.check_events()?;
         self.log_faults.iter().try_for_each(|fault| self.check_log_fault(fault))?;
-        self.aircraft.iter().try_for_each(|aircraft| self.check_aircraft(aircraft))?;
-        self.changes.iter().try_for_each(|change| self.check_change(change))
+        self.all_changes().try_for_each(|change| self.check_change(change))
     }
 
     fn check_names(&self) -> Result<(), Error> {
@@ -271,13 +253,8 @@ impl Spec {
         check_unique("positions", "position", &positions)
     }
 
-    fn check_flights(&self) -> Result<(), Error> {
-        positive("flights_per_tail", self.flights_per_tail as f64)?;
-        positive("flights_per_log", self.flights_per_log as f64)?;
-        positive("days_between_flights", self.days_between_flights)?;
-        positive("flight_hours", self.flight_hours)?;
-        within("flight_hours_spread", self.flight_hours_spread, 0.0, 0.9, "between 0 and 0.9")?;
-        not_negative("tail_hours", self.tail_hours)?;
+    /// The longest flight fits between two departures.
+    fn check_departures(&self) -> Result<(), Error> {
         let longest = self.flight_hours * (1.0 + self.flight_hours_spread);
         let day_hours =
             if self.days_between_flights >= 1.0 { 16.0 } else { 22.0 * self.days_between_flights };
@@ -287,67 +264,44 @@ impl Spec {
         Ok(())
     }
 
-    fn check_position(&self, place: &Position) -> Result<(), Error> {
-        not_negative(&format!("positions {} load_factor", place.position), place.load_factor)?;
-        self.part_index(&place.position, &place.part_number).map(|_| ())
-    }
-
-    fn check_unit(&self, unit: &UnitSpec) -> Result<(), Error> {
-        self.check_place("a unit", &unit.tail, &unit.position)?;
-        let key = |name: &str| format!("units {} {} {name}", unit.tail, unit.position);
-        not_negative(&key("gap_m"), unit.gap_m.unwrap_or(0.0))?;
-        not_negative(&key("unit_hours"), unit.unit_hours.unwrap_or(0.0))?;
-        positive(&key("stiffness_factor"), unit.stiffness_factor.unwrap_or(1.0))?;
-        unit.wear.map_or(Ok(()), |law| law.check())
-    }
-
-    fn check_swap(&self, swap: &Swap) -> Result<(), Error> {
-        self.check_before("a swap", swap.before_flight, &swap.from.tail, &swap.from.position)?;
-        self.check_place("a swap", &swap.to.tail, &swap.to.position)
-    }
-
-    fn check_replacement(&self, spare: &Replacement) -> Result<(), Error> {
-        let key = |name: &str| format!("replacements {} {name}", spare.serial_number);
-        not_negative(&key("gap_m"), spare.gap_m)?;
-        not_negative(&key("unit_hours"), spare.unit_hours)?;
-        spare.wear.map_or(Ok(()), |law| law.check())?;
-        self.check_before("a replacement", spare.before_flight, &spare.tail, &spare.position)
-    }
-
-    fn check_reshim(&self, shim: &Reshim) -> Result<(), Error> {
-        not_negative(&format!("reshims {} {} gap_m", shim.tail, shim.position), shim.gap_m)?;
-        self.check_before("a re-shim", shim.before_flight, &shim.tail, &shim.position)
-    }
-
-    fn check_play_check(&self, check: &PlayCheck) -> Result<(), Error> {
-        let key = |name: &str| format!("play_checks {} {} {name}", check.tail, check.position);
-        finite(&key("error_m"), check.error_m)?;
-        positive(&key("force_n"), check.force_n)?;
-        self.check_before("a play check", check.before_flight, &check.tail, &check.position)
+    /// Each event lies between two flights of a declared place.
+    fn check_events(&self) -> Result<(), Error> {
+        let swaps = self.swaps.iter().flat_map(|swap| {
+            [&swap.from, &swap.to].map(|of| ("a swap", swap.before_flight, &of.tail, &of.position))
+        });
+        let spares = self.replacements.iter();
+        let spares = spares.map(|of| ("a replacement", of.before_flight, &of.tail, &of.position));
+        let reshims = self.reshims.iter();
+        let reshims = reshims.map(|of| ("a re-shim", of.before_flight, &of.tail, &of.position));
+        let checks = self.play_checks.iter();
+        let checks = checks.map(|of| ("a play check", of.before_flight, &of.tail, &of.position));
+        swaps.chain(spares).chain(reshims).chain(checks).try_for_each(|(who, flight, tail, position)| {
+            if !(2..=self.flights_per_tail).contains(&flight) {
+                let must = "between 2 and `flights_per_tail`".to_owned();
+                return Err(Error::Value {
+                    key: format!("before_flight of {who}"),
+                    value: flight as f64,
+                    must,
+                });
+            }
+            self.check_place(who, tail, position)
+        })
     }
 
     fn check_log_fault(&self, fault: &LogFault) -> Result<(), Error> {
-        let logs = self.flights_per_tail.div_ceil(self.flights_per_log) as f64;
-        within("log_faults log", fault.log as f64, 1.0, logs, "between 1 and the number of the tail's logs")?;
+        if !(1..=self.flights_per_tail.div_ceil(self.flights_per_log)).contains(&fault.log) {
+            let must = "between 1 and the number of the tail's logs".to_owned();
+            return Err(Error::Value { key: "log_faults log".to_owned(), value: fault.log as f64, must });
+        }
         self.check_tail("a log fault", &fault.tail)
     }
 
-    /// An event lies between two flights of a declared place.
-    fn check_before(&self, who: &str, flight: usize, tail: &str, position: &str) -> Result<(), Error> {
-        let (last, must) = (self.flights_per_tail as f64, "between 2 and `flights_per_tail`");
-        within(&format!("before_flight of {who}"), flight as f64, 2.0, last, must)?;
-        self.check_place(who, tail, position)
-    }
-
-    fn check_aircraft(&self, aircraft: &Aircraft) -> Result<(), Error> {
-        let tail = &aircraft.tail;
-        self.check_tail("an aircraft", tail)?;
-        finite(&format!("aircraft {tail} load_bias_n"), aircraft.load_bias_n)?;
-        aircraft.buffet.as_ref().map_or(Ok(()), |buffet| buffet.check(&format!("aircraft {tail} buffet")))
+    /// The changes of `aircraft`, then those of `changes`.
+    pub(crate) fn all_changes(&self) -> impl Iterator<Item = &PlantedChange> {
+        self.aircraft.iter().chain(&self.changes)
     }
 
     fn check_change(&self, change: &PlantedChange) -> Result<(), Error> {
-        change.check()?;
         let tail = change.tail.as_deref().unwrap_or(&self.tails[0]);
         let position = change.position.as_deref().unwrap_or(&self.positions[0].position);
         self.check_place("a change", tail, position)?;
@@ -369,36 +323,6 @@ impl Spec {
             return Err(unknown(who, "position", position, &mut positions));
         }
         Ok(())
-    }
-}
-
-impl ParameterSpread {
-    fn check(&self) -> Result<(), Error> {
-        within("spread.stiffness", self.stiffness, 0.0, 0.3, "between 0 and 0.3")?;
-        finite("spread.offset_m", self.offset_m)?;
-        within("spread.load_gain", self.load_gain, 0.0, 0.1, "between 0 and 0.1")?;
-        not_negative("spread.load_bias_n", self.load_bias_n)?;
-        not_negative("spread.nonlinearity_m", self.nonlinearity_m)?;
-        within("spread.skew_s", self.skew_s, 0.0, 0.05, "between 0 and 0.05 s")?;
-        not_negative("spread.drift_m", self.drift_m)?;
-        within("spread.friction", self.friction, 0.0, 1.0, "between 0 and 1")?;
-        within("spread.no_reversal_share", self.no_reversal_share, 0.0, 1.0, "between 0 and 1")
-    }
-}
-
-impl Part {
-    fn check(&self) -> Result<(), Error> {
-        let key = |name: &str| format!("parts {} {name}", self.part_number);
-        positive(&key("lead_m"), self.lead_m)?;
-        positive(&key("reference_radius_m"), self.reference_radius_m.unwrap_or(1.0))?;
-        positive(&key("limit_m"), self.limit_m)?;
-        for (name, [least, greatest]) in [("gap_m", self.gap_m), ("unit_hours", self.unit_hours)] {
-            not_negative(&key(name), least)?;
-            within(&key(name), greatest, least, f64::MAX, "a range, the least value first")?;
-        }
-        self.wear.check()?;
-        not_negative(&key("wear_scatter_m"), self.wear_scatter_m)?;
-        self.plant.check()
     }
 }
 

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, finite, positive, within};
+use crate::load::flight_profile::Profile;
+use crate::load::vibration::Vibration;
 use crate::plant::actuator_plant::Plant;
 use crate::sensors::sensor::Sensors;
 
@@ -38,6 +39,8 @@ pub struct PlantedChange {
     pub skew_s: f64,
     /// Added to the delay of the load channel, seconds. Default 0.
     pub load_delay_s: f64,
+    /// Vibration of the load in place of the profile's. Default the profile's.
+    pub buffet: Option<Vibration>,
 }
 
 /// One actuator of one flight.
@@ -51,21 +54,14 @@ pub(crate) struct ActuatorFlight<'a> {
 }
 
 impl PlantedChange {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let from = self.from_flight as f64;
-        within("changes from_flight", from, 1.0, f64::MAX, "a flight, counted from 1")?;
-        let to = self.to_flight.map_or(from, |to| to as f64);
-        within("changes to_flight", to, from, f64::MAX, "no flight before `from_flight`")?;
-        positive("changes stiffness_factor", self.stiffness_factor)?;
-        positive("changes friction_factor", self.friction_factor)?;
-        finite("changes load_gain", self.load_gain)?;
-        finite("changes load_bias_n", self.load_bias_n)?;
-        finite("changes skew_s", self.skew_s)?;
-        finite("changes load_delay_s", self.load_delay_s)
-    }
-
     /// Applies the change as far as it has come in a flight.
-    pub(crate) fn apply(&self, flight: &ActuatorFlight<'_>, plant: &mut Plant, sensors: &mut Sensors) {
+    pub(crate) fn apply(
+        &self,
+        flight: &ActuatorFlight<'_>,
+        plant: &mut Plant,
+        profile: &mut Profile,
+        sensors: &mut Sensors,
+    ) {
         let share = self.share(flight);
         if share == 0.0 {
             return;
@@ -76,6 +72,9 @@ impl PlantedChange {
         sensors.load.bias += share * self.load_bias_n;
         sensors.screw.delay_s += share * self.skew_s;
         sensors.load.delay_s += share * self.load_delay_s;
+        if let Some(buffet) = &self.buffet {
+            profile.buffet = buffet.clone();
+        }
     }
 
     /// How much of the change a flight shows, 0 to 1.

@@ -4,8 +4,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Gamma};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, not_negative, positive};
-
 /// The mean growth of a gap since the unit was new.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -55,26 +53,6 @@ impl WearLaw {
             Self::Exponential { amplitude_m, life_hours } => amplitude_m * (unit_hours / life_hours).exp_m1(),
             Self::Onset { onset_hours, rate_m_per_hour } => {
                 rate_m_per_hour * (unit_hours - onset_hours).max(0.0)
-            }
-        }
-    }
-
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        match *self {
-            Self::Steady => Ok(()),
-            Self::Linear { rate_m_per_hour } => not_negative("wear.linear.rate_m_per_hour", rate_m_per_hour),
-            Self::Power { amplitude_m, life_hours, exponent } => {
-                not_negative("wear.power.amplitude_m", amplitude_m)?;
-                positive("wear.power.life_hours", life_hours)?;
-                positive("wear.power.exponent", exponent)
-            }
-            Self::Exponential { amplitude_m, life_hours } => {
-                not_negative("wear.exponential.amplitude_m", amplitude_m)?;
-                positive("wear.exponential.life_hours", life_hours)
-            }
-            Self::Onset { onset_hours, rate_m_per_hour } => {
-                not_negative("wear.onset.onset_hours", onset_hours)?;
-                not_negative("wear.onset.rate_m_per_hour", rate_m_per_hour)
             }
         }
     }

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, not_negative, positive, within};
 use crate::load::turbulence::GustForm;
 use crate::load::vibration::Vibration;
 
@@ -67,25 +66,5 @@ impl Profile {
     /// Whether the load touches one flank only, so that the gap cannot be seen.
     pub fn is_one_sided(&self) -> bool {
         self.no_reversal || self.reversals == Some(0)
-    }
-
-    /// Checks every parameter against its range.
-    ///
-    /// # Errors
-    /// [`Error::Value`] for the first parameter outside its range.
-    pub fn check(&self) -> Result<(), Error> {
-        within("profile.duration_s", self.duration_s, 5.0, 20e3, "between 5 and 20000 s")?;
-        within("profile.sample_rate_hz", self.sample_rate_hz, 10.0, 5e3, "between 10 and 5000 Hz")?;
-        not_negative("profile.load_n", self.load_n)?;
-        positive("profile.stroke_m", self.stroke_m)?;
-        within("profile.gust_share", self.gust_share, 0.0, 2.0, "between 0 and 2")?;
-        within("profile.gust_hz", self.gust_hz, 0.01, 20.0, "between 0.01 and 20 Hz")?;
-        within("profile.trim_share", self.trim_share, 0.0, 0.2, "between 0 and 0.2")?;
-        within("profile.stick_share", self.stick_share, 0.0, 0.5, "between 0 and 0.5")?;
-        within("profile.hinge_share", self.hinge_share, 0.0, 0.4, "between 0 and 0.4")?;
-        self.buffet.check("profile.buffet")?;
-        self.motor_vibration.check("profile.motor_vibration")?;
-        within("profile.rest_share", self.rest_share, 0.0, 0.9, "between 0 and 0.9")?;
-        within("profile.rest_s", self.rest_s, 1.0, 1e3, "between 1 and 1000 s")
     }
 }

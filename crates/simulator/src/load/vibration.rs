@@ -8,7 +8,6 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, not_negative, within};
 use crate::load::shaping_filter::ShapedNoise;
 use crate::seeded_streams::seeded_rng;
 
@@ -51,20 +50,6 @@ impl Vibration {
     /// Whether there is none.
     pub fn is_silent(&self) -> bool {
         self.rms == 0.0 && self.lines.iter().all(|line| line.amplitude == 0.0)
-    }
-
-    pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
-        let named = |name: &str| format!("{key}.{name}");
-        let range = "between 0.5 and 500 Hz, the lower edge first";
-        within(&named("low_hz"), self.low_hz, 0.5, 500.0, range)?;
-        within(&named("high_hz"), self.high_hz, self.low_hz, 500.0, range)?;
-        not_negative(&named("rms"), self.rms)?;
-        for line in &self.lines {
-            within(&named("lines.frequency_hz"), line.frequency_hz, 0.5, 500.0, "between 0.5 and 500 Hz")?;
-            not_negative(&named("lines.amplitude"), line.amplitude)?;
-            not_negative(&named("lines.phase_walk_rad"), line.phase_walk_rad)?;
-        }
-        Ok(())
     }
 }
 

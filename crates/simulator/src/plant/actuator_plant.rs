@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, positive};
 use crate::plant::backlash_contact::Contact;
 use crate::plant::friction::{Friction, FrictionLaw};
 use crate::plant::motor_controller::Drive;
@@ -62,19 +61,5 @@ impl Plant {
             screw_friction: self.screw_friction.at(time_s),
             ..*self
         }
-    }
-
-    /// Checks every parameter against its range.
-    ///
-    /// # Errors
-    /// [`Error::Value`] for the first parameter outside its range.
-    pub fn check(&self) -> Result<(), Error> {
-        positive("motor_mass_kg", self.motor_mass_kg)?;
-        positive("screw_mass_kg", self.screw_mass_kg)?;
-        self.contact.check()?;
-        self.motor_friction.check("motor_friction")?;
-        self.screw_friction.check("screw_friction")?;
-        self.friction_law.check()?;
-        self.drive.check()
     }
 }

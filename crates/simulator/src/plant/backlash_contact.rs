@@ -8,7 +8,6 @@
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, not_negative, positive, within};
 use crate::load::flight_commands::phase_factor;
 
 /// Below this change of the penetration the divided difference of V loses digits, and the force at mid-step serves.
@@ -45,16 +44,6 @@ pub enum ContactLaw {
 }
 
 impl ContactLaw {
-    pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
-        let (share, length_m) = match *self {
-            Self::Linear => return Ok(()),
-            Self::Soft { share, depth_m } | Self::Toe { share, depth_m } => (share, depth_m),
-            Self::Hertz { share, reference_m } => (share, reference_m),
-        };
-        within(&format!("{key}.share"), share, 0.0, 1.0, "between 0 and 1")?;
-        positive(&format!("{key} length"), length_m)
-    }
-
     /// V(p) / K, m².
     fn potential_m2(&self, p: f64) -> f64 {
         match *self {
@@ -163,24 +152,6 @@ pub(crate) struct MeanForce {
 }
 
 impl Contact {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        positive("contact.stiffness_n_per_m", self.stiffness_n_per_m)?;
-        not_negative("contact.damping_n_s_per_m", self.damping_n_s_per_m)?;
-        crate::error::finite("contact.gap_m", self.gap_m)?;
-        not_negative("contact.worn_m", self.worn_m)?;
-        crate::error::finite("contact.worn_at_m", self.worn_at_m[0])?;
-        positive("contact.worn_at_m", self.worn_at_m[1])?;
-        crate::error::finite("contact.offset_m", self.offset_m)?;
-        self.law.check("contact.law")?;
-        self.lower_law.map_or(Ok(()), |law| law.check("contact.lower_law"))?;
-        let factor = |key, value| within(key, value, 0.2, 5.0, "between 0.2 and 5");
-        factor("contact.lower_stiffness_factor", self.lower_stiffness_factor)?;
-        within("contact.stiffness_drift", self.stiffness_drift, -0.5, 1.0, "between -0.5 and 1")?;
-        within("contact.gap_drift", self.gap_drift, -1.0, 10.0, "between -1 and 10")?;
-        let mut factors = self.stiffness_phase_factors.into_iter();
-        factors.try_for_each(|value| factor("contact.stiffness_phase_factors", value))
-    }
-
     /// The coupling at a share of the log, with the stiffness and the gap it has by then.
     #[must_use]
     pub(crate) fn at(&self, progress: f64) -> Self {

@@ -9,8 +9,6 @@
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, not_negative, positive, within};
-
 /// The parameters of equation 1 for one mass, and what departs from it. Without any key there is no friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
@@ -61,19 +59,6 @@ impl Friction {
         let backdriven_load_share = self.backdriven_load_share.map(|share| share * factor);
         let (dry_n, load_share) = (self.dry_n * factor, self.load_share * factor);
         Self { dry_n, load_share, backdriven_load_share, ..self }
-    }
-
-    pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
-        let share = |name: &str, value| within(&format!("{key}.{name}"), value, 0.0, 1.0, "between 0 and 1");
-        not_negative(&format!("{key}.dry_n"), self.dry_n)?;
-        share("load_share", self.load_share)?;
-        share("backdriven_load_share", self.backdriven_load_share.unwrap_or(0.0))?;
-        not_negative(&format!("{key}.viscous_n_s_per_m"), self.viscous_n_s_per_m)?;
-        within(&format!("{key}.asymmetry"), self.asymmetry, -0.9, 0.9, "between -0.9 and 0.9")?;
-        not_negative(&format!("{key}.grease_n"), self.grease_n)?;
-        positive(&format!("{key}.grease_m_per_s"), self.grease_m_per_s)?;
-        within(&format!("{key}.cold_factor"), self.cold_factor, 0.1, 100.0, "between 0.1 and 100")?;
-        positive(&format!("{key}.warm_up_s"), self.warm_up_s)
     }
 
     /// Whether drag changes during a log.
@@ -145,22 +130,6 @@ pub enum FrictionLaw {
 }
 
 impl FrictionLaw {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let law = match self {
-            Self::Coulomb => return Ok(()),
-            Self::Stribeck { .. } => "stribeck",
-            Self::Presliding { .. } => "presliding",
-            Self::LuGre { .. } => "lu_gre",
-        };
-        let key = |name: &str| format!("friction_law.{law}.{name}");
-        let (ratio, speed_m_per_s, bristle) = self.parameters();
-        let (travel_m, damping_n_s_per_m) = bristle.unwrap_or((1.0, 0.0));
-        positive(&key("travel_m"), travel_m)?;
-        within(&key("ratio"), ratio, 1.0, 10.0, "between 1 and 10")?;
-        positive(&key("speed_m_per_s"), speed_m_per_s)?;
-        not_negative(&key("damping_n_s_per_m"), damping_n_s_per_m)
-    }
-
     /// The law as `LuGre`'s parameters: break-away ratio, Stribeck speed, and the bristles' travel and damping, if any.
     fn parameters(&self) -> (f64, f64, Option<(f64, f64)>) {
         match *self {

@@ -5,8 +5,6 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, positive};
-
 /// The loop's bandwidths and limits, all at the screw.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
@@ -23,15 +21,6 @@ pub struct Drive {
     /// Greatest commanded speed, m/s. Default 0.15.
     #[default(0.15)]
     pub speed_limit_m_per_s: f64,
-}
-
-impl Drive {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        positive("drive.position_hz", self.position_hz)?;
-        positive("drive.speed_hz", self.speed_hz)?;
-        positive("drive.force_limit_n", self.force_limit_n)?;
-        positive("drive.speed_limit_m_per_s", self.speed_limit_m_per_s)
-    }
 }
 
 /// The state of a drive: its gains for one moved mass, and its integrator.

@@ -12,7 +12,6 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-use crate::error::{Error, finite, not_negative, positive, within};
 use crate::load::flight_profile::Profile;
 use crate::seeded_streams::seeded_rng;
 
@@ -37,12 +36,6 @@ impl PeriodicError {
             return 0.0;
         }
         self.amplitude * (TAU * position / self.period + self.phase_rad).sin()
-    }
-
-    fn check(&self, key: &str) -> Result<(), Error> {
-        finite(&format!("{key}.amplitude"), self.amplitude)?;
-        positive(&format!("{key}.period"), self.period)?;
-        finite(&format!("{key}.phase_rad"), self.phase_rad)
     }
 }
 
@@ -125,30 +118,6 @@ fn nonlinearity_at(value: f64, profile: &Profile, name: &str) -> f64 {
 const BURST: f64 = 5.0;
 
 impl Channel {
-    pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
-        let named = |name: &str| format!("sensors.{key}.{name}");
-        not_negative(&named("noise_rms"), self.noise_rms)?;
-        not_negative(&named("resolution"), self.resolution)?;
-        within(&named("gain_error"), self.gain_error, -0.5, 0.5, "between -0.5 and 0.5")?;
-        finite(&named("bias"), self.bias)?;
-        finite(&named("drift"), self.drift)?;
-        finite(&named("nonlinearity"), self.nonlinearity)?;
-        within(&named("delay_s"), self.delay_s, -0.5, 0.5, "between -0.5 and 0.5 s")?;
-        within(&named("dropout_share"), self.dropout_share, 0.0, 0.5, "between 0 and 0.5")?;
-        not_negative(&named("spikes_per_minute"), self.spikes_per_minute)?;
-        finite(&named("spike"), self.spike)?;
-        not_negative(&named("freezes_per_minute"), self.freezes_per_minute)?;
-        not_negative(&named("freeze_s"), self.freeze_s)?;
-        not_negative(&named("hysteresis"), self.hysteresis)?;
-        positive(&named("hysteresis_length"), self.hysteresis_length)?;
-        not_negative(&named("clip"), self.clip)?;
-        within(&named("lag_s"), self.lag_s, 0.0, 1.0, "between 0 and 1 s")?;
-        within(&named("rate_hz"), self.rate_hz, 0.0, 5e3, "between 0 and 5000 Hz")?;
-        self.periodic.iter().try_for_each(|error| error.check(&named("periodic")))?;
-        not_negative(&named("coloured_rms"), self.coloured_rms)?;
-        within(&named("coloured_hz"), self.coloured_hz, 1e-3, 1e3, "between 0.001 and 1000 Hz")
-    }
-
     /// The rate at which the channel itself is sampled, within a log of the given rate.
     pub(crate) fn own_rate_hz(&self, log_rate_hz: f64) -> f64 {
         if self.rate_hz > 0.0 { self.rate_hz.min(log_rate_hz) } else { log_rate_hz }
@@ -330,18 +299,6 @@ impl Sensors {
     /// τ in `screw_logged(t) = X_screw(t − τ)`, against the motor channel, seconds: delays and lags.
     pub fn skew_s(&self) -> f64 {
         (self.screw.delay_s + self.screw.lag_s) - (self.motor.delay_s + self.motor.lag_s)
-    }
-
-    /// Checks every parameter against its range.
-    ///
-    /// # Errors
-    /// [`Error::Value`] for the first parameter outside its range.
-    pub fn check(&self) -> Result<(), Error> {
-        self.motor.check("motor")?;
-        self.screw.check("screw")?;
-        self.load.check("load")?;
-        not_negative("sensors.clock.jitter_s", self.clock.jitter_s)?;
-        not_negative("sensors.clock.tick_s", self.clock.tick_s)
     }
 }
 

@@ -116,7 +116,12 @@ fn one_aircraft_may_have_load_cells_and_buffet_of_its_own() {
     spec.sensors = simulator::Sensors::perfect();
     let plain = Plan::new(&spec).unwrap();
     let buffet = |rms| Some(simulator::Vibration { low_hz: 5.0, high_hz: 20.0, rms, ..Default::default() });
-    let with = |rms| simulator::Aircraft { tail: "B".to_owned(), load_bias_n: 400.0, buffet: buffet(rms) };
+    let with = |rms| PlantedChange {
+        tail: Some("B".to_owned()),
+        load_bias_n: 400.0,
+        buffet: buffet(rms),
+        ..PlantedChange::default()
+    };
     let flown = |rms, index: usize| {
         let spec = Spec { aircraft: vec![with(rms)], ..spec.clone() };
         let load = Plan::new(&spec).unwrap().simulate_flight(index).unwrap().actuators[0].load.clone();
@@ -128,9 +133,9 @@ fn one_aircraft_may_have_load_cells_and_buffet_of_its_own() {
     let shaken = flown(0.05, 1);
     let rms_n = (shaken.iter().map(|n| (n - 400.0).powi(2)).sum::<f64>() / shaken.len() as f64).sqrt();
     assert!((rms_n / (0.05 * spec.profile.load_n) - 1.0).abs() < 0.15, "{rms_n}");
-    spec.aircraft = vec![simulator::Aircraft { tail: "C".to_owned(), ..with(0.0) }];
+    spec.aircraft = vec![PlantedChange { tail: Some("C".to_owned()), ..with(0.0) }];
     let unknown = Plan::new(&spec).unwrap_err().to_string();
-    assert_eq!(unknown, "an aircraft names tail \"C\", which is not declared; declared are: A, B");
+    assert_eq!(unknown, "a change names tail \"C\", which is not declared; declared are: A, B");
 }
 
 #[test]

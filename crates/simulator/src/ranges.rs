@@ -1,0 +1,209 @@
+//! Ranges of the numbers of a specification: one table for all keys.
+
+use serde::Serialize;
+use toml::Value;
+
+use crate::error::Error;
+
+/// Keys whose numbers are above zero, by the ends of their paths.
+const POSITIVE: &str = "\
+    flights_per_tail flights_per_log days_between_flights flight_hours from_flight stroke_m \
+    hysteresis_length periodic.period lead_m reference_radius_m limit_m life_hours exponent stiffness_factor \
+    friction_factor force_n motor_mass_kg screw_mass_kg stiffness_n_per_m worn_at_m[1] depth_m \
+    reference_m grease_m_per_s warm_up_s travel_m speed_m_per_s position_hz speed_hz force_limit_n \
+    speed_limit_m_per_s";
+
+/// Keys whose numbers are zero or more.
+const NOT_NEGATIVE: &str = "\
+    tail_hours load_n rms lines.amplitude lines.phase_walk_rad noise_rms resolution spikes_per_minute \
+    freezes_per_minute freeze_s hysteresis clip coloured_rms jitter_s tick_s spread.load_bias_n \
+    spread.nonlinearity_m spread.drift_m wear_scatter_m rate_m_per_hour amplitude_m onset_hours \
+    load_factor unit_hours damping_n_s_per_m parts.gap_m units.gap_m \
+    replacements.gap_m reshims.gap_m worn_m dry_n viscous_n_s_per_m grease_n";
+
+/// Least and largest value of other keys. A number of no list must be finite.
+const RANGES: &[(&str, f64, f64)] = &[
+    ("flight_hours_spread", 0.0, 0.9),
+    ("duration_s", 5.0, 20e3),
+    ("sample_rate_hz", 10.0, 5e3),
+    ("gust_share", 0.0, 2.0),
+    ("gust_hz", 0.01, 20.0),
+    ("trim_share", 0.0, 0.2),
+    ("stick_share", 0.0, 0.5),
+    ("hinge_share", 0.0, 0.4),
+    ("rest_share", 0.0, 0.9),
+    ("rest_s", 1.0, 1e3),
+    ("low_hz", 0.5, 500.0),
+    ("high_hz", 0.5, 500.0),
+    ("lines.frequency_hz", 0.5, 500.0),
+    ("gain_error", -0.5, 0.5),
+    ("delay_s", -0.5, 0.5),
+    ("dropout_share", 0.0, 0.5),
+    ("lag_s", 0.0, 1.0),
+    ("rate_hz", 0.0, 5e3),
+    ("coloured_hz", 1e-3, 1e3),
+    ("spread.stiffness", 0.0, 0.3),
+    ("spread.load_gain", 0.0, 0.1),
+    ("spread.skew_s", 0.0, 0.05),
+    ("spread.friction", 0.0, 1.0),
+    ("spread.no_reversal_share", 0.0, 1.0),
+    ("share", 0.0, 1.0),
+    ("lower_stiffness_factor", 0.2, 5.0),
+    ("stiffness_drift", -0.5, 1.0),
+    ("gap_drift", -1.0, 10.0),
+    ("stiffness_phase_factors", 0.2, 5.0),
+    ("load_share", 0.0, 1.0),
+    ("backdriven_load_share", 0.0, 1.0),
+    ("asymmetry", -0.9, 0.9),
+    ("cold_factor", 0.1, 100.0),
+    ("ratio", 1.0, 10.0),
+];
+
+/// Keys of one table of which the second is not below the first.
+const ORDERED: [(&str, &str); 2] = [("low_hz", "high_hz"), ("from_flight", "to_flight")];
+
+/// Lists of a least and a greatest value.
+const RANGE_LISTS: [&str; 2] = ["gap_m", "unit_hours"];
+
+/// Checks every number of a value; `path` is the key that holds it.
+pub(crate) fn check(path: &str, checked: &impl Serialize) -> Result<(), Error> {
+    let tree = Value::try_from(checked).map_err(|e| Error::Unwritable { problem: e.to_string() })?;
+    check_value(path, &tree)
+}
+
+fn check_value(path: &str, value: &Value) -> Result<(), Error> {
+    match value {
+        Value::Float(number) => check_number(path, *number),
+        Value::Integer(number) => check_number(path, *number as f64),
+        Value::Array(values) => {
+            let place = |k: usize| format!("{path}[{k}]");
+            values.iter().enumerate().try_for_each(|(k, value)| check_value(&place(k), value))?;
+            if RANGE_LISTS.iter().any(|key| ends_with(path, key)) {
+                let [least, greatest] = [0, 1].map(|k| values.get(k).and_then(Value::as_float));
+                check_order(path, least, greatest, "a range, the least value first")?;
+            }
+            Ok(())
+        }
+        Value::Table(table) => {
+            let place = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+            table.iter().try_for_each(|(key, value)| check_value(&place(key), value))?;
+            let number =
+                |key: &str| table.get(key).and_then(|v| v.as_float().or(Some(v.as_integer()? as f64)));
+            ORDERED.iter().try_for_each(|(low, high)| {
+                check_order(&place(high), number(low), number(high), &format!("no less than `{low}`"))
+            })
+        }
+        Value::String(_) | Value::Boolean(_) | Value::Datetime(_) => Ok(()),
+    }
+}
+
+fn check_number(path: &str, value: f64) -> Result<(), Error> {
+    // Without the places in lists.
+    let names: String = path.split(['[', ']']).step_by(2).collect();
+    let is = |key: &str| ends_with(path, key) || ends_with(&names, key);
+    let (is_in_range, must) = if let Some((_, least, most)) = RANGES.iter().find(|(key, ..)| is(key)) {
+        ((*least..=*most).contains(&value), format!("between {least} and {most}"))
+    } else if POSITIVE.split(' ').any(is) {
+        (value > 0.0, "greater than zero and finite".to_owned())
+    } else if NOT_NEGATIVE.split(' ').any(is) {
+        (value >= 0.0, "zero or more and finite".to_owned())
+    } else {
+        (true, "finite".to_owned())
+    };
+    if is_in_range && value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Value { key: path.to_owned(), value, must })
+}
+
+fn check_order(path: &str, low: Option<f64>, high: Option<f64>, must: &str) -> Result<(), Error> {
+    match low.zip(high).filter(|(low, high)| low > high) {
+        Some((_, value)) => Err(Error::Value { key: path.to_owned(), value, must: must.to_owned() }),
+        None => Ok(()),
+    }
+}
+
+/// Whether a path ends with the names of a key.
+fn ends_with(path: &str, key: &str) -> bool {
+    path.strip_suffix(key).is_some_and(|above| above.is_empty() || above.ends_with('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::Spec;
+
+    /// Paths of all numbers, without the places in lists.
+    fn paths(above: &str, value: &Value, found: &mut BTreeSet<String>) {
+        match value {
+            Value::Table(table) => table.iter().for_each(|(k, v)| paths(&format!("{above}.{k}"), v, found)),
+            Value::Array(values) => values.iter().for_each(|value| paths(above, value, found)),
+            _ => drop(found.insert(above.to_owned())),
+        }
+    }
+
+    /// A renamed key must not lose its range.
+    #[test]
+    fn every_range_is_that_of_a_key() {
+        let rest = r#"
+            [[units]]
+            tail = "A"
+            position = "P"
+            stiffness_factor = 1.0
+            wear = { onset = { onset_hours = 1.0, rate_m_per_hour = 0.0 } }
+            [[parts]]
+            part_number = "R"
+            reference_radius_m = 0.1
+            wear = { power = { amplitude_m = 0.0, life_hours = 1.0, exponent = 1.0 } }
+            [parts.plant]
+            motor_friction = { backdriven_load_share = 0.1 }
+            friction_law = { lu_gre = { travel_m = 1e-6, ratio = 1.0, speed_m_per_s = 1.0, damping_n_s_per_m = 0.0 } }
+            contact = { law = { soft = { share = 0.1, depth_m = 1e-6 } }, lower_law = { hertz = { share = 0.1, reference_m = 1e-6 } } }
+            [[changes]]
+            buffet = { lines = [{}] }
+            [sensors.motor]
+            periodic = [{}]
+        "#;
+        let mut found = BTreeSet::new();
+        for text in [crate::SAMPLE_SPEC, rest] {
+            let spec: Spec = toml::from_str(text).unwrap();
+            paths("", &Value::try_from(spec).unwrap(), &mut found);
+        }
+        let ranged = RANGES.iter().map(|(key, ..)| *key);
+        for key in ranged.chain(POSITIVE.split(' ')).chain(NOT_NEGATIVE.split(' ')) {
+            let key = key.trim_end_matches("[1]");
+            assert!(found.iter().any(|path| ends_with(path, key)), "no key ends with {key}");
+        }
+    }
+
+    #[test]
+    fn a_number_is_refused_by_the_range_of_its_key() {
+        let refused = |text: &str| {
+            let spec: Spec = toml::from_str(text).unwrap();
+            check("", &spec).map_err(|e| e.to_string())
+        };
+        assert_eq!(refused("[[parts]]\npart_number = \"P\"\nplant.contact.gap_m = -1e-5"), Ok(()));
+        for (text, error) in [
+            ("tail_hours = -1.0", "`tail_hours` is -1, which must be zero or more and finite"),
+            ("spread.drift_m = nan", "`spread.drift_m` is NaN, which must be zero or more and finite"),
+            ("sensors.load.bias = inf", "`sensors.load.bias` is inf, which must be finite"),
+            ("profile.rest_share = 1", "`profile.rest_share` is 1, which must be between 0 and 0.9"),
+            (
+                "[[changes]]\nfrom_flight = 3\nto_flight = 2",
+                "`changes[0].to_flight` is 2, which must be no less than `from_flight`",
+            ),
+            (
+                "[[parts]]\npart_number = \"P\"\ngap_m = [2e-5, 1e-5]",
+                "`parts[0].gap_m` is 0.00001, which must be a range, the least value first",
+            ),
+            (
+                "[[parts]]\npart_number = \"P\"\nplant.contact.worn_at_m = [0.0, 0.0]",
+                "`parts[0].plant.contact.worn_at_m[1]` is 0, which must be greater than zero and finite",
+            ),
+        ] {
+            assert_eq!(refused(text), Err(error.to_owned()));
+        }
+    }
+}
