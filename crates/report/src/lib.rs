@@ -15,6 +15,7 @@ mod stats;
 
 pub use assets::assets;
 pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
+pub use charts::frame::Frame;
 pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 pub use page::{Error, Page, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;

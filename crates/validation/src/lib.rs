@@ -15,8 +15,6 @@ pub mod plots;
 pub mod robot_logs;
 pub mod scenarios;
 
-pub use drawing::Drawn;
-
 /// A template with its places `{{NAME}}` filled.
 pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
     values

@@ -14,7 +14,7 @@ use validation::methods::{MethodResults, estimate_flight};
 use validation::metrics::ErrorStats;
 use validation::paper::{self, Claims};
 use validation::scenarios::{Class, Kind, classes};
-use validation::{Drawn, accuracy_page, gear_bench, plots, robot_logs, write};
+use validation::{accuracy_page, gear_bench, plots, robot_logs, write};
 
 /// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]
@@ -98,12 +98,10 @@ fn write_paper(folder: &Path) -> Result<(), String> {
 
 fn write_pictures(
     folder: &Path,
-    pictures: impl IntoIterator<Item = (&'static str, Drawn)>,
+    pictures: impl IntoIterator<Item = (&'static str, String)>,
 ) -> Result<(), String> {
     let folder = folder.join("pictures");
-    let each =
-        |(name, picture): (&str, Drawn)| write(&folder, name, &picture.map_err(|e| format!("{name}: {e}"))?);
-    pictures.into_iter().try_for_each(each)
+    pictures.into_iter().try_for_each(|(name, picture)| write(&folder, name, &picture))
 }
 
 /// The page with its plots, real machines included.

@@ -21,7 +21,7 @@ pub(crate) const LIMIT: &str = r##"stroke="#7A0044" stroke-width="2""##;
 pub(crate) const PLAN: &str = r##"fill="none" stroke="#C85200" stroke-width="2""##;
 
 /// Scales of a chart, and the picture drawn so far.
-pub(crate) struct Frame {
+pub struct Frame {
     pub(crate) x: Range<f64>,
     pub(crate) y: Range<f64>,
     size: [f64; 2],
@@ -32,7 +32,7 @@ pub(crate) struct Frame {
 
 impl Frame {
     /// An empty picture of a size, px, whose plotted area shows the two ranges.
-    pub(crate) fn new(size: [f64; 2], margins: [f64; 4], x: Range<f64>, y: Range<f64>) -> Self {
+    pub fn new(size: [f64; 2], margins: [f64; 4], x: Range<f64>, y: Range<f64>) -> Self {
         Self { x, y, size, margins, svg: String::new() }
     }
 
@@ -46,7 +46,7 @@ impl Frame {
     }
 
     /// Draws a line through points.
-    pub(crate) fn line(&mut self, points: impl IntoIterator<Item = (f64, f64)>, pen: &str) {
+    pub fn line(&mut self, points: impl IntoIterator<Item = (f64, f64)>, pen: &str) {
         let mut path = String::new();
         for point in points {
             let (x, y) = self.at(point);
@@ -63,17 +63,17 @@ impl Frame {
     }
 
     /// Draws a vertical line through the plotted area.
-    pub(crate) fn vertical(&mut self, x: f64, pen: &str) {
+    pub fn vertical(&mut self, x: f64, pen: &str) {
         self.line([(x, self.y.start), (x, self.y.end)], pen);
     }
 
     /// Draws a horizontal line through the plotted area.
-    pub(crate) fn horizontal(&mut self, y: f64, pen: &str) {
+    pub fn horizontal(&mut self, y: f64, pen: &str) {
         self.line([(self.x.start, y), (self.x.end, y)], pen);
     }
 
     /// Draws a disc, with a text for readers who point at it.
-    pub(crate) fn dot(&mut self, point: (f64, f64), radius: f64, fill: &str, title: &str) {
+    pub fn dot(&mut self, point: (f64, f64), radius: f64, fill: &str, title: &str) {
         let (x, y) = self.at(point);
         let title = if title.is_empty() { String::new() } else { format!("<title>{}</title>", safe(title)) };
         let _ = write!(self.svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" {fill}>{title}</circle>"#);
@@ -91,7 +91,7 @@ impl Frame {
     }
 
     /// Writes a text that starts, or ends (`anchor`), some pixels from a point.
-    pub(crate) fn text(&mut self, point: (f64, f64), offset: [f64; 2], anchor: &str, text: impl Display) {
+    pub fn text(&mut self, point: (f64, f64), offset: [f64; 2], anchor: &str, text: impl Display) {
         let ((x, y), text) = (self.at(point), safe(text));
         let (x, y) = (x + offset[0], y + offset[1]);
         let _ = write!(
@@ -101,17 +101,17 @@ impl Frame {
     }
 
     /// Writes a text of a colour at a place of the picture, px.
-    pub(crate) fn coloured_text(&mut self, [x, y]: [f64; 2], colour: &str, text: &str) {
+    pub fn coloured_text(&mut self, [x, y]: [f64; 2], colour: &str, text: &str) {
         let _ = write!(self.svg, r#"<text x="{x}" y="{y}" fill="{colour}">{}</text>"#, safe(text));
     }
 
     /// Puts a picture into this one, `x` and `y` px from its upper left corner.
-    pub(crate) fn put(&mut self, x: f64, y: f64, picture: &str) {
+    pub fn put(&mut self, x: f64, y: f64, picture: &str) {
         let _ = write!(self.svg, r#"<svg x="{x}" y="{y}">{picture}</svg>"#);
     }
 
     /// Draws at most `most` horizontal grid lines, with their values above them at the left edge.
-    pub(crate) fn grid(&mut self, most: usize) {
+    pub fn grid(&mut self, most: usize) {
         for value in ticks(&self.y, most) {
             self.horizontal(value, GRID);
             let at_edge = [2.0 - self.margins[3], -3.0];
@@ -120,7 +120,7 @@ impl Frame {
     }
 
     /// Labels a horizontal axis of numbers, with its name at the right.
-    pub(crate) fn numbers(&mut self, most: usize, name: &str) {
+    pub fn numbers(&mut self, most: usize, name: &str) {
         let below = self.margins[2] - 6.0;
         self.horizontal(self.y.start, r##"stroke="#1C2530""##);
         for value in ticks(&self.x, most) {
@@ -152,7 +152,7 @@ impl Frame {
     }
 
     /// The SVG picture; further attributes are those of its root.
-    pub(crate) fn finish(self, attributes: &str) -> String {
+    pub fn finish(self, attributes: &str) -> String {
         let [width, height] = self.size;
         format!(
             r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="13" {attributes}>{}</svg>"#,

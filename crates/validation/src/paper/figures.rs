@@ -1,18 +1,12 @@
-//! The figures as SVG drawings.
+//! The figures as SVG pictures.
 
-use plotters::chart::ChartContext;
-use plotters::prelude::*;
-
-use crate::drawing::{
-    Area, Axes, BLUE, Drawn, Failure, GREEN, GREY, GRID, INK, ORANGE, builder, chart, drawing, mesh, text,
-};
+use crate::drawing::{Axis, BLUE, GREEN, GREY, INK, ORANGE, Panel, Series, Shape, picture};
 use crate::paper::claims::{Change, Claims, Convergence};
 use crate::paper::{GAP_M, STEP_S, backlash_m};
 
-const PURPLE: RGBColor = RGBColor(0x7B, 0x4F, 0x9E);
-const COLOURS: [RGBColor; 5] = [BLUE, ORANGE, GREEN, GREY, PURPLE];
-/// Width and height of a figure of one or two panels.
-const SIZE: (u32, u32) = (840, 300);
+const COLOURS: [&str; 5] = [BLUE, ORANGE, GREEN, GREY, "#7B4F9E"];
+/// Width and height of a figure, px.
+const SIZE: [f64; 2] = [840.0, 300.0];
 /// Columns of a line over a whole flight: each has its least and its greatest value.
 const COLUMNS: usize = 600;
 /// Dots of a scatter plot.
@@ -23,65 +17,36 @@ const ZOOM_S: (f64, f64) = (60.0, 62.0);
 const SETTLED: usize = 250;
 /// Differences below this are drawn at the edge, µm.
 const LEAST_UM: f64 = 1e-4;
+/// A curve.
+const THIN: Shape = Shape::Line(1.0);
 
-/// A curve: its name, colour and points.
-type Curve = (String, RGBColor, Vec<(f64, f64)>);
-
-/// Every figure with the name of its file.
-pub fn pictures(claims: &Claims) -> Vec<(&'static str, Drawn)> {
-    vec![
+/// Every figure with the name of its file: one panel, or two side by side.
+pub fn pictures(claims: &Claims) -> Vec<(&'static str, String)> {
+    let figures = [
         ("paper-2-positions.svg", positions(claims)),
-        ("paper-3-load.svg", load(claims)),
+        ("paper-3-load.svg", vec![load(claims)]),
         ("paper-4-relative.svg", relative(claims)),
-        ("paper-5-backlash.svg", backlash(claims)),
-        ("paper-6-speed.svg", against_speed(claims)),
-        ("paper-7-load.svg", against_load(claims)),
-        ("paper-convergence.svg", convergences(claims)),
+        ("paper-5-backlash.svg", vec![backlash(claims)]),
+        ("paper-6-speed.svg", vec![against_speed(claims)]),
+        ("paper-7-load.svg", vec![against_load(claims)]),
+        ("paper-convergence.svg", [&claims.starts, &claims.spreads].map(|all| convergence(all)).into()),
         ("paper-noise.svg", noises(claims)),
         ("paper-parameters.svg", parameters(claims)),
-        ("paper-varying.svg", varying(claims)),
-    ]
+        ("paper-varying.svg", vec![varying(claims)]),
+    ];
+    let draw = |panels: Vec<Panel>| picture(&panels, panels.len(), [SIZE[0] / panels.len() as f64, SIZE[1]]);
+    figures.into_iter().map(|(name, panels)| (name, draw(panels))).collect()
 }
 
-/// A figure of panels side by side.
-fn figure(panels: usize, draw: impl FnOnce(&[Area<'_>]) -> Result<(), Failure>) -> Drawn {
-    drawing(SIZE, |root| draw(&root.split_evenly((1, panels))))
+/// A panel whose vertical axis holds all its series.
+fn fitted(x: Axis, y: &str, series: Vec<Series>) -> Panel {
+    let y = Axis::around(y, series.iter().flat_map(|series| series.points.iter().map(|(_, y)| *y)));
+    Panel::new(x, y, series)
 }
 
-fn lines<'r, 's: 'r, X, Y>(
-    chart: &mut ChartContext<'r, SVGBackend<'s>, Cartesian2d<X, Y>>,
-    curves: Vec<Curve>,
-) -> Result<(), Failure>
-where
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
-    let is_named = curves.iter().any(|(name, ..)| !name.is_empty());
-    for (name, colour, points) in curves {
-        let drawn = chart.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
-        if !name.is_empty() {
-            drawn
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 14, y)], colour.stroke_width(2)));
-        }
-    }
-    if !is_named {
-        return Ok(());
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .border_style(GRID)
-        .label_font(text(12))
-        .draw()
-}
-
-/// Least and greatest with a margin.
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-    let margin = 0.06 * (most - least).max(f64::MIN_POSITIVE);
-    (least - margin, most + margin)
+/// The axis of time over the whole flight.
+fn time(claims: &Claims) -> Axis {
+    Axis::new("time [s]", 0.0..end_s(claims))
 }
 
 /// A series against time, with the least and the greatest value of each column.
@@ -105,105 +70,71 @@ fn zoomed(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
     samples.map(|k| (k as f64 * STEP_S, values[k] * scale)).collect()
 }
 
-fn spread(points: &[Curve]) -> (f64, f64) {
-    range(points.iter().flat_map(|(_, _, points)| points.iter().map(|(_, y)| *y)))
-}
-
 /// Points of a series, scaled.
 type Thin = fn(&[f64], f64) -> Vec<(f64, f64)>;
 
 /// Curves over the whole flight on the left, and over two seconds on the right.
-fn whole_and_zoom(series: [(&str, RGBColor, &[f64]); 2], name: &str, scale: f64) -> Drawn {
-    let curves = |points: Thin| -> Vec<Curve> {
-        series
-            .iter()
-            .map(|(name, colour, values)| ((*name).to_owned(), *colour, points(values, scale)))
-            .collect()
+fn whole_and_zoom(series: [(&str, &'static str, &[f64]); 2], name: &str, scale: f64) -> Vec<Panel> {
+    let panel = |points: Thin| {
+        let curves =
+            series.map(|(name, colour, values)| Series::new(colour, THIN, points(values, scale)).named(name));
+        let time = Axis::around("time [s]", curves[0].points.iter().map(|(x, _)| *x));
+        fitted(time, name, curves.into())
     };
-    figure(2, |areas| {
-        for (area, curves) in areas.iter().zip([curves(over_time), curves(zoomed)]) {
-            let (low, high) = spread(&curves);
-            let (from_s, to_s) = range(curves[0].2.iter().map(|(x, _)| *x));
-            let axes = Axes { x: ("time [s]", from_s, to_s), y: (name, low, high) };
-            lines(&mut chart(area, &axes)?, curves)?;
-        }
-        Ok(())
-    })
+    vec![panel(over_time), panel(zoomed)]
 }
 
-fn positions(claims: &Claims) -> Drawn {
+fn positions(claims: &Claims) -> Vec<Panel> {
     let flight = &claims.flight;
-    whole_and_zoom(
-        [("motor", ORANGE, &flight.motor_m), ("screw", BLUE, &flight.screw_m)],
-        "position [mm]",
-        1e3,
-    )
+    let series = [("motor", ORANGE, &flight.motor_m[..]), ("screw", BLUE, &flight.screw_m)];
+    whole_and_zoom(series, "position [mm]", 1e3)
 }
 
-fn load(claims: &Claims) -> Drawn {
+fn load(claims: &Claims) -> Panel {
     let points = over_time(&claims.flight.load_n, 1e-3);
-    let (low, high) = range(points.iter().map(|(_, y)| *y));
-    figure(1, |areas| {
-        let axes = Axes { x: ("time [s]", 0.0, end_s(claims)), y: ("load [kN]", low, high) };
-        lines(&mut chart(&areas[0], &axes)?, vec![(String::new(), BLUE, points)])
-    })
+    fitted(time(claims), "load [kN]", vec![Series::new(BLUE, THIN, points)])
 }
 
-fn relative(claims: &Claims) -> Drawn {
+fn relative(claims: &Claims) -> Vec<Panel> {
     let measured = crate::paper::relative_position_m(&claims.flight);
     let estimated: Vec<f64> = claims.states.iter().map(|state| state.x[0]).collect();
-    whole_and_zoom(
-        [("measured", GREY, &measured), ("estimated", BLUE, &estimated)],
-        "relative position [µm]",
-        1e6,
-    )
+    let series = [("measured", GREY, &measured[..]), ("estimated", BLUE, &estimated)];
+    whole_and_zoom(series, "relative position [µm]", 1e6)
 }
 
 fn end_s(claims: &Claims) -> f64 {
     claims.states.len() as f64 * STEP_S
 }
 
-fn backlash(claims: &Claims) -> Drawn {
-    let points = over_time(&backlash_m(&claims.states), 1e6);
-    let (low, high) = range(points.iter().map(|(_, y)| *y));
-    let end = end_s(claims);
-    let level = |name: &str, colour, level_m: f64| -> Curve {
-        (format!("{name} {:.1} µm", 1e6 * level_m), colour, vec![(0.0, 1e6 * level_m), (end, 1e6 * level_m)])
+fn backlash(claims: &Claims) -> Panel {
+    let level = |name: &str, colour, level_m: f64| {
+        let um = 1e6 * level_m;
+        Series::new(colour, THIN, vec![(0.0, um), (end_s(claims), um)]).named(&format!("{name} {um:.1} µm"))
     };
-    let gap = &claims.gap;
-    let curves = vec![
-        ("S(t)".to_owned(), GREY, points),
-        level("upper mean", ORANGE, gap.upper_m),
-        level("lower mean", GREEN, gap.lower_m),
+    let series = vec![
+        Series::new(GREY, THIN, over_time(&backlash_m(&claims.states), 1e6)).named("S(t)"),
+        level("upper mean", ORANGE, claims.gap.upper_m),
+        level("lower mean", GREEN, claims.gap.lower_m),
     ];
-    figure(1, |areas| {
-        let axes =
-            Axes { x: ("time [s]", 0.0, end), y: ("backlash S [µm]", low, high + 0.25 * (high - low)) };
-        lines(&mut chart(&areas[0], &axes)?, curves)
-    })
+    let mut panel = fitted(time(claims), "backlash S [µm]", series);
+    // Room for the names.
+    panel.y.range.end += 0.25 * (panel.y.range.end - panel.y.range.start);
+    panel
 }
 
 /// S against another quantity: dots above the mid-range in one colour, those below in another.
-fn scatter(claims: &Claims, name: &str, x: &[f64]) -> Drawn {
+fn scatter(claims: &Claims, name: &str, x: &[f64]) -> Panel {
     let s_um: Vec<f64> = backlash_m(&claims.states).iter().map(|s| 1e6 * s).collect();
     let every = (s_um.len() / DOTS).max(1);
-    let picked: Vec<usize> = (SETTLED..s_um.len() - 1).step_by(every).collect();
-    let (left, right) = range(picked.iter().map(|k| x[*k]));
-    let (low, high) = range(picked.iter().map(|k| s_um[*k]));
-    figure(1, |areas| {
-        let axes = Axes { x: (name, left, right), y: ("backlash S [µm]", low, high) };
-        let mut chart = chart(&areas[0], &axes)?;
-        let middle_um = 1e6 * claims.gap.mid_range_m;
-        let dot = |&k: &usize| {
-            let colour = if s_um[k] >= middle_um { ORANGE } else { GREEN };
-            Circle::new((x[k], s_um[k]), 1, colour.filled())
-        };
-        chart.draw_series(picked.iter().map(dot))?;
-        Ok(())
-    })
+    let picked = || (SETTLED..s_um.len() - 1).step_by(every).map(|k| (x[k], s_um[k]));
+    let middle_um = 1e6 * claims.gap.mid_range_m;
+    let (upper, lower) = picked().partition(|(_, s_um)| *s_um >= middle_um);
+    let series = [(ORANGE, upper), (GREEN, lower)];
+    let series = series.map(|(colour, points)| Series::new(colour, Shape::Dots(1.0), points));
+    fitted(Axis::around(name, picked().map(|(x, _)| x)), "backlash S [µm]", series.into())
 }
 
-fn against_speed(claims: &Claims) -> Drawn {
+fn against_speed(claims: &Claims) -> Panel {
     let motor_m = &claims.flight.motor_m;
     let speed = |k: usize| {
         let (before, after) = (k.saturating_sub(2), (k + 2).min(motor_m.len() - 1));
@@ -212,95 +143,68 @@ fn against_speed(claims: &Claims) -> Drawn {
     scatter(claims, "motor speed [mm/s]", &(0..motor_m.len()).map(speed).collect::<Vec<_>>())
 }
 
-fn against_load(claims: &Claims) -> Drawn {
+fn against_load(claims: &Claims) -> Panel {
     scatter(claims, "load [kN]", &claims.flight.load_n.iter().map(|f| 1e-3 * f).collect::<Vec<_>>())
 }
 
-/// Two panels of convergence on a logarithmic scale.
-fn convergences(claims: &Claims) -> Drawn {
-    figure(2, |areas| {
-        for (area, curves) in areas.iter().zip([&claims.starts, &claims.spreads]) {
-            let axes = Axes { x: ("time [s]", 0.0, 0.6), y: ("error of S [µm]", LEAST_UM, 3e4) };
-            let mut chart =
-                builder(area).build_cartesian_2d(axes.x.1..axes.x.2, (axes.y.1..axes.y.2).log_scale())?;
-            mesh(&mut chart, &axes)?;
-            let samples = (axes.x.2 / STEP_S) as usize;
-            let points = |curve: &Convergence| {
-                let error = curve.error_m.iter().take(samples).enumerate();
-                error.map(|(k, e)| (k as f64 * STEP_S, (1e6 * e).max(LEAST_UM))).collect()
-            };
-            let curves = curves.iter().zip(COLOURS).map(|(c, colour)| (c.name.clone(), colour, points(c)));
-            let mut curves: Vec<Curve> = curves.collect();
-            let level_um = 1e4 * GAP_M;
-            curves.push(("1 % of the gap".to_owned(), INK, vec![(axes.x.1, level_um), (axes.x.2, level_um)]));
-            lines(&mut chart, curves)?;
-        }
-        Ok(())
-    })
+/// Convergence from several starts.
+fn convergence(all: &[Convergence]) -> Panel {
+    const SHOWN_S: f64 = 0.6;
+    let curve = |(one, colour): (&Convergence, &'static str)| {
+        let error = one.error_m.iter().take((SHOWN_S / STEP_S) as usize).enumerate();
+        let points = error.map(|(k, e)| (k as f64 * STEP_S, (1e6 * e).max(LEAST_UM)));
+        Series::new(colour, THIN, points.collect()).named(&one.name)
+    };
+    let level_um = 1e4 * GAP_M;
+    let level = Series::new(INK, THIN, vec![(0.0, level_um), (SHOWN_S, level_um)]).named("1 % of the gap");
+    let series = all.iter().zip(COLOURS).map(curve).chain([level]).collect();
+    Panel::new(Axis::new("time [s]", 0.0..SHOWN_S), Axis::log("error of S [µm]", LEAST_UM..3e4), series)
 }
 
-/// The range over the flights as a bar and the mean as a line, against a factor on a logarithmic scale.
-fn changes(
-    area: &Area<'_>,
-    name: &str,
-    y: (&str, f64, f64),
-    all: &[(&str, &[Change])],
-) -> Result<(), Failure> {
+/// The range over the flights as a bar and the mean as a line, against what is made of the factor.
+fn changes(x: Axis, y: Axis, place: fn(f64) -> f64, all: &[(&str, &[Change])]) -> Panel {
+    let cut = |percent: f64| percent.clamp(y.range.start, y.range.end);
+    let of = |((name, changes), colour): (&(&str, &[Change]), &'static str)| {
+        let at = |change: &Change, k: usize| (place(change.factor), cut(change.percent[k]));
+        let bars = changes.iter().flat_map(|change| [at(change, 0), at(change, 2)]).collect();
+        let means = changes.iter().map(|change| at(change, 1)).collect();
+        [Series::new(colour, Shape::Bars(3.0), bars), Series::new(colour, THIN, means).named(name)]
+    };
+    let series = all.iter().zip(COLOURS).flat_map(of).collect();
+    Panel::new(x, y, series)
+}
+
+/// The changes against the factor itself, on a logarithmic axis.
+fn by_factor(name: &str, y: Axis, all: &[(&str, &[Change])]) -> Panel {
     let factors = || all.iter().flat_map(|(_, changes)| changes.iter().map(|change| change.factor));
     let (left, right) = (factors().fold(f64::INFINITY, f64::min), factors().fold(0.0, f64::max));
-    let axes = Axes { x: (name, left / 1.2, right * 1.2), y };
-    let mut chart = builder(area).build_cartesian_2d((axes.x.1..axes.x.2).log_scale(), axes.y.1..axes.y.2)?;
-    mesh(&mut chart, &axes)?;
-    let curve = |((name, changes), colour): (&(&str, &[Change]), RGBColor)| -> Curve {
-        let points = changes.iter().map(|change| (change.factor, change.percent[1].clamp(y.1, y.2)));
-        ((*name).to_owned(), colour, points.collect())
-    };
-    for ((_, changes), colour) in all.iter().zip(COLOURS) {
-        let bar = |change: &Change| {
-            let [least, _, most] = change.percent.map(|percent| percent.clamp(y.1, y.2));
-            PathElement::new(vec![(change.factor, least), (change.factor, most)], colour.stroke_width(3))
-        };
-        chart.draw_series(changes.iter().map(bar))?;
-    }
-    lines(&mut chart, all.iter().zip(COLOURS).map(curve).collect())
+    changes(Axis::log(name, left / 1.2..right * 1.2), y, |factor| factor, all)
 }
 
-fn noises(claims: &Claims) -> Drawn {
-    figure(2, |areas| {
-        let y = ("error of ΔS [%]", -30.0, 30.0);
-        changes(&areas[0], "noise of both positions, factor", y, &[("", &claims.noise)])?;
-        changes(&areas[1], "W_d/V_d, factor", y, &[("", &claims.tuning)])
-    })
+fn noises(claims: &Claims) -> Vec<Panel> {
+    let y = || Axis::new("error of ΔS [%]", -30.0..30.0);
+    vec![
+        by_factor("noise of both positions, factor", y(), &[("", &claims.noise)]),
+        by_factor("W_d/V_d, factor", y(), &[("", &claims.tuning)]),
+    ]
 }
 
-fn parameters(claims: &Claims) -> Drawn {
-    figure(2, |areas| {
-        let both: [(&str, &[Change]); 2] = [("damping", &claims.damping), ("mass", &claims.mass)];
-        changes(&areas[0], "assumed damping or mass, factor", ("change of ΔS [%]", -1.0, 1.0), &both)?;
-        let axes =
-            Axes { x: ("error of the stiffness [%]", -12.0, 12.0), y: ("change of ΔS [%]", -16.0, 16.0) };
-        let mut chart = chart(&areas[1], &axes)?;
-        let place = |change: &Change| 100.0 * (change.factor - 1.0);
-        let bar = |change: &Change| {
-            let ends = [change.percent[0], change.percent[2]].map(|percent| (place(change), percent));
-            PathElement::new(ends.to_vec(), BLUE.stroke_width(3))
-        };
-        chart.draw_series(claims.stiffness.iter().map(bar))?;
-        let means = claims.stiffness.iter().map(|change| (place(change), change.percent[1]));
-        lines(&mut chart, vec![(String::new(), BLUE, means.collect())])
-    })
+fn parameters(claims: &Claims) -> Vec<Panel> {
+    let y = |most: f64| Axis::new("change of ΔS [%]", -most..most);
+    let both: [(&str, &[Change]); 2] = [("damping", &claims.damping), ("mass", &claims.mass)];
+    let error = Axis::new("error of the stiffness [%]", -12.0..12.0);
+    let percent = |factor: f64| 100.0 * (factor - 1.0);
+    vec![
+        by_factor("assumed damping or mass, factor", y(1.0), &both),
+        changes(error, y(16.0), percent, &[("", &claims.stiffness)]),
+    ]
 }
 
-fn varying(claims: &Claims) -> Drawn {
-    figure(1, |areas| {
-        let axes = Axes { x: ("time [s]", 0.0, end_s(claims)), y: ("gap [µm]", 0.0, 260.0) };
-        let mut chart = chart(&areas[0], &axes)?;
-        let truth = claims.varying.iter().map(|window| (window.time_s, 1e6 * window.true_m)).collect();
-        lines(&mut chart, vec![("true gap".to_owned(), INK, truth)])?;
-        let dot = |window: &crate::paper::claims::Window| {
-            Circle::new((window.time_s, 1e6 * window.gap_m), 4, BLUE.filled())
-        };
-        chart.draw_series(claims.varying.iter().map(dot))?;
-        Ok(())
-    })
+fn varying(claims: &Claims) -> Panel {
+    let windows = claims.varying.iter();
+    let truth = windows.clone().map(|window| (window.time_s, 1e6 * window.true_m)).collect();
+    let found = windows.map(|window| (window.time_s, 1e6 * window.gap_m)).collect();
+    let series =
+        vec![Series::new(INK, THIN, truth).named("true gap"), Series::new(BLUE, Shape::Dots(4.0), found)];
+    Panel::new(time(claims), Axis::new("gap [µm]", 0.0..260.0), series)
 }
