@@ -13,8 +13,8 @@ pub enum Error {
     /// A date is not written as year, month and day.
     #[error("`start_date` is \"{text}\", which must be a date such as \"2026-03-02\"")]
     Date { text: String },
-    /// A list that must name something is empty.
-    #[error("`{key}` is empty; name at least one")]
+    /// A list that must name something is empty, or has an empty name.
+    #[error("`{key}` is empty or has an empty name; name at least one")]
     Empty { key: &'static str },
     /// A name is used that is not declared.
     #[error("{place} names {kind} \"{name}\", which is not declared; declared are: {known}")]
@@ -31,7 +31,4 @@ pub enum Error {
          raise `days_between_flights` or lower `flight_hours`"
     )]
     Crowded { flight_hours: f64, days: f64 },
-    /// The plan has no flight of the requested index.
-    #[error("flight {index} does not exist; the plan has {flights} flights, counted from 0")]
-    NoSuchFlight { index: usize, flights: usize },
 }

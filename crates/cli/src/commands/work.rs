@@ -72,7 +72,7 @@ fn decide(
     output.write_result(&format!(
         "{id}: {}; {} by {by}\n",
         escape(&unit_name(request.part_number.as_deref(), &request.serial_number)),
-        status(request)
+        request.status_text()
     ))?;
     Ok(Code::Success)
 }
@@ -102,7 +102,7 @@ fn page(found: &[WorkRequest], units: &BTreeMap<UnitKey, TrendRow>) -> String {
         (text("tail", 0), &|r| or_dash(r.tail_number.as_deref())),
         (text("position", 0), &|r| or_dash(r.position.as_deref())),
         (text("serial", 0), &|r| r.serial_number.clone()),
-        (text("status", 1), &status),
+        (text("status", 1), &WorkRequest::status_text),
         (text("by", 2), &|r| or_dash(r.by.as_deref())),
         (text("part", 3), &|r| or_dash(r.part_number.as_deref())),
         (text("opened", 4), &|r| day(r.opened_utc)),
@@ -123,20 +123,6 @@ fn page(found: &[WorkRequest], units: &BTreeMap<UnitKey, TrendRow>) -> String {
         )
     });
     head + &table::of(found, columns) + &next
-}
-
-/// Status with its date.
-fn status(request: &WorkRequest) -> String {
-    match (request.status, request.until_utc) {
-        ("deferred", Some(until)) => format!("deferred to {}", day(until)),
-        ("open", Some(until)) => format!("open, was deferred to {}", day(until)),
-        ("closed", _) => {
-            let how = request.closed_by.as_deref().unwrap_or("closed");
-            format!("{how} {}", request.closed_utc.map(day).unwrap_or_default())
-        }
-        ("open", None) => "open".to_owned(),
-        (other, _) => other.to_owned(),
-    }
 }
 
 fn day(at: Timestamp) -> String {

@@ -212,20 +212,19 @@ impl PartSettings {
 
     /// Stiffness, damping, mass or inertia, and lead or reference radius of a kind of part, each with its key.
     fn keys_of(&self, kind: Kind) -> [(&'static str, Option<f64>); 4] {
-        match kind {
-            Kind::Linear => [
+        [
+            [
                 ("stiffness_n_per_m", self.stiffness_n_per_m),
-                ("damping_n_s_per_m", self.damping_n_s_per_m),
-                ("screw_mass_kg", self.screw_mass_kg),
-                ("lead_m_per_rev", self.lead_m_per_rev),
-            ],
-            Kind::Rotary => [
                 ("stiffness_nm_per_rad", self.stiffness_nm_per_rad),
-                ("damping_nm_s_per_rad", self.damping_nm_s_per_rad),
-                ("inertia_kg_m2", self.inertia_kg_m2),
-                ("reference_radius_m", self.reference_radius_m),
             ],
-        }
+            [
+                ("damping_n_s_per_m", self.damping_n_s_per_m),
+                ("damping_nm_s_per_rad", self.damping_nm_s_per_rad),
+            ],
+            [("screw_mass_kg", self.screw_mass_kg), ("inertia_kg_m2", self.inertia_kg_m2)],
+            [("lead_m_per_rev", self.lead_m_per_rev), ("reference_radius_m", self.reference_radius_m)],
+        ]
+        .map(|of_kinds| of_kinds[kind as usize])
     }
 
     /// A key of the other kind is a misunderstanding, not a spare.
@@ -306,29 +305,22 @@ impl NoiseSettings {
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
     fn sensors(&self, part: &PartSettings, faults: &mut Faults<'_>) -> Option<SensorNoise> {
         let bandwidth_hz = required(faults, &["noise", "bandwidth_hz"], self.bandwidth_hz);
+        let radius = if part.kind == Kind::Linear { 1.0 } else { part.reference_radius_m.unwrap_or(1.0) };
         let none = Some(0.0);
-        let (radius, levels) = match part.kind {
-            Kind::Linear => (
-                1.0,
-                [
-                    ("screw_rms_m", self.screw_rms_m),
-                    ("screw_resolution_m", self.screw_resolution_m.or(none)),
-                    ("motor_rms_m", self.motor_rms_m),
-                    ("motor_resolution_m", self.motor_resolution_m.or(none)),
-                    ("unknown_force_n", self.unknown_force_n),
-                ],
-            ),
-            Kind::Rotary => (
-                part.reference_radius_m.unwrap_or(1.0),
-                [
-                    ("screw_rms_rad", self.screw_rms_rad),
-                    ("screw_resolution_rad", self.screw_resolution_rad.or(none)),
-                    ("motor_rms_rad", self.motor_rms_rad),
-                    ("motor_resolution_rad", self.motor_resolution_rad.or(none)),
-                    ("unknown_torque_nm", self.unknown_torque_nm),
-                ],
-            ),
-        };
+        let levels = [
+            [("screw_rms_m", self.screw_rms_m), ("screw_rms_rad", self.screw_rms_rad)],
+            [
+                ("screw_resolution_m", self.screw_resolution_m.or(none)),
+                ("screw_resolution_rad", self.screw_resolution_rad.or(none)),
+            ],
+            [("motor_rms_m", self.motor_rms_m), ("motor_rms_rad", self.motor_rms_rad)],
+            [
+                ("motor_resolution_m", self.motor_resolution_m.or(none)),
+                ("motor_resolution_rad", self.motor_resolution_rad.or(none)),
+            ],
+            [("unknown_force_n", self.unknown_force_n), ("unknown_torque_nm", self.unknown_torque_nm)],
+        ];
+        let levels = levels.map(|of_kinds| of_kinds[part.kind as usize]);
         let levels = levels.map(|(key, level)| required(faults, &["noise", key], level));
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");

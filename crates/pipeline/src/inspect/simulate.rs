@@ -113,7 +113,7 @@ fn tables(plan: &Plan, spec: &Spec) -> Vec<(&'static str, String)> {
 /// Simulates one flight and writes its log: a column for each channel of each actuator.
 fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
     let planned = &plan.flights[index];
-    let flight = plan.simulate_flight(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
+    let flight = plan.simulate_flight(planned).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
     for actuator in flight.actuators {
         columns.extend(channels(actuator));

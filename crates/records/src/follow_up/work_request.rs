@@ -51,6 +51,24 @@ impl WorkRequest {
         (self.part_number.clone(), self.serial_number.clone())
     }
 
+    /// Number and status: `W12 deferred to 2026-12-01`.
+    pub fn title(&self) -> String {
+        format!("{} {}", self.request_id, self.status_text())
+    }
+
+    /// Status with its date: `deferred to 2026-12-01`.
+    pub fn status_text(&self) -> String {
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d");
+        match (self.status, self.until_utc, self.closed_utc) {
+            ("deferred", Some(until), _) => format!("deferred to {}", day(until)),
+            ("open", Some(until), _) => format!("open, was deferred to {}", day(until)),
+            ("closed", _, Some(closed)) => {
+                format!("{} {}", self.closed_by.as_deref().unwrap_or("closed"), day(closed))
+            }
+            (other, ..) => other.to_owned(),
+        }
+    }
+
     /// Whether work is left to do, now or later.
     pub fn is_open(&self) -> bool {
         self.status != "closed"

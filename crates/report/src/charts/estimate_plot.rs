@@ -287,7 +287,7 @@ fn buckets(samples: usize) -> usize {
 
 /// Minimum and maximum of each bucket with their sample positions, in time order, so that no excursion is lost.
 /// NaN for a bucket without a value.
-fn min_max_buckets(values: &[f64], buckets: usize) -> Vec<(f64, f64)> {
+pub fn min_max_buckets(values: &[f64], buckets: usize) -> Vec<(f64, f64)> {
     let mut points = Vec::with_capacity(2 * buckets);
     for (bucket, at) in (0..buckets).zip(bucket_positions(values.len(), buckets).step_by(2)) {
         let part = &values[bucket * values.len() / buckets..(bucket + 1) * values.len() / buckets];

@@ -13,7 +13,7 @@ use crate::format::{
 use crate::model::{Report, TimedInterval, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::quantities::{self, Change, Chart, Level};
-use crate::pages::work_list::{capital, status, what};
+use crate::pages::work_list::{capital, what};
 use crate::stats::peers::Peers;
 
 #[derive(Template)]
@@ -185,7 +185,7 @@ fn past(unit: &UnitView) -> Vec<(Timestamp, String)> {
     for request in &unit.work_requests {
         let said = request.reason.as_deref().map_or_else(String::new, |reason| format!(": {reason}"));
         let by = request.by.as_deref().map_or_else(String::new, |by| format!(" ({by})"));
-        all.push((request.opened_utc, format!("work request {}{by}{said}", status(request))));
+        all.push((request.opened_utc, format!("work request {}{by}{said}", request.title())));
     }
     all.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
     all

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use records::{TrendRow, WorkRequest};
+use records::TrendRow;
 
 use crate::charts::sparkline::sparkline;
-use crate::format::date;
 use crate::model::{Report, UnitView};
 
 /// Name of the group of units that are on no known aircraft.
@@ -66,19 +65,6 @@ pub(crate) fn what(row: &TrendRow) -> String {
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
-}
-
-/// Number and status of a work request, with its date.
-pub(crate) fn status(request: &WorkRequest) -> String {
-    let status = match (request.status, request.until_utc, request.closed_utc) {
-        ("deferred", Some(until), _) => format!("deferred to {}", date(until)),
-        ("open", Some(until), _) => format!("open, was deferred to {}", date(until)),
-        ("closed", _, Some(closed)) => {
-            format!("{} {}", request.closed_by.as_deref().unwrap_or("closed"), date(closed))
-        }
-        (other, ..) => other.to_owned(),
-    };
-    format!("{} {status}", request.request_id)
 }
 
 /// Gaps of a unit from zero to its limit, oldest first.

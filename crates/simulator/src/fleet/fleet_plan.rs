@@ -7,7 +7,9 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::error::Error;
-use crate::fleet::fleet_plan_types::{ActuatorLog, ChannelUnit, Plan, PlannedActuator, SimulatedFlight};
+use crate::fleet::fleet_plan_types::{
+    ActuatorLog, ChannelUnit, Plan, PlannedActuator, PlannedFlight, SimulatedFlight,
+};
 use crate::fleet::fleet_planner::Planner;
 use crate::fleet::fleet_spec::{MotorLogFormat, Part, ScrewLogUnit, Spec};
 use crate::flight::simulate;
@@ -17,19 +19,17 @@ impl Plan {
     /// Lays out the calendar of a fleet and the truth of each of its actuators.
     ///
     /// # Errors
-    /// Any variant but [`Error::NoSuchFlight`]: the first diagnostic about the spec.
+    /// The first fault of the spec.
     pub fn new(spec: &Spec) -> Result<Self, Error> {
         spec.check()?;
         Planner::new(spec)?.plan()
     }
 
-    /// Simulates one flight, counted from 0; the result does not depend on the order of calls.
+    /// Simulates one flight of the plan; the result does not depend on the order of calls.
     ///
     /// # Errors
-    /// [`Error::NoSuchFlight`] beyond the end of the plan.
-    pub fn simulate_flight(&self, flight_index: usize) -> Result<SimulatedFlight, Error> {
-        let missing = Error::NoSuchFlight { index: flight_index, flights: self.flights.len() };
-        let flight = self.flights.get(flight_index).ok_or(missing)?;
+    /// [`Error::Value`] for a parameter that a change of the flight moves out of its range.
+    pub fn simulate_flight(&self, flight: &PlannedFlight) -> Result<SimulatedFlight, Error> {
         let record = |actuator| self.record(flight.seed, actuator);
         let actuators = flight.actuators.iter().map(record).collect::<Result<_, _>>()?;
         let PlannedActuator { profile, sensors, .. } = &flight.actuators[0];

@@ -124,74 +124,51 @@ pub enum ScrewLogUnit {
 }
 
 /// One design.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[serde(deny_unknown_fields, default)]
 pub struct Part {
     /// Its name.
     pub part_number: String,
     /// Travel of the screw per turn of the resolver, metres. Default 0.005.
-    #[serde(default = "default_lead")]
+    #[default(0.005)]
     pub lead_m: f64,
     /// How its motor position is logged. Default `angle`.
-    #[serde(default)]
     pub motor_log: MotorLogFormat,
     /// Unit in which a linear screw position is logged. Default `mm`.
-    #[serde(default)]
     pub screw_log: ScrewLogUnit,
     /// For a rotary actuator the radius r at which its metres and newtons are meant: the output is
     /// logged as `X/r` in radians and the load as `F·r` in N·m. Default none, a linear actuator.
     pub reference_radius_m: Option<f64>,
     /// The gap at which a unit must be removed, metres. Default 200 µm.
-    #[serde(default = "default_limit")]
+    #[default(200e-6)]
     pub limit_m: f64,
     /// Least and greatest gap of a unit at the start, metres. Default 50 to 90 µm.
-    #[serde(default = "default_gaps")]
+    #[default([50e-6, 90e-6])]
     pub gap_m: [f64; 2],
     /// Least and greatest age of a unit at the start, hours. Default 400 to 1600.
-    #[serde(default = "default_ages")]
+    #[default([400.0, 1600.0])]
     pub unit_hours: [f64; 2],
     /// How its units wear. Default steady.
-    #[serde(default)]
     pub wear: WearLaw,
     /// Unevenness of wear, metres: the variance of a growth is this times the growth. Default 0.
-    #[serde(default)]
     pub wear_scatter_m: f64,
     /// Its mechanics; the gap and offset in it are replaced by each unit's own.
-    #[serde(default)]
     pub plant: Plant,
 }
 
-fn default_lead() -> f64 {
-    0.005
-}
-fn default_limit() -> f64 {
-    200e-6
-}
-fn default_gaps() -> [f64; 2] {
-    [50e-6, 90e-6]
-}
-fn default_ages() -> [f64; 2] {
-    [400.0, 1600.0]
-}
-
 /// One place on every tail.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[serde(deny_unknown_fields, default)]
 pub struct Position {
     /// Its name, as logs and installations use it.
     pub position: String,
     /// The design that fits there.
     pub part_number: String,
     /// Its load over the profile's. Default 1.
-    #[serde(default = "default_factor")]
+    #[default(1.0)]
     pub load_factor: f64,
     /// Its load never changes sign. Default false.
-    #[serde(default)]
     pub no_reversal: bool,
-}
-
-fn default_factor() -> f64 {
-    1.0
 }
 
 /// The unit that sits in a place at the start; whatever is left out comes from chance and the part.
@@ -327,7 +304,7 @@ impl Spec {
 }
 
 fn check_unique(key: &'static str, kind: &'static str, names: &[&str]) -> Result<(), Error> {
-    if names.is_empty() {
+    if names.is_empty() || names.contains(&"") {
         return Err(Error::Empty { key });
     }
     let again = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name));

@@ -13,7 +13,8 @@ fn digest(flight: &SimulatedFlight) -> u64 {
 fn first_flight(spec: &str, duration_s: f64) -> u64 {
     let mut spec: Spec = toml::from_str(spec).unwrap();
     spec.profile.duration_s = duration_s;
-    digest(&Plan::new(&spec).unwrap().simulate_flight(0).unwrap())
+    let plan = Plan::new(&spec).unwrap();
+    digest(&plan.simulate_flight(&plan.flights[0]).unwrap())
 }
 
 /// Digests of the simulator before it had load spectra, lag, hysteresis and further laws.

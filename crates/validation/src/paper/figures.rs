@@ -51,17 +51,8 @@ fn time(claims: &Claims) -> Axis {
 
 /// A series against time, with the least and the greatest value of each column.
 fn over_time(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
-    let width = values.len().div_ceil(COLUMNS);
-    let column = |(k, part): (usize, &[f64])| {
-        let at = |place: usize| ((k * width + place) as f64 * STEP_S, part[place] * scale);
-        let by = |a: &usize, b: &usize| part[*a].total_cmp(&part[*b]);
-        let (least, most) = ((0..part.len()).min_by(by), (0..part.len()).max_by(by));
-        let mut places: Vec<usize> = least.into_iter().chain(most).collect();
-        places.sort_unstable();
-        places.dedup();
-        places.into_iter().map(at).collect::<Vec<_>>()
-    };
-    values.chunks(width).enumerate().flat_map(column).collect()
+    let points = report::min_max_buckets(values, COLUMNS);
+    points.into_iter().map(|(at, value)| (at * STEP_S, value * scale)).collect()
 }
 
 /// The samples of the zoom.
