@@ -14,9 +14,7 @@ mod state_badge;
 mod stats;
 
 pub use assets::assets;
-pub use charts::estimate_plot::{
-    ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg, min_max_buckets,
-};
+pub use charts::estimate_plot::{EstimatePlot, estimate_plot_html, estimate_plot_svg, min_max_buckets};
 pub use charts::frame::Frame;
 pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 pub use page::{Error, Page, flight_path, unit_path};

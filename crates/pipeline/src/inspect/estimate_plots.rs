@@ -3,7 +3,7 @@
 use ingest::ActuatorChannels;
 use job::{Part, estimate};
 use records::{Diagnostic, GapEstimate};
-use report::{ContactInterval, EstimatePlot};
+use report::EstimatePlot;
 
 /// The plot of an actuator of a log.
 ///
@@ -16,7 +16,7 @@ pub(crate) fn plot(
     estimate: &GapEstimate,
 ) -> Result<EstimatePlot, Diagnostic> {
     let (s_m, midrange) = estimate::filter_output(channels, part)?;
-    let mut plot = EstimatePlot {
+    Ok(EstimatePlot {
         title: format!("{} in {log_path}", channels.position),
         summary: summary(estimate),
         step_s: channels.step_s,
@@ -25,20 +25,8 @@ pub(crate) fn plot(
         dx_m: channels.dx_m.clone(),
         load_n: channels.load_n.clone(),
         s_m,
-        ..EstimatePlot::default()
-    };
-    if let Some(contact) = estimate::plot_data(channels, part)? {
-        plot.flanks = [contact.upper.to_vec(), contact.lower.to_vec()];
-        let intervals = contact.touches.into_iter().map(|touch| ContactInterval {
-            time_s: plot.time_s(touch.time_s / plot.step_s),
-            is_upper: touch.flank.sign() > 0.0,
-            is_used: touch.trust.is_some_and(|trust| trust > 0.0),
-            force_n: touch.force_n,
-            dx_m: touch.dx_m,
-        });
-        plot.contacts = intervals.collect();
-    }
-    Ok(plot)
+        contact: estimate::plot_data(channels, part)?,
+    })
 }
 
 /// The estimate in one line.

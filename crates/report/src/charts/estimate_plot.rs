@@ -1,6 +1,7 @@
 //! Diagnostic plot of one estimate: measured channels, filter output and the fitted contact flanks.
 
 use askama::Template;
+use estimator::contact::{ContactPlot, Flank, Touch};
 
 use crate::charts::frame::{Frame, PEER};
 use crate::page::Error;
@@ -40,10 +41,8 @@ pub struct EstimatePlot {
     pub s_m: Vec<f64>,
     /// Mean of S above and below its mid-range, m.
     pub bounds_m: Option<(f64, f64)>,
-    /// Contact intervals that the regression found.
-    pub contacts: Vec<ContactInterval>,
-    /// Fitted flanks, upper and lower: force in the coupling, N, and δX, m.
-    pub flanks: [Vec<(f64, f64)>; 2],
+    /// Stretches in contact and the flanks that the regression fitted; none where it rejects the flight.
+    pub contact: Option<ContactPlot>,
 }
 
 impl EstimatePlot {
@@ -51,21 +50,6 @@ impl EstimatePlot {
     pub fn time_s(&self, sample: f64) -> f64 {
         records::sample_time_s(sample, self.step_s, &self.breaks)
     }
-}
-
-/// An interval of samples in which one flank is in contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactInterval {
-    /// Midpoint, s.
-    pub time_s: f64,
-    /// Whether the upper flank is in contact.
-    pub is_upper: bool,
-    /// Whether the linear fit used it.
-    pub is_used: bool,
-    /// Force in the coupling, N.
-    pub force_n: f64,
-    /// δX corrected for drift, time skew, sensor error and friction, m.
-    pub dx_m: f64,
 }
 
 /// Draws all estimates into one SVG, one below the other.
@@ -189,9 +173,14 @@ fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
             frame.line([(0.0, to_um(bound)), (end_s, to_um(bound))], &pen);
         }
     }
-    for contact in downsampled(&plot.contacts) {
-        let y = if contact.is_upper { floor } else { floor - 0.025 * (high - low) };
-        frame.dot((contact.time_s, y), 1.0, &format!(r#"fill="{}""#, colour(contact)), "");
+    for contact in downsampled(touches(plot)) {
+        let y = if contact.flank == Flank::Upper { floor } else { floor - 0.025 * (high - low) };
+        frame.dot(
+            (plot.time_s(contact.time_s / plot.step_s), y),
+            1.0,
+            &format!(r#"fill="{}""#, colour(contact)),
+            "",
+        );
     }
     let legend = [
         ("backlash S, δX [µm]:", "#1C2530"),
@@ -222,21 +211,23 @@ fn load(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
 /// Draws δX against the coupling force with the fitted flanks; samples that the fit did not use are faint.
 fn flanks(plot: &EstimatePlot) -> String {
     let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
-    let (low, high) = span(plot.contacts.iter().map(|s| to_um(s.dx_m)));
-    let (left, right) = span(plot.contacts.iter().map(|s| s.force_n / 1e3));
+    let (low, high) = span(touches(plot).iter().map(|s| to_um(s.dx_m)));
+    let (left, right) = span(touches(plot).iter().map(|s| s.force_n / 1e3));
     let mut frame = axes([SIZE[0] - TIME_PLOTS_WIDTH, SIZE[1] - HEADING], (left, right), (low, high));
     frame.numbers(6, "coupling force [kN]");
     for is_used in [false, true] {
-        for contact in downsampled(&plot.contacts).filter(|contact| contact.is_used == is_used) {
+        for contact in downsampled(touches(plot))
+            .filter(|contact| contact.trust.is_some_and(|trust| trust > 0.0) == is_used)
+        {
             let fill = if is_used { colour(contact) } else { FAINT };
             let fill = format!(r#"fill="{fill}" fill-opacity="0.55""#);
             frame.dot((contact.force_n / 1e3, to_um(contact.dx_m)), 2.0, &fill, "");
         }
     }
-    for flank in &plot.flanks {
+    for flank in plot.contact.iter().flat_map(|contact| [&contact.upper, &contact.lower]) {
         frame.line(flank.iter().map(|(force_n, dx_m)| (force_n / 1e3, to_um(*dx_m))), GAP);
     }
-    let heading = if plot.contacts.is_empty() { "no contact found" } else { "corrected δX [µm]" };
+    let heading = if touches(plot).is_empty() { "no contact found" } else { "corrected δX [µm]" };
     frame.coloured_text([62.0, 14.0], "#1C2530", heading);
     frame.finish("")
 }
@@ -247,11 +238,16 @@ fn axes(size: [f64; 2], x: (f64, f64), y: (f64, f64)) -> Frame {
     frame
 }
 
-fn colour(contact: &ContactInterval) -> &'static str {
-    if contact.is_upper { UPPER } else { LOWER }
+fn colour(contact: &Touch) -> &'static str {
+    if contact.flank == Flank::Upper { UPPER } else { LOWER }
 }
 
-fn downsampled(contacts: &[ContactInterval]) -> impl Iterator<Item = &ContactInterval> {
+/// The stretches in contact.
+fn touches(plot: &EstimatePlot) -> &[Touch] {
+    plot.contact.as_ref().map_or(&[], |contact| &contact.touches)
+}
+
+fn downsampled(contacts: &[Touch]) -> impl Iterator<Item = &Touch> {
     contacts.iter().step_by(contacts.len().div_ceil(MAX_CONTACTS).max(1))
 }
 
@@ -331,12 +327,18 @@ mod tests {
         let mut dx_m: Vec<f64> = (0..samples).map(|k| 1e-4 * wave(k)).collect();
         dx_m[2500] = 3e-3;
         dx_m[100..200].fill(f64::NAN);
-        let contact = |k: usize| ContactInterval {
+        let touch = |k: usize| Touch {
             time_s: k as f64,
-            is_upper: k.is_multiple_of(2),
-            is_used: k > 3,
+            duration_s: 1.0,
+            flank: if k.is_multiple_of(2) { Flank::Upper } else { Flank::Lower },
+            trust: (k > 3).then_some(1.0),
             force_n: 100.0 * k as f64,
             dx_m: 1e-6 * k as f64,
+        };
+        let contact = ContactPlot {
+            touches: (0..20).map(touch).collect(),
+            upper: [(0.0, 5e-5), (5e3, 1.5e-4)],
+            lower: [(0.0, -5e-5), (-5e3, -1.5e-4)],
         };
         EstimatePlot {
             title: "<script>alert(1)</script> & co".to_owned(),
@@ -346,8 +348,7 @@ mod tests {
             load_n: (0..samples).map(|k| 5e3 * wave(k)).collect(),
             s_m: (0..samples).map(|k| 5e-5 * wave(k).signum()).collect(),
             bounds_m: Some((5e-5, -5e-5)),
-            contacts: (0..20).map(contact).collect(),
-            flanks: [vec![(0.0, 5e-5), (5e3, 1.5e-4)], vec![(0.0, -5e-5), (-5e3, -1.5e-4)]],
+            contact: Some(contact),
             dx_m,
         }
     }

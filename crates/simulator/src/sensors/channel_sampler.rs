@@ -52,37 +52,28 @@ impl ChannelSampler {
             self.shown = self.sensor.follow(before, after, self.step_s);
             (shown, self.shown)
         };
-        match &mut self.average {
-            None => self.sample(from_s, before, after),
-            Some(average) => {
-                while self.samples.len() < self.wanted {
-                    let boundary_s = (average.boundaries as f64 - 1.0) / self.rate_hz - self.delay_s;
-                    let part = (boundary_s - from_s) / self.step_s;
-                    if part > 1.0 {
-                        break;
-                    }
-                    // The first boundary ends no period: it opens the first one.
-                    if average.boundaries > 0 {
+        while !self.is_full() {
+            // The first instant of an average ends no period: it opens the first one.
+            let is_closed = self.average.as_ref().is_some_and(|average| !average.is_open);
+            let instant = self.samples.len() as f64 - f64::from(u8::from(is_closed));
+            let part = (instant / self.rate_hz - self.delay_s - from_s) / self.step_s;
+            if part > 1.0 {
+                break;
+            }
+            match &mut self.average {
+                None => self.samples.push(before + part * (after - before)),
+                Some(average) => {
+                    if average.is_open {
                         let rest = integral(before, after, average.since, part, self.step_s);
                         self.samples.push((average.integral + rest) * self.rate_hz);
                     }
-                    let boundaries = average.boundaries + 1;
-                    *average = BoxAverage { boundaries, integral: 0.0, since: part };
+                    *average = BoxAverage { is_open: true, integral: 0.0, since: part };
                 }
-                average.integral += integral(before, after, average.since, 1.0, self.step_s);
-                average.since = 0.0;
             }
         }
-    }
-
-    fn sample(&mut self, from_s: f64, before: f64, after: f64) {
-        while !self.is_full() {
-            let instant_s = self.samples.len() as f64 / self.rate_hz - self.delay_s;
-            let part = (instant_s - from_s) / self.step_s;
-            if part > 1.0 {
-                return;
-            }
-            self.samples.push(before + part * (after - before));
+        if let Some(average) = &mut self.average {
+            average.integral += integral(before, after, average.since, 1.0, self.step_s);
+            average.since = 0.0;
         }
     }
 }
@@ -133,11 +124,11 @@ impl SensorState {
 /// The mean over one sample period, which ends at the sample instant.
 #[derive(Debug, Default)]
 struct BoxAverage {
-    /// Boundaries passed so far; the first opens the first period.
-    boundaries: usize,
-    /// The integral since the last boundary.
+    /// Whether the first period has begun.
+    is_open: bool,
+    /// The integral since the period began.
     integral: f64,
-    /// Where within the present step the last boundary lay, 0 to 1.
+    /// Where within the present step the period began, 0 to 1.
     since: f64,
 }
 
