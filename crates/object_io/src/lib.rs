@@ -28,7 +28,7 @@ pub use client::{block_on, handle};
 pub use cloud::post_json;
 pub use error::Error;
 pub use http_post::{Posted, check_url};
-pub use listing::{ListEntry, head, list, list_first};
+pub use listing::{ListEntry, head, list};
 pub use local_file::{create_fresh, system_error};
 pub use object_file::ObjectFile;
 pub use settings::{Settings, configure};

@@ -33,19 +33,11 @@ impl ListEntry {
     }
 }
 
-/// Passes every object below a folder to `take`; one page (1000 objects) is held in memory at a time.
+/// Passes the first `most` objects below a folder to `take`, by name; one page (1000 objects) is held in memory at a time.
 ///
 /// # Errors
 /// The error of the failed request; entries passed before it are valid.
-pub fn list(folder: &Address, take: impl FnMut(ListEntry)) -> Result<(), Error> {
-    list_first(folder, usize::MAX, take)
-}
-
-/// As [`list`], for the first `most` objects by name.
-///
-/// # Errors
-/// As [`list`].
-pub fn list_first(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
+pub fn list(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
     block_on(folder.request(async |client, location| {
         let mut found = client.list(Some(location)).take(most);
         while let Some(meta) = found.next().await {

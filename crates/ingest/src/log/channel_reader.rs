@@ -61,8 +61,6 @@ pub(crate) struct ChannelSampling<'s> {
     pub(crate) samples: SampleSelector,
     pub(crate) time_column: Option<String>,
     valid: Option<SampleSelector>,
-    /// Rows between samples where the channel is slower than its rows; else 1.
-    every: usize,
     /// Its rows on one clock.
     pub(crate) base: TimeBase,
     /// The stamps of the rows that count, once they were read.
@@ -79,7 +77,6 @@ impl<'s> ChannelSampling<'s> {
             samples: table.samples(&named(&map.column), position),
             time_column: map.time_column.as_ref().map(named),
             valid: map.valid_column.as_ref().map(|column| table.samples(&named(column), position)),
-            every: 1,
             base: clock::uniform(0, 1.0),
             stamps: OnceCell::new(),
         }
@@ -167,7 +164,6 @@ impl<'s> ChannelSampling<'s> {
                 base
             }
         };
-        self.every = self.rows_between();
         Ok(self)
     }
 
@@ -184,6 +180,7 @@ impl<'s> ChannelSampling<'s> {
         Ok((Some(stamps), base))
     }
 
+    /// Rows between samples where the channel is slower than its rows; else 1.
     fn rows_between(&self) -> usize {
         match self.map.rate_hz {
             Some(rate_hz) if !self.is_apart() => {
@@ -272,14 +269,13 @@ impl<'s> ChannelSampling<'s> {
         let mut shared = self.shares_rows(master);
         if shared {
             self.base = master.base.clone();
-            self.every = self.rows_between();
         } else {
             self = self.with_clock()?;
         }
-        let is_slow_load = role == Role::Load && self.every > 1;
+        let is_own_rate = self.rows_between() == 1;
         // A nanosecond is no shift.
         let is_shifted = (self.map.shift_s() - master.map.shift_s()).abs() >= 1e-9;
-        let is_direct = shared && !is_shifted && (self.every == 1 || is_slow_load);
+        let is_direct = shared && !is_shifted && (is_own_rate || role == Role::Load);
         let read = match self.readings(geometry, wanted.filter(|_| is_direct)) {
             Ok(read) if is_direct => return Ok(read),
             Err(error) if shared && self.has_own_list(master, &error)? => {
@@ -297,10 +293,11 @@ impl<'s> ChannelSampling<'s> {
         })?;
         let at_s: Vec<f64> = lead.seconds.iter().map(|t| t + master.map.shift_s() + apart_s).collect();
         // Where it is slower than its rows, its own samples count.
-        let rows = decimated_rows(&read.values, self.every).into_iter().map(|row| row as usize);
+        let every = self.rows_between();
+        let rows = decimated_rows(&read.values, every).into_iter().map(|row| row as usize);
         let own = rows.map(|row| (stamps.seconds[row] + self.map.shift_s(), read.values[row]));
         let (own_s, values): (Vec<_>, Vec<_>) = own.unzip();
-        let step_s = self.base.step_s * self.every as f64;
+        let step_s = self.base.step_s * every as f64;
         let is_slow = step_s > BREAK_STEPS * master.base.step_s;
         let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
         let series = TimeSeries { at_s: &own_s, values: &values, step_s };

@@ -32,7 +32,7 @@ pub(crate) fn matching(
     let root = address.bucket_url();
     note_tables_above(address, folder, tables)?;
     let mut found = Vec::new();
-    object_io::list(&address.with_key(folder), |entry| {
+    object_io::list(&address.with_key(folder), usize::MAX, |entry| {
         tables.note(&entry.path);
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
         if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
@@ -51,7 +51,7 @@ fn note_tables_above(address: &Address, key: &str, tables: &mut TableFolders) ->
         let separator = if above.is_empty() { "" } else { "/" };
         for name in TableFolders::LOGS {
             let log = address.with_key(&format!("{above}{separator}{name}"));
-            match object_io::list_first(&log, MOST_NOTED, |entry| tables.note(&entry.path)) {
+            match object_io::list(&log, MOST_NOTED, |entry| tables.note(&entry.path)) {
                 Ok(()) | Err(object_io::Error::Denied { .. } | object_io::Error::Missing { .. }) => {}
                 Err(error) => return Err(error.into()),
             }

@@ -224,7 +224,7 @@ impl Location {
             return durable_fs::entries(&self.dir).map_err(Error::io(&self.dir, "read"));
         };
         let (prefix, mut found) = (joined(bucket.address.key(), ""), Vec::new());
-        object_io::list(&bucket.address, |entry| {
+        object_io::list(&bucket.address, usize::MAX, |entry| {
             let name = Address::parse_required(&entry.path).ok();
             let name = name.as_ref().and_then(|address| address.key().strip_prefix(&prefix));
             let written =
