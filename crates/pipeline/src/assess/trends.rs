@@ -245,28 +245,26 @@ pub fn assess(
         };
     };
     let mut histories = histories.map_or_else(|| load_histories(&store()?), Ok)?;
-    let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
-    let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    let days: Vec<Timestamp> = queries.iter().map(|(_, as_of)| *as_of).collect();
+    let selected: Vec<UnitKey> = queries.iter().map(|(named, _)| unit_of(named, &histories)).collect();
     // A unit that never flew has an assessment all the same.
     for unit in &selected {
         histories.units.entry(unit.clone()).or_default();
     }
     let fleet = FleetContext::new(config, installations, &mut histories, &days)?;
     // One assessment for each query, without data later than its date and without the tail-wide steps.
-    let row = |(query, unit): (&AsOfQuery, &UnitKey)| {
-        Ok(fleet.row(unit, &fleet.trend(unit, query.as_of_utc)?, query.as_of_utc, &TailWide::default()))
+    let row = |(unit, as_of): (&UnitKey, &Timestamp)| {
+        Ok(fleet.row(unit, &fleet.trend(unit, *as_of)?, *as_of, &TailWide::default()))
     };
-    let now = queries.par_iter().zip(&selected).map(row).collect::<Result<_, Error>>()?;
+    let now = selected.par_iter().zip(&days).map(row).collect::<Result<_, Error>>()?;
     Ok(StoreAssessment { now, ..StoreAssessment::default() })
 }
 
 /// The unit that a query means.
-fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
-    let named = (query.part_number.clone(), query.serial_number.clone());
-    if query.part_number.is_some() || histories.units.contains_key(&named) {
-        return named;
-    }
-    histories.units.keys().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
+fn unit_of(named: &UnitKey, histories: &Histories) -> UnitKey {
+    let is_complete = named.0.is_some() || histories.units.contains_key(named);
+    let known = || histories.units.keys().find(|name| name.1 == named.1);
+    if is_complete { named } else { known().unwrap_or(named) }.clone()
 }
 
 /// Every unit's flights in the store.

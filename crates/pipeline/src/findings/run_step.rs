@@ -17,7 +17,7 @@ use crate::findings::finding::Finding;
 use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
-use crate::fleet::bookkeeping::maintenance_log::{self, MaintenanceLog};
+use crate::fleet::bookkeeping::maintenance_log;
 
 /// Inputs of the step.
 pub(crate) struct FollowUp<'a> {
@@ -76,10 +76,7 @@ impl FollowUp<'_> {
         let mut events = writer.store().work_events()?;
         let mut added = Vec::new();
         if !self.is_partial {
-            let maintenance = match &self.config.document.logs.maintenance {
-                Some(file) => maintenance_log::read(&self.config.path(file))?,
-                None => MaintenanceLog::new(),
-            };
+            let maintenance = maintenance_log::read(self.config)?;
             let newest = findings.iter().map(|finding| finding.as_of_utc).max();
             let tables = Tables::new(self.installations, &maintenance, newest.map_or(now, |at| at.max(now)));
             added = work_update::update(&events, findings, &tables, self.run_id, now);

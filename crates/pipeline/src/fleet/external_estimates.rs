@@ -6,21 +6,13 @@ use ingest::tables::{TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
 use crate::fleet::builder::{self, add_external};
-use crate::fleet::histories::Histories;
+use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::unit_rows::of_parts;
 use jiff::Timestamp;
 
-/// A unit and a day.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AsOfQuery {
-    /// The part number, where the table has it.
-    pub part_number: Option<String>,
-    /// The unit.
-    pub serial_number: String,
-    /// The date of the assessment; later data are ignored.
-    pub as_of_utc: Timestamp,
-}
+/// A unit, and the date of its assessment; later data are ignored.
+pub type AsOfQuery = (UnitKey, Timestamp);
 
 /// Reads an estimates table: `serial_number` (or `serial`), `departure_utc`, `gap_m`, and what else the
 /// contract allows.
@@ -56,11 +48,9 @@ pub fn queries(table: &TableBatch) -> Result<Vec<AsOfQuery>, Error> {
     table
         .rows()
         .map(|row| {
-            Ok(AsOfQuery {
-                part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),
-                serial_number: table.required(row, serial, name::<records::SerialNumber>)?.to_string(),
-                as_of_utc: table.required(row, as_of, utc)?,
-            })
+            let part_number = part.and_then(|c| table.text(row, c)).map(str::to_owned);
+            let serial_number = table.required(row, serial, name::<records::SerialNumber>)?.to_string();
+            Ok(((part_number, serial_number), table.required(row, as_of, utc)?))
         })
         .collect()
 }

@@ -41,25 +41,22 @@ pub type NamedLog = (LogFiles, String);
 /// # Errors
 /// [`Error::Refused`] when a pattern fits no file, or is no pattern.
 pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
-    let mut seen = SeenObjects::new();
-    let mut unlisted = BTreeMap::new();
-    let main = matching(config, &config.document.logs.files, &mut seen, &mut unlisted)?;
-    let main = flights_of(config, main, &config.document.identity, &mut unlisted);
+    let mut found = DiscoveredLogs::default();
+    let main = matching(config, &config.document.logs.files, &mut found)?;
+    let main = flights_of(config, main, &config.document.identity, &mut found);
     let mut companions = Vec::new();
     for (name, group) in &config.document.group {
-        let files = matching(config, &group.files, &mut seen, &mut unlisted)?;
+        let files = matching(config, &group.files, &mut found)?;
         let identity = group.identity.as_ref().unwrap_or(&config.document.identity);
-        let files = flights_of(config, files, identity, &mut unlisted);
+        let files = flights_of(config, files, identity, &mut found);
         companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
-    let mut found = if companions.is_empty() && !config.document.logs.has_pieces() {
-        let logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
-        DiscoveredLogs { logs, ..DiscoveredLogs::default() }
+    if companions.is_empty() && !config.document.logs.has_pieces() {
+        found.logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
     } else {
-        group_files(config, main, companions)
-    };
-    found.faulty.append(&mut unlisted);
-    Ok(DiscoveredLogs { seen, ..found })
+        group_files(config, main, companions, &mut found);
+    }
+    Ok(found)
 }
 
 /// The flights of some files, each with a name and a path of its own; a file that cannot be read keeps its name, and is
@@ -68,24 +65,24 @@ fn flights_of(
     config: &Config,
     files: Vec<(String, PathBuf)>,
     identity: &IdentityMapping,
-    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+    found: &mut DiscoveredLogs,
 ) -> Vec<(String, PathBuf)> {
     if !identity.by_row {
         return files;
     }
     let split: Vec<_> =
         files.into_par_iter().map(|(name, path)| (flights_in(&path, &name, identity), name, path)).collect();
-    let mut found = Vec::new();
+    let mut named = Vec::new();
     for (flights, name, path) in split {
         match flights {
-            Ok(paths) => found.extend(paths.into_iter().map(|path| (log_path(config, &path), path))),
+            Ok(paths) => named.extend(paths.into_iter().map(|path| (log_path(config, &path), path))),
             Err(diagnostic) if is_passing(&diagnostic.code) => {
-                unlisted.insert(name, (path, diagnostic));
+                found.faulty.insert(name, (path, diagnostic));
             }
-            Err(_) => found.push((name, path)),
+            Err(_) => named.push((name, path)),
         }
     }
-    found
+    named
 }
 
 /// The flights of files given by hand, as paths of their own.
@@ -176,7 +173,8 @@ fn group_files(
     config: &Config,
     main: Vec<(String, PathBuf)>,
     companions: Vec<(&str, (String, PathBuf))>,
-) -> DiscoveredLogs {
+    found: &mut DiscoveredLogs,
+) {
     let mut known: Vec<IdentifiedFile> = main
         .into_par_iter()
         .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
@@ -184,7 +182,6 @@ fn group_files(
     if config.document.logs.has_pieces() {
         join_pieces(&mut known);
     }
-    let mut found = DiscoveredLogs::default();
     let mut whose = IdentityIndex::new();
     for (who, log_path, path) in known {
         let who = match who {
@@ -219,10 +216,9 @@ fn group_files(
     for (who, group, log_path, path) in identified {
         match who {
             Err(diagnostic) => drop(found.faulty.insert(log_path, (path, diagnostic))),
-            Ok(who) => attach_companions(&mut found, &whose, &who, group, log_path, &path),
+            Ok(who) => attach_companions(found, &whose, &who, group, log_path, &path),
         }
     }
-    found
 }
 
 /// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
@@ -265,10 +261,9 @@ type Listed = Result<(PathBuf, Option<FileStat>), TableFault>;
 fn matching(
     config: &Config,
     patterns: &[String],
-    seen: &mut SeenObjects,
-    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+    found: &mut DiscoveredLogs,
 ) -> Result<Vec<(String, PathBuf)>, Error> {
-    let mut found = BTreeMap::new();
+    let mut named = BTreeMap::new();
     let (mut silent, mut tables) = (BTreeSet::new(), TableFolders::default());
     // `**` reaches our own results and tables, which are no logs.
     let logs = &config.document.logs;
@@ -303,12 +298,12 @@ fn matching(
             match checked {
                 Ok(None) => {}
                 Ok(Some((path, stat))) => {
-                    seen.extend(stat.map(|stat| (path.clone(), stat)));
-                    found.insert(log_path(config, &path), path);
+                    found.seen.extend(stat.map(|stat| (path.clone(), stat)));
+                    named.insert(log_path(config, &path), path);
                 }
                 Err((path, diagnostic)) => {
                     let shown = log_path(config, &path);
-                    unlisted.insert(shown.clone(), (path, diagnostic.in_file(&shown)));
+                    found.faulty.insert(shown.clone(), (path, diagnostic.in_file(&shown)));
                 }
             }
         }
@@ -318,7 +313,7 @@ fn matching(
     }
     // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
     if silent.is_empty() {
-        Ok(found.into_iter().collect())
+        Ok(named.into_iter().collect())
     } else {
         Err(Error::refused(no_log(config, &silent)))
     }
@@ -402,13 +397,9 @@ mod tests {
         let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
             .replace("logs/**/*.parquet", "logs/*.parquet");
         let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
-        let (mut seen, mut unlisted) = (SeenObjects::new(), BTreeMap::new());
-        let found = matching(&config, &["logs/*.parquet".to_owned()], &mut seen, &mut unlisted).unwrap();
-        assert_eq!(
-            found.iter().map(|(log_path, _)| log_path.as_str()).collect::<Vec<_>>(),
-            ["logs/a.parquet"]
-        );
-        let (path, error) = &unlisted["logs/b.parquet"];
+        let found = discover(&config).unwrap();
+        assert_eq!(found.logs.keys().collect::<Vec<_>>(), ["logs/a.parquet"]);
+        let (path, error) = &found.faulty["logs/b.parquet"];
         assert_eq!((error.code.as_str(), path.ends_with("b.parquet")), ("file_unreadable", true));
     }
 }

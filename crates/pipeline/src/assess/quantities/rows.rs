@@ -121,29 +121,9 @@ fn evidence(subject: &Subject<'_>, fit: &QuantityChanges) -> String {
     )
 }
 
-/// Likely cause of the unit's own change: the wear where the quantity follows the gap.
-fn cause(subject: &Subject<'_>) -> String {
-    const FOLLOWS: f64 = 0.8;
-    match gap_correlation(subject) {
-        Some(r) if r.abs() > FOLLOWS => format!("it follows the gap (r = {r:.2})"),
-        _ if subject.treatment.is_of_sensor() => "its sensor or wiring".to_owned(),
-        _ => ChangeScope::Unit.cause().to_owned(),
-    }
-}
-
-/// Correlation with the gaps of the same flights.
-fn gap_correlation(subject: &Subject<'_>) -> Option<f64> {
-    let flights = subject.series().flights();
-    let pair = |v: &trend::quantity::QuantityValue| {
-        let at = flights.binary_search_by_key(&v.departure_us, |f| f.departure_us).ok()?;
-        Some((v.value, flights[at].gap?.gap_m))
-    };
-    let pairs: Vec<(f64, f64)> = subject.values.iter().filter_map(pair).collect();
-    let count = pairs.len() as f64;
-    let (x, y) = pairs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / count, sum.1 + y / count));
-    let sum = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(a, b)| of(a - x, b - y)).sum::<f64>();
-    let r = sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
-    (pairs.len() >= 8).then_some(r).filter(|r| r.is_finite())
+/// Likely cause of the unit's own change.
+fn cause(subject: &Subject<'_>) -> &'static str {
+    if subject.treatment.is_of_sensor() { "its sensor or wiring" } else { ChangeScope::Unit.cause() }
 }
 
 /// A step that a tail or a part made.

@@ -12,7 +12,7 @@ use crate::assess::quantities::limits::{Scale, Treatment};
 use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ, Units};
 use crate::findings::monitoring::median;
 use crate::fleet::flight_row::FlightRow;
-use crate::fleet::histories::{History, TailPosition, UnitKey};
+use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// Facts about a unit in addition to the values.
 #[derive(Clone, Copy)]
@@ -27,8 +27,6 @@ pub(crate) struct Subject<'a> {
     pub(crate) name: &'a UnitKey,
     /// Its flights.
     unit: &'a FollowedFlights<'a>,
-    /// Its history, and the same by usage.
-    of_fleet: &'a (&'a History, Series),
     pub(crate) quantity: Quantity,
     /// What limits are a share of, in the quantity's unit.
     pub(crate) scale: f64,
@@ -53,9 +51,9 @@ impl<'a> Subject<'a> {
         let quantity = READ[index].0;
         let treatment = Treatment::of(quantity, &facts.limits.quantities(name.0.as_deref()));
         let (last, _) = unit.flights.last()?;
-        let of_fleet = facts.units.get(name)?;
+        let (_, series) = facts.units.get(name)?;
         // The channels of a position have no hours and no maintenance of their own.
-        let series = Some(&of_fleet.1).filter(|_| !treatment.is_of_channel);
+        let series = Some(series).filter(|_| !treatment.is_of_channel);
         let maintained = series.and_then(|s| s.maintenance_until(last.departure_us()).last());
         let moved = unit.flights.iter().rposition(|(flown, _)| flown.place != last.place);
         let begin = moved.filter(|_| treatment.is_of_position).map_or(0, |k| k + 1);
@@ -90,7 +88,6 @@ impl<'a> Subject<'a> {
         (!values.is_empty() && scale > 0.0).then_some(Self {
             name,
             unit,
-            of_fleet,
             quantity,
             scale,
             treatment,
@@ -110,14 +107,9 @@ impl<'a> Subject<'a> {
         Some(self.treatment.limit? * self.scale)
     }
 
-    /// The unit's usage.
-    pub(crate) fn series(&self) -> &'a Series {
-        &self.of_fleet.1
-    }
-
     /// Name of a flight.
     pub(crate) fn flight_id(&self, departure_us: i64) -> Option<String> {
-        let history = self.of_fleet.0;
+        let history = self.unit.history;
         history.flight_id(history.at(Timestamp::from_microsecond(departure_us).ok()?)?).map(str::to_owned)
     }
 

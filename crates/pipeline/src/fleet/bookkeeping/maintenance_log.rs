@@ -1,7 +1,6 @@
 //! Maintenance log: work on units, with its date.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use ingest::tables::{TableBatch, name, utc};
 use job::Config;
@@ -14,17 +13,18 @@ use crate::error::Error;
 /// Entries by part and serial number.
 pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 
-/// Reads a maintenance table: `part_number`, `serial_number`, `utc`, `kind` (`reshim`, `rerig`, `overhaul` or
+/// Reads the configured maintenance table, empty where none is configured: `part_number`, `serial_number`, `utc`, `kind` (`reshim`, `rerig`, `overhaul` or
 /// `lubrication`); CSV or Parquet.
 ///
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
-pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
-    let table = TableBatch::read(file)?;
+pub(crate) fn read(config: &Config) -> Result<MaintenanceLog, Error> {
+    let mut maintenance = MaintenanceLog::new();
+    let Some(file) = &config.document.logs.maintenance else { return Ok(maintenance) };
+    let table = TableBatch::read(&config.path(file))?;
     let column = |name| table.column(&[name]);
     let (part, serial) = (column("part_number")?, column("serial_number")?);
     let (done, kind) = (column("utc")?, column("kind")?);
-    let mut maintenance = MaintenanceLog::new();
     for row in table.rows() {
         let unit = (
             table.required(row, part, name::<PartNumber>)?.to_string(),

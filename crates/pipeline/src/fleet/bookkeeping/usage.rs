@@ -29,10 +29,8 @@ impl<'a> OperatorTables<'a> {
         installations: &'a Installations,
         is_booked: bool,
     ) -> Result<Self, Error> {
-        let file = config.document.logs.maintenance.as_ref();
-        let maintenance = file.map(|file| maintenance_log::read(&config.path(file))).transpose()?;
         Ok(Self {
-            maintenance: maintenance.unwrap_or_default(),
+            maintenance: maintenance_log::read(config)?,
             flights: &config.flights,
             installations: InstallationIndex::new(installations),
             inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
