@@ -12,7 +12,7 @@ use store::LogRecord;
 pub(crate) type SeenObjects = HashMap<PathBuf, FileStat>;
 
 /// Identity and version of a file without opening it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct FileStat {
     /// Bytes.
     pub size_bytes: i64,

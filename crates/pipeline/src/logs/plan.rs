@@ -8,6 +8,7 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
+use serde::{Deserialize, Serialize};
 use store::{LogOutcome, LogRecord, RecordKey};
 
 use crate::error::{is_passing, is_unlisted};
@@ -62,7 +63,7 @@ impl Request {
 }
 
 /// Reason to process a log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum WorkReason {
     /// The log is new.
     New,
@@ -102,7 +103,7 @@ impl WorkReason {
 }
 
 /// One log to be processed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WorkItem {
     /// Its files.
     pub files: LogFiles,
@@ -151,7 +152,7 @@ pub struct Plan {
 }
 
 /// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StandingError {
     /// The log.
     pub log: String,

@@ -8,28 +8,24 @@
 
 use std::collections::HashMap;
 
-use ingest::LogFiles;
 use job::Config;
 use records::Installations;
 use serde::{Deserialize, Serialize};
-use store::LogRecord;
 
 use crate::error::Error;
-use crate::logs::plan::{Plan, Request, WorkItem, WorkReason};
+use crate::logs::plan::{Plan, Request, WorkItem};
 use crate::run::event::Event;
 use crate::run::flight_ownership::ProcessedLog;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::scheduler::{Context, RunInputs, WorkerContext, execute_run};
-use crate::run::summary::{self, RunSummary};
+use crate::run::summary::RunSummary;
 use crate::run::worker_pool::StepCount;
 
 /// One log to be processed by the engine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
-    /// Its name in records and messages.
-    pub log_path: String,
-    /// Its files.
-    pub files: LogFiles,
+    /// The log, with its status before.
+    pub work: WorkItem,
     /// The run it is done for.
     pub run_id: String,
 }
@@ -48,7 +44,6 @@ pub fn process_task(
     task: &Task,
     program_version: &str,
 ) -> Result<String, Error> {
-    // Content can be known only to a plan that has accounts, and this one has none.
     let unidentified = job::flight_log::digest_without_identity(config, installations);
     let inputs = RunInputs {
         config: config.clone(),
@@ -57,12 +52,10 @@ pub fn process_task(
         run_id: task.run_id.clone(),
         program_version: program_version.to_owned(),
     };
-    let (files, log_path) = (task.files.clone(), task.log_path.clone());
-    let work = WorkItem { files, fault: None, log_path, stat: None, why: WorkReason::New, before: None };
     let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
     let worker = WorkerContext { inputs: &inputs, budget: &budget, steps: &steps };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let done = pool.install(|| worker.process_log(&work));
+    let done = pool.install(|| worker.process_log(&task.work));
     serde_json::to_string(&done).map_err(|e| Error::Engine(e.to_string()))
 }
 
@@ -95,32 +88,21 @@ fn process_batch(
     watch: &dyn Fn(Event),
 ) -> Result<Vec<ProcessedLog>, Error> {
     let sound = works.iter().filter(|work| work.fault.is_none());
-    let task = |work: &WorkItem| Task {
-        log_path: work.log_path.clone(),
-        files: work.files.clone(),
-        run_id: inputs.run_id.clone(),
-    };
+    let task = |work: &WorkItem| Task { work: work.clone(), run_id: inputs.run_id.clone() };
     let tasks: Vec<Task> = sound.map(task).collect();
     let mut answers =
         if tasks.is_empty() { HashMap::new() } else { read(engine(&tasks).map_err(Error::Engine)?)? };
     let outcome = |work: &WorkItem| {
         let done = match &work.fault {
             Some(fault) => inputs.failed(work, fault.clone()),
-            None => to_log_result(inputs, work, answers.remove(&work.log_path)?),
+            None => answers.remove(&work.log_path)?,
         };
+        // The engine knows what the log was before, and this process also what other logs were.
+        let done = inputs.known(work, &done.account).unwrap_or(done);
         watch(done.event(work));
         Some(done)
     };
     Ok(works.iter().filter_map(outcome).collect())
-}
-
-/// Outcome of a log, as if it had been processed by this process.
-fn to_log_result(inputs: &RunInputs, work: &WorkItem, answer: ProcessedLog) -> ProcessedLog {
-    // The engine has seen the log, and this process its file.
-    let LogRecord { size_bytes, modified_utc_ns, file_id, log_path, .. } =
-        summary::of_log(work, &inputs.run_id);
-    let account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..answer.account };
-    inputs.known(work, &account).unwrap_or(ProcessedLog { account, ..answer })
 }
 
 /// Results by log; the first of several results of a log counts.
