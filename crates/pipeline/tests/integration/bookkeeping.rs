@@ -6,6 +6,7 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
+use pipeline::fleet::bookkeeping::installation_index::dates_ahead;
 use pipeline::fleet::bookkeeping::join::Bookkeeping;
 use records::{
     Alias, GapEstimate, GapRecord, Installation, Installations, Position, RunRecord, SerialNumber, Status,
@@ -193,4 +194,19 @@ fn any_order_of_logs_corrections_and_kills_ends_where_one_ordered_run_does() {
             thread.join().unwrap();
         }
     });
+}
+
+#[test]
+fn a_date_ahead_whose_day_and_month_exchanged_are_past_names_that_date() {
+    let utc = |text: &str| text.parse::<Timestamp>().unwrap();
+    let (installed, removed) = (utc("2026-08-24T00:00:00Z"), utc("2026-12-10T06:00:00Z"));
+    let installation = fleet::installation(["N1", "left", "P", "S"], installed, Some(removed));
+    let table = Installations::new(vec![installation]).unwrap();
+    let named = |now: &str| dates_ahead(&table, utc(now)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    let likely =
+        "P / S: `removed_utc` is 2026-12-10, a date to come; day and month may be exchanged (2026-10-12)";
+    assert_eq!(named("2026-11-23T00:00:00Z"), [likely]);
+    // Before the exchanged date, nothing hints at an exchange; at the date itself, it has come.
+    assert_eq!(named("2026-10-01T00:00:00Z"), [likely.split(';').next().unwrap()]);
+    assert!(named("2026-12-10T00:00:00Z").is_empty());
 }

@@ -46,6 +46,7 @@ impl<'a> InstallationIndex<'a> {
         self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
     }
 }
+
 /// A date of the installations table that is still to come.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
@@ -98,38 +99,4 @@ fn exchanged(at: Timestamp) -> Option<Timestamp> {
         return None;
     }
     there.with().month(day).day(month).build().ok()?.to_zoned(TimeZone::UTC).ok().map(|z| z.timestamp())
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-mod tests {
-    use records::{PartNumber, Position, SerialNumber, TailNumber};
-
-    use super::*;
-
-    #[test]
-    fn a_date_ahead_whose_day_and_month_exchanged_are_past_names_that_date() {
-        let installation = Installation {
-            tail_number: TailNumber::new("N1").unwrap(),
-            position: Position::new("left").unwrap(),
-            part_number: PartNumber::new("P").unwrap(),
-            serial_number: SerialNumber::new("S").unwrap(),
-            installed_utc: "2026-08-24T00:00:00Z".parse().unwrap(),
-            removed_utc: Some("2026-12-10T06:00:00Z".parse().unwrap()),
-            unit_hours_at_install: None,
-            tail_hours_at_install: None,
-            today: None,
-        };
-        let table = Installations::new(vec![installation]).unwrap();
-        let named = |now: &str| {
-            let found = dates_ahead(&table, now.parse().unwrap());
-            found.iter().map(ToString::to_string).collect::<Vec<_>>()
-        };
-        let likely =
-            "P / S: `removed_utc` is 2026-12-10, a date to come; day and month may be exchanged (2026-10-12)";
-        assert_eq!(named("2026-11-23T00:00:00Z"), [likely]);
-        // Before the exchanged date, nothing hints at an exchange; at the date itself, it has come.
-        assert_eq!(named("2026-10-01T00:00:00Z"), [likely.split(';').next().unwrap()]);
-        assert!(named("2026-12-10T00:00:00Z").is_empty());
-    }
 }

@@ -1,11 +1,10 @@
 //! Flights of the flights table that left no record: an actuator wears in them all the same.
 
-use std::collections::BTreeSet;
-
 use ingest::tables::flights::Flights;
-use jiff::{SignedDuration, Timestamp};
+use jiff::SignedDuration;
 use records::{Flight, Installation};
 
+use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::History;
 
 /// Longest distance between the departures of a flight and a record of the same name: names are reused.
@@ -22,35 +21,24 @@ pub(crate) fn unlogged_flights<'a>(
     if table.is_empty() || history.flights().iter().all(is_elsewhere) {
         return Vec::new();
     }
-    let known = &Known::of(history);
     let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
         let flights = table.of_tail(installation.tail_number.as_str());
-        let missing = flights.filter(|f| installation.covers(f.departure_utc) && !known.holds(f));
+        let missing = flights.filter(|f| installation.covers(f.departure_utc) && !is_logged(f, history));
         missing.map(move |flight| (index, flight))
     });
     missing.collect()
 }
 
-/// Flights covered by a unit's rows.
-struct Known<'a> {
-    departures: BTreeSet<(&'a str, Timestamp)>,
-    names: BTreeSet<(&'a str, &'a str, Timestamp)>,
-}
-
-impl<'a> Known<'a> {
-    fn of(history: &'a History) -> Self {
-        let mut known = Self { departures: BTreeSet::new(), names: BTreeSet::new() };
-        for f in history.flights() {
-            let Some(tail) = history.place(f).tail_number.as_deref() else { continue };
-            known.departures.insert((tail, f.departure_utc()));
-            known.names.extend(history.flight_id(f).map(|id| (tail, id, f.departure_utc())));
-        }
-        known
-    }
-
-    fn holds(&self, flight: &Flight) -> bool {
-        let (tail, id, at) = (flight.tail_number.as_str(), flight.flight_id.as_str(), flight.departure_utc);
-        let near = (tail, id, at - SAME_FLIGHT)..=(tail, id, at + SAME_FLIGHT);
-        self.departures.contains(&(tail, at)) || self.names.range(near).next().is_some()
-    }
+/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure close by.
+fn is_logged(flight: &Flight, history: &History) -> bool {
+    let at = flight.departure_utc;
+    let first = history.flights().partition_point(|flown| flown.departure_utc() < at - SAME_FLIGHT);
+    let mut near =
+        history.flights()[first..].iter().take_while(|flown| flown.departure_utc() <= at + SAME_FLIGHT);
+    let is_same = |flown: &FlightRow| {
+        flown.departure_utc() == at || history.flight_id(flown) == Some(flight.flight_id.as_str())
+    };
+    let is_on_tail =
+        |flown: &FlightRow| history.place(flown).tail_number.as_deref() == Some(flight.tail_number.as_str());
+    near.any(|flown| is_same(flown) && is_on_tail(flown))
 }
