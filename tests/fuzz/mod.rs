@@ -62,12 +62,14 @@ fn fuzz_maintenance_and_estimates() {
     let corpus = [maintenance, estimates, queries].map(|text| text.as_bytes().to_vec()).to_vec();
     let folder = tempfile::tempdir().unwrap();
     let file: PathBuf = folder.path().join("table.csv");
+    let mut config = Config::default();
+    config.document.logs.maintenance = Some(file.display().to_string());
     bolero::check!().with_iterations(300).with_max_len(64).for_each(|input| {
         let choices = &mut Choices(input);
         let mut bytes = choices.pick(&corpus).clone();
         edit_text(choices, &mut bytes, &corpus);
         std::fs::write(&file, bytes).unwrap();
-        let _ = maintenance_log::read(&file).map_err(|e| e.to_string());
+        let _ = maintenance_log::read(&config).map_err(|e| e.to_string());
         let _ = external_estimates::read(&file).map_err(|e| e.to_string());
         let _ = TableBatch::read(&file)
             .map(|table| external_estimates::queries(&table).map_err(|e| e.to_string()));

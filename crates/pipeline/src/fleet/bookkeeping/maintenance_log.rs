@@ -13,12 +13,12 @@ use crate::error::Error;
 /// Entries by part and serial number.
 pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 
-/// Reads the configured maintenance table, empty where none is configured: `part_number`, `serial_number`, `utc`, `kind` (`reshim`, `rerig`, `overhaul` or
-/// `lubrication`); CSV or Parquet.
+/// Reads the configured maintenance table; empty where none is configured. Its columns are `part_number`, `serial_number`,
+/// `utc` and `kind` (`reshim`, `rerig`, `overhaul` or `lubrication`); CSV or Parquet.
 ///
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
-pub(crate) fn read(config: &Config) -> Result<MaintenanceLog, Error> {
+pub fn read(config: &Config) -> Result<MaintenanceLog, Error> {
     let mut maintenance = MaintenanceLog::new();
     let Some(file) = &config.document.logs.maintenance else { return Ok(maintenance) };
     let table = TableBatch::read(&config.path(file))?;

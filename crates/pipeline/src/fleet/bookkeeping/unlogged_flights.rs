@@ -29,7 +29,7 @@ pub(crate) fn unlogged_flights<'a>(
     missing.collect()
 }
 
-/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure close by.
+/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure within 12 hours of it.
 fn is_logged(flight: &Flight, history: &History) -> bool {
     let at = flight.departure_utc;
     let first = history.flights().partition_point(|flown| flown.departure_utc() < at - SAME_FLIGHT);
