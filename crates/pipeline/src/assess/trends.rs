@@ -13,7 +13,6 @@ use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
 use crate::assess::quantities::follow::{FollowedQuantities, follow};
-use crate::assess::quantities::subject::UnitFacts;
 use crate::assess::quantities::values::{self, FleetValues, Units, by_unit};
 use crate::assess::quantities::{peers, rows};
 use crate::assess::tail_wide_steps::TailWide;
@@ -355,9 +354,8 @@ impl<'a> FleetContext<'a> {
     where
         'a: 'v,
     {
-        let facts = UnitFacts { units: &self.units, limits: self.limits };
         let units = by_unit(&self.units, values, as_of);
-        self.followed = follow(&units, facts, as_of);
+        self.followed = follow(&units, &self.units, self.limits, as_of);
         self.moved = recorder_changes(&self.followed.changes, as_of);
         for (row, state) in self.followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
             self.conditions.entry(row.unit()).or_default().push(state.to_owned());

@@ -395,7 +395,7 @@ mod tests {
         std::fs::write(folder.path().join("logs/a.parquet"), "").unwrap();
         std::os::unix::fs::symlink("b.parquet", folder.path().join("logs/b.parquet")).unwrap();
         let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-            .replace("logs/**/*.parquet", "logs/*.parquet");
+            .replace("sample-data/logs/**/*.parquet", "logs/*.parquet");
         let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
         let found = discover(&config).unwrap();
         assert_eq!(found.logs.keys().collect::<Vec<_>>(), ["logs/a.parquet"]);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 use jiff::Timestamp;
 use job::Config;
-use records::{Installation, Installations, PartNumber, QuantityRow};
+use records::{Flight, Installation, Installations, PartNumber, QuantityRow};
 use store::{LogOutcome, LogRecord, Store};
 use trend::Forecast;
 
@@ -354,14 +354,11 @@ fn tails(
             tail.refused += 1;
         }
     }
-    for flight in config.flights.iter().filter(|f| as_of.is_none_or(|as_of| f.departure_utc <= as_of)) {
-        if let Some((tail, _)) = tails.get_mut(flight.tail_number.as_str()) {
-            *tail.flown.get_or_insert(0) += 1;
-        }
-    }
     let counted = |(name, (tail, departures)): (&str, (ReportTailRow, BTreeSet<i64>))| {
-        let tail_number = name.to_owned();
-        (tail_number.clone(), ReportTailRow { tail_number, flights: departures.len() as i64, ..tail })
+        let is_past = |flight: &&Flight| as_of.is_none_or(|as_of| flight.departure_utc <= as_of);
+        let flown = Some(config.flights.of_tail(name).filter(is_past).count() as i64).filter(|n| *n > 0);
+        let (tail_number, flights) = (name.to_owned(), departures.len() as i64);
+        (tail_number.clone(), ReportTailRow { tail_number, flights, flown, ..tail })
     };
     tails.into_iter().map(counted).collect()
 }

@@ -10,11 +10,12 @@ use trend::quantity::changes::QuantityStep;
 use trend::quantity::common_curve::CommonCurve;
 use trend::quantity::covariates::Slopes;
 
+use crate::assess::limits::Limits;
 use crate::assess::quantities::attribution::common_steps;
 use crate::assess::quantities::limits::Treatment;
 use crate::assess::quantities::rows;
-use crate::assess::quantities::subject::{Subject, UnitFacts, fit_all};
-use crate::assess::quantities::values::{FollowedUnits, READ, by_position};
+use crate::assess::quantities::subject::{Subject, fit_all};
+use crate::assess::quantities::values::{FollowedUnits, READ, Units, by_position};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -39,14 +40,17 @@ pub struct FollowedQuantities {
 /// Follows all quantities of all units.
 pub(crate) fn follow(
     units: &FollowedUnits<'_>,
-    facts: UnitFacts<'_>,
+    fleet: &Units<'_>,
+    limits: Limits<'_>,
     as_of: Timestamp,
 ) -> FollowedQuantities {
     let positions = by_position(units);
     let of_quantity = |index: usize| {
-        let usual = Treatment::of(READ[index].0, &facts.limits.quantities(None));
+        let usual = Treatment::of(READ[index].0, &limits.quantities(None));
         let units = if usual.is_of_channel { &positions } else { units };
-        let subjects = units.par_iter().filter_map(|(name, unit)| Subject::new(name, unit, facts, index));
+        let subjects = units
+            .par_iter()
+            .filter_map(|(name, unit)| Subject::new(name, unit, &fleet.get(*name)?.1, limits, index));
         follow_quantity(subjects.collect(), usual.limit, as_of)
     };
     let mut all = FollowedQuantities::default();

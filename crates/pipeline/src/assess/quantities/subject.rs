@@ -9,17 +9,10 @@ use trend::quantity::changes::{self, QuantityChanges, QuantityStep};
 
 use crate::assess::limits::Limits;
 use crate::assess::quantities::limits::{Scale, Treatment};
-use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ, Units};
+use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ};
 use crate::findings::monitoring::median;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{TailPosition, UnitKey};
-
-/// Facts about a unit in addition to the values.
-#[derive(Clone, Copy)]
-pub(crate) struct UnitFacts<'a> {
-    pub(crate) units: &'a Units<'a>,
-    pub(crate) limits: Limits<'a>,
-}
 
 /// One quantity of one unit.
 pub(crate) struct Subject<'a> {
@@ -45,13 +38,13 @@ impl<'a> Subject<'a> {
     pub(crate) fn new(
         name: &'a UnitKey,
         unit: &'a FollowedFlights<'a>,
-        facts: UnitFacts<'a>,
+        series: &Series,
+        limits: Limits<'_>,
         index: usize,
     ) -> Option<Self> {
         let quantity = READ[index].0;
-        let treatment = Treatment::of(quantity, &facts.limits.quantities(name.0.as_deref()));
+        let treatment = Treatment::of(quantity, &limits.quantities(name.0.as_deref()));
         let (last, _) = unit.flights.last()?;
-        let (_, series) = facts.units.get(name)?;
         // The channels of a position have no hours and no maintenance of their own.
         let series = Some(series).filter(|_| !treatment.is_of_channel);
         let maintained = series.and_then(|s| s.maintenance_until(last.departure_us()).last());

@@ -59,14 +59,9 @@ fn age_of(newest_log: Timestamp, as_of: Timestamp, today: Timestamp) -> Option<S
 
 /// A flights table that ends before the logs do: from then on, usage is that of logged flights.
 fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
-    let mut ends = BTreeMap::<&str, Timestamp>::new();
-    for flight in config.flights.iter() {
-        let end = ends.entry(flight.tail_number.as_str()).or_default();
-        *end = flight.departure_utc.max(*end);
-    }
     let ended = rows.iter().filter_map(|row| {
         let (tail, latest) = (row.tail_number.as_deref()?, row.latest_utc?);
-        let end = *ends.get(tail)?;
+        let end = config.flights.of_tail(tail).last()?.departure_utc;
         (days_between(end, latest) > QUIET_DAYS).then_some((tail, end, latest))
     });
     let ended: BTreeSet<(&str, Timestamp, Timestamp)> = ended.collect();
