@@ -46,7 +46,7 @@ pub(crate) struct BlockMeans {
     /// X₂ as it was logged, m.
     screw_m: Vec<f64>,
     /// F as it was logged, N.
-    logged_n: Vec<f64>,
+    pub(crate) logged_n: Vec<f64>,
     /// Sine and cosine of the screw's position within the period of its errors; empty where no period is configured.
     pub(crate) phases: Vec<[f64; 2]>,
     /// The coupling at each block, once it is integrated.

@@ -6,9 +6,8 @@ use std::ops::Range;
 
 use crate::io::read_at;
 
-/// Bytes that are read and hashed at a time: the hash takes sixteen pieces of 1 KiB side by side, but fewer at the ends of
-/// what it is fed with.
-const BUFFER_BYTES: usize = 1 << 19;
+/// Bytes that are read and hashed at a time: as many as stay in the cache in between.
+const BUFFER_BYTES: usize = 1 << 17;
 
 /// A digest that stretches are added to, one after the other as if they were one.
 #[derive(Debug)]

@@ -40,7 +40,7 @@ const GROUPS: usize = 10;
 #[derive(Debug, Default)]
 pub struct ContactWorkspace {
     pub(crate) whole: BlockMeans,
-    excerpt: BlockMeans,
+    pub(crate) excerpt: BlockMeans,
 }
 
 /// The fitted flanks.
