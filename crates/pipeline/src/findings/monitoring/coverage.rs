@@ -38,6 +38,7 @@ pub(crate) fn notes(
     let as_of = rows.first().map(|row| row.as_of_utc);
     notes.extend(newest_log.zip(as_of).and_then(|(at, as_of)| age_of(at, as_of, today)));
     notes.extend(flights_table_ends(rows, config));
+    notes.extend(look_alikes(rows));
     notes
 }
 
@@ -55,6 +56,35 @@ fn age_of(newest_log: Timestamp, as_of: Timestamp, today: Timestamp) -> Option<S
         "states are those of the newest record (`trend.as_of`)"
     };
     Some(format!("newest log {}, {age} old; {dates}", day_text(newest_log, today)))
+}
+
+/// Units of one part whose serial numbers look alike: one of them may be misspelt.
+fn look_alikes(rows: &[TrendRow]) -> Vec<String> {
+    let mut alike = BTreeMap::<(&str, String), BTreeSet<&str>>::new();
+    for row in rows {
+        let (part, serial) = (row.part_number.as_deref().unwrap_or_default(), row.serial_number.as_str());
+        alike.entry((part, skeleton(serial))).or_default().insert(serial);
+    }
+    let several = alike.into_iter().filter(|(_, serials)| serials.len() > 1);
+    let note = |((part, _), serials): ((&str, String), BTreeSet<&str>)| {
+        let names: Vec<String> = serials.into_iter().map(|serial| format!("`{serial}`")).collect();
+        let names = names.join(" and ");
+        format!(
+            "part {part}: serial numbers {names} look alike; if they are one unit, name it in `logs.aliases`"
+        )
+    };
+    several.map(note).collect()
+}
+
+/// A name without what is easily mistaken: dashes, blanks, capitals, O for 0, and I or l for 1.
+fn skeleton(name: &str) -> String {
+    let kept = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_uppercase);
+    kept.map(|c| match c {
+        'O' => '0',
+        'I' | 'L' => '1',
+        other => other,
+    })
+    .collect()
 }
 
 /// A flights table that ends before the logs do: from then on, usage is that of logged flights.
@@ -214,4 +244,22 @@ pub(crate) fn unknown_tails<'a>(
         }
     }
     found.into_iter().collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn serial_numbers_that_differ_by_dashes_capitals_or_o_and_zero_look_alike() {
+        let row = |part: &str, serial: &str| TrendRow {
+            part_number: Some(part.into()),
+            serial_number: serial.into(),
+            ..TrendRow::default()
+        };
+        let rows = [row("P", "SN-0O1"), row("P", "sn001"), row("P", "SN-002"), row("Q", "SN-00I")];
+        let expected = "part P: serial numbers `SN-0O1` and `sn001` look alike; if they are one unit, name it in `logs.aliases`";
+        assert_eq!(look_alikes(&rows), [expected]);
+    }
 }
