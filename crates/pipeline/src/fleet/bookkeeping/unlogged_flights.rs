@@ -29,12 +29,13 @@ pub(crate) fn unlogged_flights<'a>(
     missing.collect()
 }
 
-/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure within 12 hours of it.
+/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure within
+/// 12 hours of it.
 fn is_logged(flight: &Flight, history: &History) -> bool {
     let at = flight.departure_utc;
-    let first = history.flights().partition_point(|flown| flown.departure_utc() < at - SAME_FLIGHT);
-    let mut near =
-        history.flights()[first..].iter().take_while(|flown| flown.departure_utc() <= at + SAME_FLIGHT);
+    let since = |flown: &FlightRow| flown.departure_utc().duration_since(at);
+    let first = history.flights().partition_point(|flown| since(flown) < -SAME_FLIGHT);
+    let mut near = history.flights()[first..].iter().take_while(|flown| since(flown) <= SAME_FLIGHT);
     let is_same = |flown: &FlightRow| {
         flown.departure_utc() == at || history.flight_id(flown) == Some(flight.flight_id.as_str())
     };
