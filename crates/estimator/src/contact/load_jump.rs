@@ -1,7 +1,7 @@
 //! A load cell whose zero differs between tension and compression: its reading jumps at zero load.
 
 use crate::contact::block_means::BlockMeans;
-use crate::contact::lost_motion::median_and_error;
+use crate::contact::stats::median_and_error;
 use crate::samples::Samples;
 
 /// By how much the reading of the load jumps where the load changes its side, N; 0 where it passes zero as smoothly as

@@ -4,7 +4,7 @@ use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::stats::{MAD, median};
+use crate::contact::stats::median_and_error;
 
 /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap of
 /// the flanks times their stiffness.
@@ -72,18 +72,4 @@ fn travel_m<'a>(
     let line_m = line.beta[GAP] + 2.0 * load * line.beta[FORCE];
     // The uncertainty of the gap (drift, transducer, friction) applies here too; the scatter of the medians is added.
     Some((line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1))))
-}
-
-/// The median of values and its standard error, where those of one stretch count as one; none of fewer than five.
-pub(crate) fn median_and_error(values: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
-    let (mut values, mut stretches): (Vec<f64>, Vec<u32>) = values.unzip();
-    if values.len() < 5 {
-        return None;
-    }
-    stretches.sort_unstable();
-    stretches.dedup();
-    let middle = median(&mut values);
-    values.iter_mut().for_each(|value| *value = (*value - middle).abs());
-    // A median of a normal sample scatters so much more than its mean: √(π/2).
-    Some((middle, 1.253_314_137_315_5 * MAD * median(&mut values) / (stretches.len() as f64).sqrt()))
 }

@@ -135,10 +135,7 @@ fn look(
     workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, FlankFit), Rejection> {
     let (scaling, _) = prepare(samples, prior, workspace)?;
-    let mut contact = flank_fit::fit(workspace, &scaling)?;
-    let load_zero_n = contact.search.line.at.load_zero_n;
-    let jump_n = load_jump::load_jump_n(samples, &workspace.excerpt, load_zero_n, scaling.load_n);
-    contact.add_load_jump(jump_n);
+    let contact = flank_fit::fit(samples, workspace, &scaling)?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();

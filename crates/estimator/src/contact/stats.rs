@@ -23,6 +23,20 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// The median of values and its standard error, where those of one stretch count as one; none of fewer than five.
+pub(crate) fn median_and_error(values: impl Iterator<Item = (f64, u32)>) -> Option<(f64, f64)> {
+    let (mut values, mut stretches): (Vec<f64>, Vec<u32>) = values.unzip();
+    if values.len() < 5 {
+        return None;
+    }
+    stretches.sort_unstable();
+    stretches.dedup();
+    let middle = median(&mut values);
+    values.iter_mut().for_each(|value| *value = (*value - middle).abs());
+    // A median of a normal sample scatters so much more than its mean: √(π/2).
+    Some((middle, 1.253_314_137_315_5 * MAD * median(&mut values) / (stretches.len() as f64).sqrt()))
+}
+
 /// Standard deviation of normal values about zero, from the median of their sizes.
 pub(crate) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     MAD * median(&mut values.map(f64::abs).collect::<Vec<f64>>())

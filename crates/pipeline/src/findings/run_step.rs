@@ -56,13 +56,8 @@ impl FollowUp<'_> {
         let alerts = summary.alerts.insert(AlertSummary::default());
         let rows = self.detect(&findings, channels, writer, alerts, now)?;
         let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
-        summary.errors.extend(diagnostics(&delivery::deliver(
-            rows,
-            channels,
-            self.run_id,
-            &mut courier,
-            alerts,
-        )?));
+        let failed = delivery::deliver(rows, channels, self.run_id, &mut courier, alerts)?;
+        summary.errors.extend(diagnostics(&failed));
         Ok(())
     }
 

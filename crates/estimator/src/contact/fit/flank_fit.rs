@@ -19,6 +19,7 @@ use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling, UNSEEN_GAP};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::load_jump::load_jump_n;
 use crate::contact::stats::{LOOKS, second_differences};
 use crate::gap::midrange;
 use crate::kalman::Filter;
@@ -40,7 +41,7 @@ const GROUPS: usize = 10;
 #[derive(Debug, Default)]
 pub struct ContactWorkspace {
     pub(crate) whole: BlockMeans,
-    pub(crate) excerpt: BlockMeans,
+    excerpt: BlockMeans,
 }
 
 /// The fitted flanks.
@@ -63,14 +64,6 @@ pub(crate) struct FlankFit {
 }
 
 impl FlankFit {
-    /// Counts a jump of the load cell's reading at zero load, N, as an error of the gap: the fit moved both flanks inwards by
-    /// half of the jump over the stiffness.
-    pub(crate) fn add_load_jump(&mut self, jump_n: f64) {
-        let error_m = jump_n * self.compliance_m_per_n;
-        self.load_jumps = error_m > self.gap_m.1;
-        self.gap_m.1 = self.gap_m.1.hypot(error_m);
-    }
-
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         dot(&self.search.line.fit.beta[DRY..], &row.x[DRY..])
@@ -82,7 +75,11 @@ impl FlankFit {
 /// # Errors
 /// As [`search`]; [`Rejection::RateTooLow`] for a load that vibrates faster than it is sampled, so that neighbouring
 /// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
-pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
+pub(crate) fn fit(
+    samples: &Samples<'_>,
+    workspace: &mut ContactWorkspace,
+    scaling: &Scaling,
+) -> Result<FlankFit, Rejection> {
     let search = coarse_to_fine(workspace, scaling)?;
     let windup_m = scaling.windup_m();
     let [squares, _, count] = second_differences(workspace.whole.load_n.iter().copied());
@@ -111,6 +108,11 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         return Err(Rejection::MotionUnexplained);
     }
     fit.gap_m.1 = fit.gap_m.1.hypot(fit.unexplained_m);
+    // The fit moved both flanks inwards by half of a jump over the stiffness.
+    let zero_n = fit.search.line.at.load_zero_n;
+    let jump_m = fit.compliance_m_per_n * load_jump_n(samples, &workspace.excerpt, zero_n, scaling.load_n);
+    fit.load_jumps = jump_m > fit.gap_m.1;
+    fit.gap_m.1 = fit.gap_m.1.hypot(jump_m);
     Ok(fit)
 }
 
