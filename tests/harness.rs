@@ -9,6 +9,8 @@ use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use regex::Regex;
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::gate::is_gate;
@@ -55,27 +57,12 @@ impl CommandResult {
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Self { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
     }
-
-    /// Standard output as JSON.
-    pub(crate) fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap()
-    }
 }
 
 impl TestFleet {
     /// A copy of the tests' small fleet: three aircraft with ten flights each, all with a log.
     pub(crate) fn sample() -> Self {
         Self::of("three-aircraft")
-    }
-
-    /// The same after a run.
-    pub(crate) fn processed() -> Self {
-        static PROCESSED: OnceLock<TestFleet> = OnceLock::new();
-        Self::once(&PROCESSED, || {
-            let fleet = Self::sample();
-            fleet.run_ok(&["run", "--quiet"]);
-            fleet
-        })
     }
 
     /// A copy of a fleet that is made once for all tests.
@@ -130,16 +117,6 @@ impl TestFleet {
         CommandResult::of(&mut self.command(args))
     }
 
-    /// The command, with its arguments as one line, under a limit of the shell such as `-v 1048576`, KiB. The GNU allocator
-    /// otherwise reserves 64 MiB of address space for each thread.
-    pub(crate) fn limited(&self, limit: &str, args: &str) -> CommandResult {
-        let script = format!("ulimit {limit} && exec \"$0\" {args}");
-        let mut command = std::process::Command::new("sh");
-        command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).current_dir(self.folder.path());
-        command.env("MALLOC_ARENA_MAX", "2").env_remove("FREEPLAY_CONFIG").stdin(std::process::Stdio::null());
-        CommandResult::of(&mut command)
-    }
-
     /// Runs a command that must end well.
     pub(crate) fn run_ok(&self, args: &[&str]) -> String {
         let result = self.freeplay(args);
@@ -191,6 +168,35 @@ impl TestFleet {
         self.edit("pipeline.toml", |text| format!("{text}\n{table}"));
     }
 
+    /// Writes logs again.
+    pub(crate) fn rewrite_logs(&self, how: &LogRewrite) {
+        let pattern = |pattern: &Option<String>| pattern.as_ref().map(|pattern| Regex::new(pattern).unwrap());
+        let [columns, without, blank] = [&how.columns, &how.without, &how.blank].map(pattern);
+        let is = |pattern: &Option<Regex>, name: &str| pattern.as_ref().is_some_and(|p| p.is_match(name));
+        let (first, end, step) = how.rows.unwrap_or((0, usize::MAX, 1));
+        for log in self.glob(&how.from) {
+            let mut own = if how.is_anonymous { Facts::new() } else { facts(&log) };
+            own.retain(|(key, _)| !how.facts.contains_key(key));
+            own.extend(how.facts.iter().filter_map(|(key, value)| Some((key.clone(), value.clone()?))));
+            let mut table = Table::read(&log).columns();
+            table.retain(|(name, _)| (columns.is_none() || is(&columns, name)) && !is(&without, name));
+            for (name, values) in &mut table {
+                if is(&blank, name) {
+                    values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
+                }
+                let rows = first..end.min(values.len());
+                *values = values[rows].iter().copied().step_by(step).collect();
+                for (from, to) in &how.rename {
+                    *name = Regex::new(from).unwrap().replace(name, to).into_owned();
+                }
+            }
+            let rows = table.first().map_or(0, |(_, values)| values.len());
+            table.extend(how.add.iter().map(|(name, value)| (name.clone(), vec![*value; rows])));
+            let name = log.file_stem().unwrap().to_str().unwrap();
+            write_log(&self.path(&how.to.replace("{log}", name)), table, &own);
+        }
+    }
+
     /// Paths that fit a pattern, by name.
     pub(crate) fn glob(&self, pattern: &str) -> Vec<PathBuf> {
         glob::glob(self.path(pattern).to_str().unwrap()).unwrap().flatten().collect()
@@ -205,6 +211,36 @@ impl TestFleet {
     pub(crate) fn logs_of(&self, tail: &str) -> Vec<PathBuf> {
         self.glob(&format!("sample-data/logs/{tail}/*.parquet"))
     }
+}
+
+/// Logs that are written again as doubles, with other columns, rows or facts.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LogRewrite {
+    /// Pattern of the paths of logs.
+    from: String,
+    /// Path of what is written; `{log}` is the name of the log without its ending.
+    to: String,
+    /// Pattern of the names of columns that stay.
+    columns: Option<String>,
+    /// Pattern of the names of columns that go.
+    without: Option<String>,
+    /// Pattern of the names of columns whose every second value is missing.
+    blank: Option<String>,
+    /// The first row, the row after the last, and the step.
+    rows: Option<(usize, usize, usize)>,
+    /// Pattern of names, and what replaces them.
+    #[serde(default)]
+    rename: Vec<(String, String)>,
+    /// Further columns of one value.
+    #[serde(default)]
+    add: BTreeMap<String, f64>,
+    /// Without the facts of the log.
+    #[serde(default)]
+    is_anonymous: bool,
+    /// Facts that replace those of the log; null removes one.
+    #[serde(default)]
+    facts: BTreeMap<String, Option<String>>,
 }
 
 /// Rows of comma-separated values without some of their columns.

@@ -5,7 +5,8 @@
 //! Comments above a block change the defaults: `first: COMMAND` runs before it and is not shown, `exit 1` is the
 //! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
 //! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
-//! `edit: ["FILE", "FROM", "TO"]` replaces text before its block.
+//! `edit: ["FILE", "FROM", "TO"]` replaces text before its block, and `log: {…}` writes logs again before `first:`, with the
+//! keys of [`LogRewrite`]. `records` prints every stored record without what names the log, the settings and the run.
 //! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except
 //! where lines are omitted.
 
@@ -15,8 +16,13 @@ use std::process::{Command, Stdio};
 
 use regex::Regex;
 
-use crate::harness::{TestFleet, spread, top};
+use crate::harness::{LogRewrite, TestFleet, spread, top};
 use crate::markdown::{Block, Page, all};
+
+/// The shell function `records`; its columns are those of a comparison of two runs.
+const RECORDS: &str = r#"records() { freeplay store export --format csv "$@" | awk -F, '
+    NR == 1 { for (i = 1; i <= NF; i++) left_out[i] = $i ~ /^(log_path|(log|config)_digest|run_id|processed_utc)$/ }
+    { line = ""; for (i = 1; i <= NF; i++) if (!left_out[i]) line = line "," $i; print line }' | LC_ALL=C sort; }"#;
 
 /// Pages that are tried outside the gate, README first.
 const PAGES: usize = 3;
@@ -73,6 +79,11 @@ fn try_blocks(page: &str) -> Page {
 #[test]
 fn commands_do_what_they_did_when_a_person_last_read_it() {
     try_blocks("commands.md");
+}
+
+#[test]
+fn logs_of_any_shape_give_what_a_person_last_read() {
+    try_blocks("logs.md");
 }
 
 #[test]
@@ -133,6 +144,9 @@ impl<'p> Try<'p> {
             let [file, from, to]: [String; 3] = serde_json::from_str(change).unwrap();
             self.fleet.edit(&file, |text| text.replacen(&from, &to, 1));
         }
+        for change in block.marks.iter().filter_map(|mark| mark.strip_prefix("log: ")) {
+            self.fleet.rewrite_logs(&serde_json::from_str::<LogRewrite>(change).unwrap());
+        }
         if let Some(command) = block.mark("first:") {
             self.run(&Step { script: command.to_owned(), shown: None, code: 0 });
         }
@@ -148,7 +162,7 @@ impl<'p> Try<'p> {
         let command =
             step.script.replace("cargo run --locked -- ", "freeplay ").replace("cargo run -- ", "freeplay ");
         let script = format!(
-            "exec 2>&1\ncd \"$(cat .here)\"\nset -e\ntrap 'code=$?; pwd > \"$TOP\"/.here; exit $code' EXIT\n{command}"
+            "{RECORDS}\nexec 2>&1\ncd \"$(cat .here)\"\nset -e\ntrap 'code=$?; pwd > \"$TOP\"/.here; exit $code' EXIT\n{command}"
         );
         let folder = fs::canonicalize(self.fleet.path("")).unwrap();
         if !folder.join(".here").exists() {

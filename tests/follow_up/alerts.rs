@@ -1,4 +1,5 @@
-//! Alerts of the command on the small fleet: to folders, commands and addresses, with faults and kills.
+//! Alerts of the command on the small fleet to addresses, and the examples of the documentation. Alerts to folders and
+//! commands, with faults and kills, are in `tests/data/commands.md`.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -6,50 +7,13 @@ use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
 
-use super::{LONG_HORIZON, SHORT_HORIZON, processed_fleet};
 use crate::harness::{CommandResult, TestFleet, top};
 
 /// Units that `freeplay trend` finds in `plan` on the small fleet.
 const IN_PLAN: [&str; 2] = ["1040-0009", "1040-0013"];
 
-/// The small fleet with a baseline of states; the next run finds two units in `plan`.
-fn fleet(alerts: &str) -> TestFleet {
-    let fleet = processed_fleet();
-    fleet.configure_also(alerts);
-    let first = fleet.freeplay(&["run", "--quiet"]);
-    assert!(matches!(first.code, Some(0 | 5)), "{first:?}");
-    fleet.configure(SHORT_HORIZON, LONG_HORIZON);
-    fleet
-}
-
-/// The small fleet until September, where one unit is in `watch`, with a baseline.
-fn fleet_of_september() -> TestFleet {
-    let fleet = TestFleet::sample();
-    fleet.configure_also("[alerts.files]\nfolder = \"alerts\"\n");
-    fleet.run_ok(&["run", "--quiet", "--until", "2026-09-22"]);
-    fleet
-}
-
 fn run(fleet: &TestFleet) -> CommandResult {
     fleet.freeplay(&["run", "--json"])
-}
-
-fn summary(result: &CommandResult) -> Value {
-    result.json()["alerts"].clone()
-}
-
-fn alerts(fleet: &TestFleet) -> Vec<Value> {
-    fleet.rows(&["store", "alerts"])
-}
-
-fn files(fleet: &TestFleet, folder: &str) -> Vec<Value> {
-    let read = |file: std::path::PathBuf| fleet.read_json(file.to_str().unwrap());
-    fleet.glob(&format!("{folder}/*")).into_iter().map(read).collect()
-}
-
-/// Messages that the command `cat >> got` received.
-fn got(fleet: &TestFleet) -> Vec<Value> {
-    fleet.read("got").lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 fn serials(messages: &[Value]) -> Vec<&str> {
@@ -57,137 +21,6 @@ fn serials(messages: &[Value]) -> Vec<&str> {
     let mut serials: Vec<&str> = changes.map(|message| message["serial_number"].as_str().unwrap()).collect();
     serials.sort_unstable();
     serials
-}
-
-#[test]
-fn a_folder_gets_a_summary_first_and_then_one_file_for_each_change() {
-    let fleet = fleet_of_september();
-    let first = files(&fleet, "alerts");
-    assert_eq!(
-        (first.len(), &first[0]["kind"], &first[0]["states"]["normal"], &first[0]["states"]["watch"]),
-        (1, &"baseline".into(), &11.into(), &1.into())
-    );
-    // A run with `--until` is complete: the logs that it left out were not selected.
-    let result = run(&fleet);
-    assert_eq!(result.code, Some(0), "{result:?}");
-    let messages = files(&fleet, "alerts");
-    assert_eq!(serials(&messages), IN_PLAN);
-    let message = messages.iter().find(|message| message["serial_number"] == "1040-0013").unwrap();
-    assert_eq!((&message["from"], &message["to"]), (&"watch".into(), &"plan".into()));
-    assert_eq!((&message["tail_number"], &message["work_request"]), (&"N414FP".into(), &"W2".into()));
-    let text = message["text"].as_str().unwrap();
-    let start = "EMA-27-1040 / 1040-0013 on N414FP aileron_left: watch → plan, due ";
-    assert!(text.starts_with(start) && text.contains(" of 150.0 µm, +"), "{text}");
-    assert_eq!((&summary(&result)["changes"], &summary(&result)["sent"]), (&2.into(), &2.into()));
-    for _ in 0..2 {
-        assert_eq!(summary(&run(&fleet))["sent"], 0);
-    }
-    assert_eq!(summary(&fleet.freeplay(&["run", "--redo", "--json"]))["changes"], 0, "the same states again");
-    assert_eq!(files(&fleet, "alerts").len(), 3);
-}
-
-#[test]
-fn changes_wait_while_logs_are_left_for_later() {
-    let fleet = fleet_of_september();
-    let part = fleet.freeplay(&["run", "--limit", "5", "--json"]);
-    assert_eq!((&summary(&part)["is_held"], &summary(&part)["changes"]), (&true.into(), &0.into()));
-    let text = fleet.run_ok(&["run", "--limit", "1"]);
-    assert!(text.contains("alerts: changes wait for a run that processes every log"), "{text}");
-    assert_eq!(files(&fleet, "alerts").len(), 1);
-    run(&fleet);
-    assert_eq!(serials(&files(&fleet, "alerts")), IN_PLAN);
-}
-
-/// The command kills the run that started it: at once, or when it has the message.
-#[test]
-#[cfg(unix)]
-fn a_run_killed_while_it_sends_leaves_a_mark_and_sends_nothing_twice() {
-    for (script, received) in [("kill -9 $PPID", 0), ("cat >> got; kill -9 $PPID", 1)] {
-        let fleet = fleet("[alerts.hook]\ncommand = [\"sh\", \"-c\", \"cat > baseline\"]\n");
-        fleet.configure("cat > baseline", script);
-        let killed = run(&fleet);
-        assert_eq!(killed.code, None, "{killed:?}");
-        // The run was complete before it sent messages.
-        let info = fleet.json(&["store", "info"]);
-        assert_eq!((&info["last_run"]["ended"], &info["last_run"]["exit_code"]), (&"well".into(), &0.into()));
-        let statuses = |fleet: &TestFleet| -> Vec<String> {
-            let rows = alerts(fleet);
-            let rows = rows.iter().filter(|row| row["channel"] == "hook" && row["kind"] == "change");
-            rows.map(|row| row["status"].as_str().unwrap().to_owned()).collect()
-        };
-        let mut found = statuses(&fleet);
-        found.sort();
-        assert_eq!(found, ["pending", "sending"]);
-        fleet.configure(script, "cat >> got");
-        let next = run(&fleet);
-        assert_eq!(next.code, Some(5), "{next:?}");
-        assert!(next.err.contains("error[alert_unconfirmed]"), "{}", next.err);
-        assert_eq!((&summary(&next)["sent"], &summary(&next)["unconfirmed"]), (&1.into(), &1.into()));
-        assert_eq!(got(&fleet).len(), received + 1);
-        let after = run(&fleet);
-        assert_eq!((after.code, &summary(&after)["unconfirmed_before"]), (Some(0), &1.into()));
-        // A person finds that the message is missing, and has it sent again.
-        let rows = alerts(&fleet);
-        let id =
-            rows.iter().find(|row| row["status"] == "unconfirmed").unwrap()["alert_id"].as_str().unwrap();
-        fleet.run_ok(&["store", "alerts", "--resend", id]);
-        assert_eq!(summary(&run(&fleet))["sent"], 1);
-        let got = got(&fleet);
-        assert_eq!(got.len(), received + 2);
-        assert_eq!(got.iter().filter(|message| message["id"] == id).count(), received + 1);
-        assert_eq!(fleet.freeplay(&["store", "alerts", "--resend", "none"]).code, Some(2));
-    }
-}
-
-#[test]
-#[cfg(unix)]
-fn a_failing_command_a_timeout_and_a_bad_folder_lose_no_result() {
-    let fleet = fleet(
-        "[alerts.fails]\ncommand = [\"sh\", \"-c\", \"echo no route >&2; exit 75\"]\n\
-         [alerts.hangs]\ncommand = [\"sleep\", \"600\"]\ntimeout_s = 0.3\n\
-         [alerts.folder]\nfolder = \"pipeline.toml/alerts\"\n\
-         [alerts.missing]\ncommand = [\"/no/such/program\"]\n",
-    );
-    let begun = std::time::Instant::now();
-    let result = fleet.freeplay(&["run"]);
-    assert!(begun.elapsed().as_secs() < 120);
-    assert_eq!(result.code, Some(5), "{result:?}");
-    for part in [
-        "`fails`: 3 not sent: the command ended with code 75: no route",
-        "`folder`: 3 not sent",
-        "`missing`: 3",
-    ] {
-        assert!(result.err.contains(part), "{part}: {}", result.err);
-    }
-    assert!(
-        result.err.contains("`hangs`: 2 perhaps not received: `sleep` did not end within 0.3 s"),
-        "{}",
-        result.err
-    );
-    assert!(result.out.contains("12 units: 2 plan, 10 normal;"), "{}", result.out);
-    assert_eq!(fleet.exported().lines().count(), 121, "all records are stored");
-    // For the exit code, a state of `--fail-on` comes before a failed alert.
-    assert_eq!(fleet.freeplay(&["run", "--fail-on", "plan", "--quiet"]).code, Some(4));
-    fleet.configure("echo no route >&2; exit 75", "cat >> got");
-    run(&fleet);
-    assert_eq!(serials(&got(&fleet)), IN_PLAN);
-}
-
-/// A channel that was renamed with messages in it: they go through another one, or are taken back.
-#[test]
-fn messages_of_a_channel_that_is_gone_can_be_sent_through_another_or_dropped() {
-    let fleet = fleet("[alerts.old]\ncommand = [\"false\"]\n");
-    assert_eq!(run(&fleet).code, Some(5));
-    fleet.configure("[alerts.old]\ncommand = [\"false\"]", "[alerts.files]\nfolder = \"alerts\"");
-    let result = fleet.freeplay(&["run"]);
-    assert!(result.out.contains("`freeplay store alerts --drop old`"), "{result:?}");
-    let drop = ["store", "alerts", "--drop", "old"];
-    assert_eq!(fleet.freeplay(&[&drop[..], &["--to", "none"]].concat()).code, Some(2));
-    fleet.run_ok(&[&drop[..], &["--to", "files"]].concat());
-    assert_eq!(run(&fleet).code, Some(0));
-    assert_eq!(serials(&files(&fleet, "alerts")), IN_PLAN);
-    assert!(fleet.run_ok(&["store", "alerts", "--unsent"]).contains("no alert"));
-    assert_eq!(fleet.freeplay(&drop).code, Some(2), "none is left");
 }
 
 /// Code of the answer and body of each request.
@@ -223,7 +56,13 @@ fn receiver(codes: &'static [u16]) -> (String, Received) {
 #[test]
 fn an_address_gets_each_change_once_after_it_answered_with_an_error() {
     let (url, got) = receiver(&[200, 500, 503]);
-    let fleet = fleet(&format!("[alerts.chat]\nurl = \"{url}\"\ntails = [\"N41[34]FP\"]\n"));
+    let fleet = TestFleet::sample();
+    fleet.configure_also(&format!("[alerts.chat]\nurl = \"{url}\"\ntails = [\"N41[34]FP\"]\n"));
+    // No unit needs attention within one hour, two do within 500 hours (README).
+    let [short, long] = ["1.0", "500.0"].map(|hours| format!("planning_horizon_hours = {hours}"));
+    fleet.configure(&long, &short);
+    fleet.run_ok(&["run", "--quiet"]);
+    fleet.configure(&short, &long);
     let result = run(&fleet);
     assert_eq!(result.code, Some(5), "{result:?}");
     assert!(

@@ -33,8 +33,10 @@ fn by_serial<'v>(units: impl IntoIterator<Item = (&'v Value, &'v Value)>) -> BTr
 
 /// The sample fleet, and three whose gaps are drawn: each unit begins and wears as its serial number and the seed say.
 fn fleets() -> Vec<TestFleet> {
+    let processed = TestFleet::sample();
+    processed.run_ok(&["run", "--quiet"]);
     let drawn = (1..=3).map(|seed: u64| {
-        let fleet = TestFleet::processed().copied();
+        let fleet = processed.copied();
         let store = Store::open(fleet.path("results")).unwrap();
         let mut writer = store.lock(&Holder::this_process(), None).unwrap();
         let columns = ["gap_m", "departure_utc", "serial_number"];

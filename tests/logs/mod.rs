@@ -3,4 +3,3 @@
 mod ground_truth;
 mod hostile_names;
 pub(crate) mod layouts;
-mod reference_logs;

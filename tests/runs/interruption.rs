@@ -139,26 +139,6 @@ fn a_run_that_waits_can_be_interrupted() {
     drop(held);
 }
 
-/// A command waits for a run that holds the store, and a run for a command.
-#[test]
-fn decisions_during_a_run_are_all_kept() {
-    let fleet = TestFleet::processed();
-    let decisions: Vec<_> = (0..4)
-        .map(|n| {
-            let by = format!("person {n}");
-            fleet.command(&["work", "acknowledge", "W1", "--by", &by]).spawn().unwrap()
-        })
-        .collect();
-    let run = fleet.command(&["run", "--quiet", "--redo", "--wait", "60s"]).output().unwrap();
-    assert_eq!(run.status.code(), Some(0), "{run:?}");
-    for mut decision in decisions {
-        assert_eq!(decision.wait().unwrap().code(), Some(0));
-    }
-    let events = std::fs::read_dir(fleet.path("results/work")).unwrap().count();
-    assert!(events >= 6, "one file for the run, and one for each decision: {events}");
-    assert!(fleet.run_ok(&["store", "verify"]).contains("OK"));
-}
-
 /// All is stored when the summary cannot be written: `/dev/full` is a disk without space.
 #[cfg(target_os = "linux")]
 #[test]

@@ -2,7 +2,6 @@
 
 #[cfg(target_os = "linux")]
 mod disk_faults;
-mod incremental_runs;
 #[cfg(target_os = "linux")]
 mod injected_faults;
 mod interruption;

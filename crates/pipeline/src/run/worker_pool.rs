@@ -329,27 +329,34 @@ mod tests {
         (outcomes - late.get(), late.get())
     }
 
-    /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run.
+    thread_local! {
+        /// Logs that this thread has begun.
+        static BEGUN: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+    }
+
+    /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run. Logs are
+    /// counted, since their times depend on what else the machine does.
     #[test]
     fn no_log_waits_for_the_rest_of_the_run() {
         for _ in 0..5 {
-            let longest = Arc::new(Mutex::new(Duration::ZERO));
-            let (seen, begun) = (Arc::clone(&longest), Instant::now());
+            let most = Arc::new(Mutex::new(0));
+            let seen = Arc::clone(&most);
             let process = move |_, _: &StepCount| {
-                let begun = Instant::now();
+                let before = BEGUN.replace(BEGUN.get() + 1);
                 let actuator = || std::thread::sleep(Duration::from_millis(2));
                 rayon::join(actuator, || rayon::join(actuator, actuator));
-                let mut longest = seen.lock().unwrap();
-                *longest = begun.elapsed().max(*longest);
+                let mut most = seen.lock().unwrap();
+                *most = (BEGUN.get() - before - 1).max(*most);
             };
             assert_eq!(run_pool(60, Duration::from_mins(1), process), (60, 0));
-            let (longest, whole) = (*longest.lock().unwrap(), begun.elapsed());
-            assert!(4 * longest < whole, "a log took {longest:?} of {whole:?}");
+            let most = *most.lock().unwrap();
+            assert!(most < 15, "a log waited for {most} of 60");
         }
     }
 
     /// A run finishes every sound log next to 20 that never end and keep a processor busy: the largest, or some of the
-    /// largest and of the smallest. Logs of a share that is gone end the run.
+    /// largest and of the smallest. Logs of a share that is gone end the run. On a busy machine a sound log may be late, too:
+    /// then it gets more time.
     #[test]
     fn logs_that_never_end_keep_no_other_log_from_its_turn() {
         let cases: [fn(usize) -> bool; 2] = [|log| log < 20, |log| !(10..40).contains(&log)];
@@ -360,7 +367,8 @@ mod tests {
                 while is_endless(log) && begun.elapsed() < Duration::from_secs(20) {}
                 std::thread::sleep(Duration::from_millis(5));
             };
-            assert_eq!(run_pool(50, Duration::from_millis(150), process), (30, 20));
+            let finishes_all = |ms| run_pool(50, Duration::from_millis(ms), process) == (30, 20);
+            assert!([150, 1_000, 4_000].into_iter().any(finishes_all), "a sound log was late");
         }
         let (finished, late) = run_pool(100, Duration::from_millis(20), |_, _| {
             loop {
