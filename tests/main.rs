@@ -4,7 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod bookkeeping;
-mod cli_output;
 mod docs;
 mod follow_up;
 mod fuzz;
@@ -13,3 +12,4 @@ mod harness;
 mod logs;
 mod markdown;
 mod runs;
+mod traces;
