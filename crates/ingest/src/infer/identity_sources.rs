@@ -273,46 +273,10 @@ mod tests {
 
     #[test]
     fn tails_departures_and_positions_in_paths_are_found_with_their_forms() {
-        for (path, wanted, format) in [
-            ("d/N412FP/FLT_2026-09-10_1307.parquet", "N412FP 2026-09-10_1307", "%Y-%m-%d_%H%M"),
-            ("d/TC-JRA/20261119T041300Z_0413.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/TC-JRA/QAR20261119_041300.parquet", "TC-JRA 20261119_041300", "%Y%m%d_%H%M%S"),
-            ("d/N412FP/2026-11-19/0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%dT%H%M"),
-            ("d/A320_N412FP_2026-11-19T04:13:00.parquet", "N412FP 2026-11-19T04:13:00", "%Y-%m-%dT%H:%M:%S"),
-            ("d/N412FP_2026-11-19_17.parquet", "N412FP 2026-11-19", "%Y-%m-%d"),
-            ("d/N412FP 2026-11-19 0413.parquet", "N412FP 2026-11-19 0413", "%Y-%m-%d %H%M"),
-            ("d/2026/11/TC-JRA-17-202611190413.parquet", "TC-JRA 202611190413", "%Y%m%d%H%M"),
-            (
-                "d/N412FP/rudder_l/20261119T041300Z.parquet",
-                "N412FP rudder_l 20261119T041300Z",
-                "%Y%m%dT%H%M%SZ",
-            ),
-            ("d/TC-JRA_20261119T041300Z.parquet", "TC-JRA 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/97-0042/2026-11-19_0413.parquet", "97-0042 2026-11-19_0413", "%Y-%m-%d_%H%M"),
-            ("d/4X-EKA_20261119_041300.parquet", "4X-EKA 20261119_041300", "%Y%m%d_%H%M%S"),
-            ("d/QAR-N412FP-20261119T041300Z.parquet", "N412FP 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/TK1923_N412FP_20261119-041300.parquet", "N412FP 20261119-041300", "%Y%m%d-%H%M%S"),
-            ("d/FDR_20261119_041300_N412FP.parquet", "20261119_041300 N412FP", "%Y%m%d_%H%M%S"),
-            ("logs/20261119T041300Z_17.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/N412FP/2026/11/19/041300.parquet", "N412FP 2026/11/19 041300", "%Y/%m/%dT%H%M%S"),
-            ("d/N412FP/F0017/x1.parquet", "N412FP", ""),
-            ("d/FLEET/N412FP_20261119-041300.parquet", "N412FP 20261119-041300", "%Y%m%d-%H%M%S"),
-            ("d/tail=N412FP;dep=19NOV2026_0413.parquet", "N412FP 19NOV2026_0413", "%d%b%Y_%H%M"),
-            ("d/dep=2026-11-19;tail=N412FP.parquet", "2026-11-19 N412FP", "%Y-%m-%d"),
-            ("d/FLEET/JA8089-20261119T041300.parquet", "JA8089 20261119T041300", "%Y%m%dT%H%M%S"),
-            ("d/A320/JA8089/TK1923/20261119T041300Z.parquet", "JA8089 20261119T041300Z", "%Y%m%dT%H%M%SZ"),
-            ("d/tail=N412FP/20261119_041300/x1.parquet", "N412FP 20261119_041300", "%Y%m%d_%H%M%S"),
-            (
-                "d/N412FP/20261119T041300Z/rudder_l.parquet",
-                "N412FP 20261119T041300Z rudder_l",
-                "%Y%m%dT%H%M%SZ",
-            ),
-            (
-                "d/N412FP/20261119T041300Z_rudder_l.parquet",
-                "N412FP 20261119T041300Z rudder_l",
-                "%Y%m%dT%H%M%SZ",
-            ),
-        ] {
+        let paths: Vec<&str> = include_str!("../../tests/data/paths.txt").lines().skip(1).collect();
+        assert!(paths.len() > 20);
+        for line in paths {
+            let [path, wanted, format] = line.split('|').collect::<Vec<_>>().try_into().unwrap();
             let position = path_position(Path::new(path)).map(|(position, _)| position);
             let (expression, found) = path_identity(Path::new(path), position.is_some()).unwrap();
             let found = found.unwrap_or_default();

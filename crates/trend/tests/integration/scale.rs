@@ -3,13 +3,13 @@
 use trend::{Assessment, FleetPrior, Observation, SerialExecutor, Series, Settings, assess};
 
 use crate::histories::{self, Drawn, LIMIT_M};
-use crate::states::{CALM, URGENT, drawn};
+use crate::states::{drawn, kinds};
 
 /// Some units of each kind of history, every third without stated errors, with every length multiplied by a factor.
 fn assessments(factor: f64) -> Vec<Assessment> {
-    let kinds = URGENT.iter().chain(&CALM).zip(0..);
+    let kinds = [kinds(true), kinds(false)].into_iter().flatten().zip(0..);
     let units: Vec<Drawn> = kinds
-        .flat_map(|(kind, number)| drawn(*kind, number).into_iter().take(2))
+        .flat_map(|(kind, number)| drawn(&kind, number).into_iter().take(2))
         .map(|unit| unit.0)
         .collect();
     let series = |(unit, drawn): (usize, &Drawn)| {
