@@ -8,11 +8,13 @@ use std::sync::Arc;
 use ingest::Flights;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, Installation, PartNumber, Position, Provenance, SerialNumber,
-    Status, TailNumber,
-};
-use store::{Holder, LogRecord, LogResult, Store};
+use records::{GapEstimate, GapRecord, Installation, PartNumber, Position, SerialNumber, Status, TailNumber};
+use store::{Holder, LogResult, Store};
+
+pub(crate) use self::made_up::{record, result};
+
+#[path = "../../../../tests/made_up.rs"]
+mod made_up;
 
 /// Configuration of the sample fleet, with a text replaced by another; relative paths begin in this crate's folder.
 pub(crate) fn config_with(from: &str, to: &str) -> Config {
@@ -63,58 +65,6 @@ pub(crate) fn estimated(gap_um: f64) -> GapEstimate {
         load_reversals: 100,
         ..GapEstimate::default()
     }
-}
-
-/// A record of a tail, position, part number, serial number and flight.
-pub(crate) fn record(
-    [tail, position, part, serial, flight]: [&str; 5],
-    departure_utc: Timestamp,
-    flight_hours: f64,
-    estimate: GapEstimate,
-) -> GapRecord {
-    GapRecord {
-        flight: Flight {
-            tail_number: TailNumber::new(tail).unwrap(),
-            flight_id: FlightId::new(flight).unwrap(),
-            departure_utc,
-            flight_hours: Some(flight_hours),
-            tail_hours_end: None,
-        },
-        position: Position::new(position).unwrap(),
-        part_number: PartNumber::new(part).unwrap(),
-        serial_number: SerialNumber::new(serial).unwrap(),
-        unit_hours: None,
-        estimate,
-        provenance: Provenance {
-            log_path: format!("{tail}/{flight} {departure_utc}.parquet"),
-            log_digest: "d".into(),
-            config_digest: "c".into(),
-            program_version: "0".into(),
-            run_id: "run".into(),
-            processed_utc: departure_utc,
-        },
-    }
-}
-
-/// What a run stores of a log with some records of one flight.
-pub(crate) fn result(records: Vec<GapRecord>) -> LogResult {
-    let GapRecord { flight, provenance, .. } = &records[0];
-    let account = LogRecord {
-        log_path: provenance.log_path.clone(),
-        size_bytes: 1,
-        log_digest: Some(provenance.log_digest.clone()),
-        config_digest: Some(provenance.config_digest.clone()),
-        tail_number: Some(flight.tail_number.to_string()),
-        flight_id: Some(flight.flight_id.to_string()),
-        departure_utc: Some(flight.departure_utc),
-        positions: records.iter().map(|record| record.position.to_string()).collect(),
-        estimated: records.len() as i64,
-        duration_s: 0.1,
-        run_id: "run".into(),
-        processed_utc: provenance.processed_utc,
-        ..LogRecord::default()
-    };
-    LogResult { account, records, moved_from: Vec::new() }
 }
 
 /// A store with the results of some logs, below a folder.

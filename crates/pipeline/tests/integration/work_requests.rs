@@ -33,7 +33,8 @@ impl Desk {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
             ["unit", serial, tail, from, to @ ..] => {
-                let is_other = |row: &Installation| row.unit().1.as_str() != *serial || row.removed_utc.is_some();
+                let is_other =
+                    |row: &Installation| row.unit().1.as_str() != *serial || row.removed_utc.is_some();
                 self.installations.retain(is_other);
                 let names = [*tail, "aileron", "EMA", *serial];
                 let to = to.first().map(|to| utc(to));

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
-use records::{
-    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
-    TailNumber,
-};
+use records::{GapEstimate, GapRecord, Status};
 use store::{Holder, LogRecord, LogResult, RunRecord, Store, Writer};
+
+use crate::made_up;
 
 pub(crate) const POSITIONS: [&str; 3] = ["aileron_left", "aileron_right", "elevator"];
 
@@ -29,54 +28,19 @@ pub(crate) fn record(tail: usize, flight: i64, position: &str, gap_m: f64) -> Ga
         flags: vec!["soft_contact".into(), "drift".into()],
         ..GapEstimate::refused("below_detection")
     };
-    GapRecord {
-        flight: Flight {
-            tail_number: TailNumber::new(format!("N{tail}")).unwrap(),
-            flight_id: FlightId::new(format!("F{flight:04}")).unwrap(),
-            departure_utc: departure(flight),
-            flight_hours: Some(1.5),
-            tail_hours_end: None,
-        },
-        position: Position::new(position).unwrap(),
-        part_number: PartNumber::new("EMA-27").unwrap(),
-        serial_number: SerialNumber::new(format!("S-{tail}-{position}")).unwrap(),
-        unit_hours: None,
-        estimate,
-        provenance: Provenance {
-            log_path: format!("logs/N{tail}/{flight}.parquet"),
-            log_digest: "d1".into(),
-            config_digest: "c1".into(),
-            program_version: "0.1.0".into(),
-            run_id: "run".into(),
-            processed_utc: time("2026-11-20T02:00:00Z"),
-        },
-    }
+    let [tail, serial] = [format!("N{tail}"), format!("S-{tail}-{position}")];
+    let names = [&*tail, position, "EMA-27", &serial, &format!("F{flight:04}")];
+    made_up::record(names, departure(flight), 1.5, estimate)
 }
 
 /// The account of the log of that flight.
 pub(crate) fn account(tail: usize, flight: i64) -> LogRecord {
-    LogRecord {
-        log_path: format!("logs/N{tail}/{flight}.parquet"),
-        size_bytes: 1_000,
-        modified_utc_ns: 1_700_000_000_123_456_789,
-        file_id: "1:2".into(),
-        log_digest: Some("d1".into()),
-        tail_number: Some(format!("N{tail}")),
-        flight_id: Some(format!("F{flight:04}")),
-        departure_utc: Some(departure(flight)),
-        positions: POSITIONS.map(str::to_owned).to_vec(),
-        estimated: 3,
-        duration_s: 0.25,
-        run_id: "run".into(),
-        processed_utc: time("2026-11-20T02:00:00Z"),
-        ..LogRecord::default()
-    }
+    result(tail, flight, 0.0).account
 }
 
 /// What comes of the log of that flight: a record for each position.
 pub(crate) fn result(tail: usize, flight: i64, gap_m: f64) -> LogResult {
-    let records = POSITIONS.iter().map(|position| record(tail, flight, position, gap_m)).collect();
-    LogResult { account: account(tail, flight), records, moved_from: Vec::new() }
+    made_up::result(POSITIONS.map(|position| record(tail, flight, position, gap_m)).to_vec())
 }
 
 pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRecord {

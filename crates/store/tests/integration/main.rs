@@ -8,6 +8,8 @@ mod folder;
 mod fuzz;
 #[path = "../../../../tests/gate.rs"]
 mod gate;
+#[path = "../../../../tests/made_up.rs"]
+mod made_up;
 mod maintenance;
 mod queries;
 mod round_trip;
