@@ -1,13 +1,14 @@
 //! Proposes a mapping for `init --from` from a sample of the logs of a folder. A comment on each line says how sure it is.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
+use askama::Template;
 use ingest::infer::{InferredMapping, folder_value, path_identity, path_position, path_tail, propose};
 use ingest::mapping::units::{Dimension, Unit};
 use ingest::mapping::{Epoch, IdentityField};
 use ingest::{Layout, Role};
+use records::Diagnostic;
 use records::sanitize::csv_cell;
 
 use crate::commands::context::display_path;
@@ -34,25 +35,6 @@ const INSTALLATIONS_HEAD: &str = "\
 # Empty removed_utc: still installed. A date without time is midnight UTC.
 tail_number,position,part_number,serial_number,installed_utc,removed_utc
 ";
-
-/// Placeholder values of a rotary part; the template has those of a linear part.
-const ROTARY_PART: &str = r#"
-kind = "rotary"           # loads are torques, and both positions are angles
-stiffness_nm_per_rad = 2.0e4
-damping_nm_s_per_rad = 1.0
-inertia_kg_m2 = 3.0e-3
-reference_radius_m = 0.1  # the radius at which the gap is stated
-# limit_m and watch_m: removal limit and alert level; without them a unit is not assessed
-
-[part."PART-NUMBER".noise]
-screw_rms_rad = 5.0e-5
-screw_resolution_rad = 5.0e-5
-motor_rms_rad = 5.0e-5    # at the driven side
-motor_resolution_rad = 5.0e-5
-unknown_torque_nm = 5.0   # mainly friction; about 2 % of the rated torque
-bandwidth_hz = 10.0       # bandwidth of the backlash random walk
-
-"#;
 
 /// Logs from which the same mapping is inferred.
 struct Variant {
@@ -81,6 +63,44 @@ impl Variant {
             motor_wraps_at: None,
             ..self.offer.clone()
         }
+    }
+
+    /// Why no proposal covers these logs beside others.
+    fn fault(&self) -> String {
+        let lacking = Role::NEEDED.iter().filter(|role| self.lacks(**role));
+        match lacking.map(|role| role.as_str()).collect::<Vec<_>>().as_slice() {
+            [] => "rows are laid out otherwise".to_owned(),
+            lacking => format!("no {}", lacking.join(", ")),
+        }
+    }
+
+    /// Its tails as elements of a list.
+    fn tails(&self) -> String {
+        self.offer.tails.iter().map(|tail| quoted(tail)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Whether a channel is read otherwise than in the usual logs.
+    fn differs(&self, usual: &Self, role: Role) -> bool {
+        !self.lacks(role) && self.offer.channel(role) != usual.offer.channel(role)
+    }
+
+    /// The value at which a channel starts again.
+    fn turn(&self, role: Role) -> Option<String> {
+        self.offer.motor_wraps_at.filter(|_| role == Role::Motor).map(|turn| format!("{turn:?}"))
+    }
+
+    /// The further columns of a channel as elements of a list, and whether one of them names no unit.
+    fn alternatives(&self, role: Role) -> Option<(String, bool)> {
+        let [(_, own_unit), others @ ..] = self.offer.channels.get(&role)?.as_slice() else { return None };
+        let other = |(column, unit): &(String, Option<Unit>)| {
+            let turn = self.turn(role).filter(|_| unit.is_none() || unit == own_unit);
+            let turn = turn.map_or_else(String::new, |turn| format!(", wraps_at = {turn}"));
+            let unit = unit.or(*own_unit).unwrap_or(usual(role)).as_str();
+            format!("{{ column = {}, unit = {unit:?}{turn} }}", quoted(column))
+        };
+        let texts: Vec<String> = others.iter().map(other).collect();
+        let is_guess = others.iter().any(|(_, unit)| unit.is_none());
+        (!texts.is_empty()).then(|| (texts.join(", "), is_guess))
     }
 
     fn add(&mut self, other: Self) {
@@ -278,61 +298,47 @@ impl Proposal {
 
     /// Template with the mapping of the logs below a folder, to be verified with `check`.
     pub(crate) fn configuration(&self, template: &str, folder: &Path, dir: &Path) -> Result<String, Failure> {
-        let (head, rest) = template.split_once("# Which flight a log is.").unwrap_or((template, ""));
-        let (_, rest) = rest.split_once("[estimate]").unwrap_or(("", rest));
-        let (estimate, rest) = rest.split_once("# One table per part number").unwrap_or((rest, ""));
-        let (part, trend) = rest.split_once("[trend]").unwrap_or(("", rest));
-        let folder = relative(folder, dir)?;
-        let below = |files: &str| quoted(&format!("{}/{files}", display_path(&folder)));
-        let files = format!("# {}.\nfiles = [{}]", self.coverage(), below(&self.files));
-        let mut head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
-        for (kind, group) in &self.groups {
-            let kind = key(kind);
-            let _ = write!(head, "[group.{kind}]\nfiles = [{}]\n\n", below(&group.files));
-            if group.offer.clock != self.main.offer.clock {
-                let _ = write!(head, "[group.{kind}.clock]\n{}\n", clock(&group.offer));
-            }
-            if group.offer.layout != Layout::default() {
-                let _ = write!(head, "[group.{kind}.layout]\n{}\n", layout(&group.offer.layout));
-            }
-        }
-        let overrides: String = self.overrides.iter().map(|variant| self.of_tails(variant)).collect();
-        let part = self.part(part);
-        Ok(format!("{head}{}{overrides}[estimate]{estimate}{part}[trend]{trend}", self.mapping()))
+        let mut trend = template;
+        let [head, tables, _, estimate, _, part] = MARKERS.map(|marker| {
+            let (before, after) = trend.split_once(marker).unwrap_or((trend, ""));
+            trend = after;
+            before
+        });
+        let (offer, log) = (&self.main.offer, &self.main.log);
+        let names = |names: Vec<&str>| escape(&names.join(", "));
+        let positions = names(offer.positions.iter().map(String::as_str).collect());
+        let [has_tail, has_departure] =
+            [IdentityField::TailNumber, IdentityField::DepartureUtc].map(|fact| has(offer, fact));
+        let is_identified = has_tail && has_departure;
+        let position_path = needed_position(log, offer).filter(|_| is_identified);
+        let identity_path = if is_identified { None } else { identity_path(log, offer) };
+        let lacks_format = identity_path.as_ref().map_or(has_tail, |(_, format)| format.is_none());
+        let text = Configuration {
+            proposal: self,
+            head,
+            tables,
+            positions: if positions.is_empty() { "none".to_owned() } else { positions },
+            position_path: position_path.map(|(_, path)| path),
+            identity_path,
+            has_tail,
+            has_departure,
+            lacks_departure: lacks_format && !has_departure,
+            others: names(offer.others.iter().take(12).map(String::as_str).collect()),
+            estimate,
+            linear_part: part
+                .replace("EMA-27-1040", PART)
+                .replace("\nlimit_m", "\n# limit_m")
+                .replace("\nwatch_m", "\n# watch_m"),
+            trend,
+            folder: relative(folder, dir)?,
+        };
+        text.render().map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
     }
 
-    /// Placeholders of a part, without limits: a run refuses them.
-    fn part(&self, of_template: &str) -> String {
+    /// Whether load and screw position are those of a part that only turns.
+    fn is_rotary(&self) -> bool {
         let dimension = |role: Role| Some(self.main.offer.channel(role)?.1?.dimension());
-        let is_rotary = dimension(Role::Load) == Some(Dimension::Torque)
-            && dimension(Role::Screw) == Some(Dimension::Angle);
-        let (_, linear) = of_template.split_once("[part.\"EMA-27-1040\"]").unwrap_or(("", of_template));
-        let linear = linear.replace("EMA-27-1040", PART);
-        let linear = linear.replace("\nlimit_m", "\n# limit_m").replace("\nwatch_m", "\n# watch_m");
-        format!(
-            "# One table per part number in installations.csv. These values are placeholders, and `freeplay run` refuses them:\n\
-             # enter part number and data sheet, then delete the line `placeholder`. `freeplay check` on ten logs or more\n\
-             # prints what it identifies.\n[part.\"{PART}\"]\nplaceholder = true{}",
-            if is_rotary { ROTARY_PART } else { &linear }
-        )
-    }
-
-    /// Override for tails whose logs differ from the main ones.
-    fn of_tails(&self, variant: &Variant) -> String {
-        let tails: Vec<String> = variant.offer.tails.iter().map(|tail| quoted(tail)).collect();
-        let mut text =
-            format!("# {}.\n[[override]]\ntails = [{}]\n", self.seen_in(variant), tails.join(", "));
-        let (own, usual) = (&variant.offer, &self.main.offer);
-        let differs =
-            |role: &Role| own.channels.contains_key(role) && own.channel(*role) != usual.channel(*role);
-        for (role, name) in CHANNELS.iter().filter(|(role, _)| differs(role)) {
-            let _ = write!(text, "[override.channel.{name}]\n{}", self.channel(variant, *role));
-        }
-        if (&own.clock, own.epoch) != (&usual.clock, usual.epoch) {
-            let none = if own.epoch == Epoch::None { "epoch = \"none\"\n" } else { "" };
-            let _ = write!(text, "[override.clock]\n{}{none}", clock(own));
-        }
-        text + "\n"
+        dimension(Role::Load) == Some(Dimension::Torque) && dimension(Role::Screw) == Some(Dimension::Angle)
     }
 
     fn seen_in(&self, variant: &Variant) -> String {
@@ -340,92 +346,60 @@ impl Proposal {
         format!("In {} of {} logs looked at, the first of them {log}", variant.logs, self.looked_at)
     }
 
-    /// Inferred part of the configuration; keys that could not be inferred are left to fill in.
-    fn mapping(&self) -> String {
-        let offer = &self.main.offer;
-        let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
-        let positions = if positions.is_empty() { "none".to_owned() } else { escape(&positions.join(", ")) };
-        let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
-        let has = |role: &Role| Role::NEEDED.contains(role) || offer.channels.contains_key(role);
-        let mut channels = String::new();
-        for (role, name) in CHANNELS.iter().filter(|(role, _)| has(role)) {
-            let _ = write!(channels, "\n[channel.{name}]\n{}", self.channel(&self.main, *role));
-        }
-        let rows = if offer.layout == Layout::default() {
-            String::new()
-        } else {
-            format!("\n[layout]\n{}", layout(&offer.layout))
-        };
-        let uncovered = self.uncovered.iter().map(|variant| {
-            let lacking = Role::NEEDED.iter().filter(|role| variant.lacks(**role));
-            let lacking: Vec<&str> = lacking.map(|role| role.as_str()).collect();
-            let why = if lacking.is_empty() {
-                "rows are laid out otherwise".to_owned()
-            } else {
-                format!("no {}", lacking.join(", "))
-            };
-            format!("# Not covered: {why}. {}.\n", self.seen_in(variant))
-        });
-        [
-            format!(
-                "# Inferred: verify names, units and signs with `freeplay check`. Each line says how sure it is, and why.\n\
-                 # {}.\n",
-                self.seen_in(&self.main)
-            ),
-            uncovered.collect(),
-            format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer, &self.main.log)),
-            "# Time zone of departures without one.\ntime_zone = \"UTC\"   # low: a guess\n".to_owned(),
-            rows,
-            format!("\n[clock]\n{}", clock(offer)),
-            channels,
-            if others.is_empty() {
-                "\n".to_owned()
-            } else {
-                format!("\n# Unmapped numeric columns: {}\n\n", escape(&others.join(", ")))
-            },
-        ]
-        .concat()
+    /// The group whose files hold a channel.
+    fn group_of(&self, role: Role) -> Option<&String> {
+        Some(self.groups.iter().find(|(_, group)| group.roles.contains(&role))?.0)
+    }
+}
+
+/// Where the proposal takes over from the common template, and where it gives back.
+const MARKERS: [&str; 6] = [
+    "files = [\"logs/**/*.parquet\"]\n",
+    "\n# Which flight a log is.",
+    "[estimate]\n",
+    "\n# One table per part number",
+    "[part.\"EMA-27-1040\"]\n",
+    "[trend]\n",
+];
+
+/// A proposed `pipeline.toml`: the common template with the mapping of some logs, and placeholders of a part without limits,
+/// which a run refuses. Keys that could not be inferred are left to fill in.
+#[derive(Template)]
+#[template(path = "proposal.toml", escape = "none")]
+struct Configuration<'p> {
+    proposal: &'p Proposal,
+    head: &'p str,
+    tables: &'p str,
+    positions: String,
+    /// The expression that finds the position in the path, where the path holds nothing else of the identity.
+    position_path: Option<String>,
+    /// The expression that finds what metadata and columns do not hold, and the format of its departure.
+    identity_path: Option<(String, Option<String>)>,
+    has_tail: bool,
+    has_departure: bool,
+    lacks_departure: bool,
+    /// Columns that were not understood.
+    others: String,
+    estimate: &'p str,
+    linear_part: String,
+    trend: &'p str,
+    folder: PathBuf,
+}
+
+impl Configuration<'_> {
+    /// A pattern of files below the folder of the logs.
+    fn below(&self, files: &str) -> String {
+        quoted(&format!("{}/{files}", display_path(&self.folder)))
     }
 
-    fn channel(&self, variant: &Variant, role: Role) -> String {
-        let (offer, usual) = (&variant.offer, usual(role).as_str());
-        let seen = format!("in {} of {} logs looked at", variant.logs, self.looked_at);
-        let mut text = match offer.channel(role) {
-            Some((column, unit)) => {
-                let (unit, sure) = match unit {
-                    Some(unit) => (unit.as_str(), "high: the log names it"),
-                    None => (usual, "low: a guess, the log names no unit"),
-                };
-                format!("column = {}   # high: {seen}\nunit = {unit:?}   # {sure}\n", quoted(column))
-            }
-            None => format!("column = \"\"           # no column was recognised\nunit = {usual:?}\n"),
-        };
-        let group = self.groups.iter().find(|(_, group)| group.roles.contains(&role));
-        if let Some((name, _)) = group {
-            let _ = writeln!(text, "group = {}", quoted(name));
-        }
-        let turn = offer.motor_wraps_at.filter(|_| role == Role::Motor);
-        if let Some(turn) = turn {
-            let _ = writeln!(text, "wraps_at = {turn:?}   # high: it leaps by more than half a turn");
-        }
-        let own_unit = offer.channel(role).and_then(|(_, unit)| *unit);
-        let other = |(column, unit): &(String, Option<Unit>)| {
-            let is_alike = unit.is_none() || *unit == own_unit;
-            let unit = unit.or(own_unit).map_or(usual, |unit| unit.as_str());
-            let wraps =
-                turn.filter(|_| is_alike).map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
-            format!("{{ column = {}, unit = {unit:?}{wraps} }}", quoted(column))
-        };
-        if let Some([_, others @ ..]) = offer.channels.get(&role).map(Vec::as_slice)
-            && !others.is_empty()
-        {
-            let is_guess = others.iter().any(|(_, unit)| unit.is_none());
-            let sure =
-                if is_guess { "   # low: a column that names no unit may have another one" } else { "" };
-            let others: Vec<String> = others.iter().map(other).collect();
-            let _ = writeln!(text, "alternatives = [{}]{sure}", others.join(", "));
-        }
-        text
+    /// Sources of the identity other than the path, each with its facts as keys of a table.
+    fn identity_sources(&self) -> Vec<(&'static str, String)> {
+        let offer = &self.proposal.main.offer;
+        let fact = |(fact, name): (&IdentityField, &String)| format!("{} = {}", fact.as_str(), quoted(name));
+        let sources =
+            [("metadata", &offer.metadata), ("columns", &offer.columns), ("folders", &offer.folders)];
+        let given = sources.into_iter().filter(|(_, facts)| !facts.is_empty());
+        given.map(|(source, facts)| (source, facts.iter().map(fact).collect::<Vec<_>>().join(", "))).collect()
     }
 }
 
@@ -538,13 +512,14 @@ fn key(text: &str) -> String {
     if text.chars().all(is_bare) { text.to_owned() } else { quoted(text) }
 }
 
-fn layout(layout: &Layout) -> String {
+/// The keys of a layout that have a column.
+fn layout_keys(layout: &Layout) -> impl Iterator<Item = (&'static str, &String)> {
     let keys = [
         ("name_column", &layout.name_column),
         ("value_column", &layout.value_column),
         ("position_column", &layout.position_column),
     ];
-    keys.iter().filter_map(|(key, column)| Some(format!("{key} = {}\n", quoted(column.as_ref()?)))).collect()
+    keys.into_iter().filter_map(|(key, column)| Some((key, column.as_ref()?)))
 }
 
 /// Whether neither columns nor folders name the position of a log.
@@ -559,92 +534,18 @@ fn needed_position(log: &Path, offer: &InferredMapping) -> Option<(String, Strin
     if needs_position(offer) { path_position(log) } else { None }
 }
 
-/// Comment of a proposal whose departures only the clock can give.
-const NO_DEPARTURE: &str = "# No departure was found: it is the first timestamp if the clock has a date.\n";
-
-fn identity(offer: &InferredMapping, log: &Path) -> String {
-    let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
-        let facts: Vec<String> =
-            facts.iter().map(|(fact, name)| format!("{} = {}", fact.as_str(), quoted(name))).collect();
-        if facts.is_empty() { String::new() } else { format!("{key} = {{ {} }}\n", facts.join(", ")) }
-    };
-    let mut text = [
-        table("metadata", &offer.metadata),
-        table("columns", &offer.columns),
-        table("folders", &offer.folders),
-        if offer.by_row {
-            "by_row = true   # high: rows of one file name several flights\n".to_owned()
-        } else {
-            String::new()
-        },
-    ]
-    .concat();
-    let has = |fact| {
-        [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
-    };
-    if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
-        if let Some((_, path)) = needed_position(log, offer) {
-            let _ = writeln!(text, "# The position is inferred from the path.\npath = '{path}'");
-        }
-        return text;
-    }
-    match path_identity(log, needs_position(offer)) {
-        Some((mut path, format)) => {
-            text.push_str(
-                "# Not all of the identity is in metadata or columns; the rest is inferred from the path.\n",
-            );
-            for fact in
-                [IdentityField::TailNumber, IdentityField::DepartureUtc].into_iter().filter(|fact| has(*fact))
-            {
-                path = path.replace(&format!("(?<{}>", fact.as_str()), "(?:");
-            }
-            let _ = writeln!(text, "path = '{path}'   # medium: the form of {}", escape(&display_path(log)));
-            if !has(IdentityField::TailNumber) && !path.contains("<tail_number>") {
-                text.push_str("# TODO: no tail was found: set it in `path`, `folders` or `columns`.\n");
-            }
-            match format {
-                _ if has(IdentityField::DepartureUtc) => {}
-                Some(format) => drop(writeln!(text, "departure_format = {format:?}")),
-                None => text.push_str(NO_DEPARTURE),
-            }
-        }
-        None if has(IdentityField::TailNumber) => {
-            text.push_str(NO_DEPARTURE);
-        }
-        None => {
-            text.push_str(
-                "# TODO: no tail/departure found in metadata or path; set path, folders or columns\n",
-            );
-            text.push_str(
-                "path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n",
-            );
-            text.push_str("departure_format = \"%Y%m%dT%H%M%SZ\"\n");
-        }
-    }
-    text
+/// Whether metadata, columns or folders hold a fact of the identity.
+fn has(offer: &InferredMapping, fact: IdentityField) -> bool {
+    [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
 }
 
-fn clock(offer: &InferredMapping) -> String {
-    let epoch = match offer.epoch {
-        Epoch::Unix => "epoch = \"unix\"   # high: its values lie between 1990 and 2100\n",
-        Epoch::Midnight => "epoch = \"midnight\"   # medium: its name, and values below a day\n",
-        Epoch::Excel => {
-            "epoch = \"excel\"   # high: as days since 1899, its values lie between 1990 and 2100\n"
+/// The expression that finds the rest of the identity in the path of a log, and the format of its departure.
+fn identity_path(log: &Path, offer: &InferredMapping) -> Option<(String, Option<String>)> {
+    let (mut path, format) = path_identity(log, needs_position(offer))?;
+    for fact in [IdentityField::TailNumber, IdentityField::DepartureUtc] {
+        if has(offer, fact) {
+            path = path.replace(&format!("(?<{}>", fact.as_str()), "(?:");
         }
-        Epoch::None => "",
-    };
-    match &offer.clock {
-        Some((column, Some(unit))) => format!(
-            "column = {}\nunit = {}   # medium: by its name or its steps\n{epoch}",
-            quoted(column),
-            quoted(unit)
-        ),
-        Some((column, None)) => {
-            let column = quoted(column);
-            format!(
-                "column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n{epoch}"
-            )
-        }
-        None => "# No time column was recognised: name it, or delete `column` and give `rate_hz`.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
     }
+    Some((path, format))
 }
