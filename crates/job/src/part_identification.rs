@@ -2,24 +2,13 @@
 //! also replace a guess of the noise levels.
 
 use estimator::contact::ContactEstimate;
-use estimator::{NoiseModel, SensorNoise};
 use ingest::channel::noise_floor::{WhiteNoise, white_noise};
 use ingest::{ActuatorChannels, Geometry};
 
-use crate::config::part::Part;
+use crate::config::part::{NoiseModel, Part};
 
 /// Friction below this share of the load is not distinguishable from none.
 const MIN_FRICTION_SHARE: f64 = 0.01;
-
-/// The keys of a linear and of a rotary part, below the part.
-const KEYS: [[&str; 2]; 6] = [
-    ["stiffness_n_per_m", "stiffness_nm_per_rad"],
-    ["noise.screw_rms_m", "noise.screw_rms_rad"],
-    ["noise.screw_resolution_m", "noise.screw_resolution_rad"],
-    ["noise.motor_rms_m", "noise.motor_rms_rad"],
-    ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
-    ["noise.unknown_force_n", "noise.unknown_torque_nm"],
-];
 
 /// A value, and its standard uncertainty where it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,17 +17,17 @@ struct Identified {
     uncertainty: Option<f64>,
 }
 
-/// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis, in the order of
-/// `KEYS`: stiffness by the contact regression; white noise and smallest step of the screw and of the motor position; and
-/// the unknown force, which is the friction of the screw at the rms load.
+/// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis: stiffness by the
+/// contact regression; white noise and smallest step of the screw and of the motor position; and the unknown force, which
+/// is the friction of the screw at the rms load.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct IdentifiedParams([Option<Identified>; KEYS.len()]);
+pub struct IdentifiedParams([Option<Identified>; 6]);
 
 /// A key of `[part."…"]`, its identified value, and its configured value.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ParamComparison {
     /// The key, below the part.
-    pub key: &'static str,
+    pub key: String,
     /// From the logs, in the key's unit.
     pub identified: f64,
     /// Standard uncertainty of `identified`, where it is known.
@@ -83,34 +72,23 @@ impl IdentifiedParams {
 
     /// The facts under the keys and in the units in which a part of this kind is configured.
     pub fn comparisons(&self, part: &Part) -> Vec<ParamComparison> {
-        let sensors = match part.noise {
-            NoiseModel::Sensors(sensors) => Some(sensors),
-            _ => None,
+        let settings = &part.settings;
+        let [(stiffness, configured), ..] = settings.keys_of(settings.kind);
+        let noise = settings.noise.clone().unwrap_or_default();
+        let is_of_sensors = noise.model == NoiseModel::Sensors;
+        let levels = noise.levels(settings.kind);
+        let levels = levels.map(|(key, level)| (format!("noise.{key}"), level.filter(|_| is_of_sensors)));
+        // What the reference radius makes of the units.
+        let scales = match part.geometry {
+            Geometry::Linear { .. } => [1.0; 6],
+            Geometry::Rotary { reference_radius_m: r } => [r * r, 1.0 / r, 1.0 / r, 1.0 / r, 1.0 / r, r],
         };
-        let stiffness = part.actuator.stiffness_n_per_m();
-        // The column of the keys, and what a radius makes of their units.
-        let (column, length, force, rate) = match part.geometry {
-            Geometry::Linear { .. } => (0, 1.0, 1.0, 1.0),
-            Geometry::Rotary { reference_radius_m: r } => (1, r.recip(), r, r * r),
-        };
-        let level = |of: fn(&SensorNoise) -> f64| sensors.as_ref().map(of);
-        let settings = [
-            (rate, Some(stiffness)),
-            (length, level(|s| s.screw_rms_m)),
-            (length, level(|s| s.screw_resolution_m)),
-            (length, level(|s| s.motor_rms_m)),
-            (length, level(|s| s.motor_resolution_m)),
-            (force, level(|s| s.unknown_force_n)),
-        ];
-        let all = KEYS.iter().zip(settings).zip(self.0);
-        all.filter_map(|((keys, (scale, configured)), identified)| {
+        let keys = std::iter::once((stiffness.to_owned(), configured)).chain(levels);
+        let all = keys.zip(scales).zip(self.0);
+        all.filter_map(|(((key, configured), scale), identified)| {
             let Identified { value, uncertainty } = identified?;
-            Some(ParamComparison {
-                key: keys[column],
-                identified: value * scale,
-                uncertainty: uncertainty.map(|v| v * scale),
-                configured: configured.map(|v| v * scale),
-            })
+            let uncertainty = uncertainty.map(|v| v * scale);
+            Some(ParamComparison { key, identified: value * scale, uncertainty, configured })
         })
         .collect()
     }

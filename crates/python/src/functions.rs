@@ -103,7 +103,7 @@ pub(crate) fn trace(
     part_number: Option<&str>,
 ) -> PyResult<Table> {
     let seen = estimate_log(py, &log, &request(py, config, part_number, true)?)?;
-    if let Some(diagnostic) = seen.diagnostics.into_iter().chain(seen.not_shown).next() {
+    if let Some(diagnostic) = seen.diagnostics.into_iter().next() {
         return Err(to_exception(py, ExceptionClass::Log, &[diagnostic]));
     }
     let columns = seen.trace.columns();

@@ -211,7 +211,7 @@ impl PartSettings {
     }
 
     /// Stiffness, damping, mass or inertia, and lead or reference radius of a kind of part, each with its key.
-    fn keys_of(&self, kind: Kind) -> [(&'static str, Option<f64>); 4] {
+    pub(crate) fn keys_of(&self, kind: Kind) -> [(&'static str, Option<f64>); 4] {
         [
             [
                 ("stiffness_n_per_m", self.stiffness_n_per_m),
@@ -302,12 +302,10 @@ impl NoiseSettings {
         }
     }
 
-    /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
-    fn sensors(&self, part: &PartSettings, faults: &mut Faults<'_>) -> Option<SensorNoise> {
-        let bandwidth_hz = required(faults, &["noise", "bandwidth_hz"], self.bandwidth_hz);
-        let radius = if part.kind == Kind::Linear { 1.0 } else { part.reference_radius_m.unwrap_or(1.0) };
+    /// Noise levels of the sensors of a kind of part, each with its key; a step that is not given is zero.
+    pub(crate) fn levels(&self, kind: Kind) -> [(&'static str, Option<f64>); 5] {
         let none = Some(0.0);
-        let levels = [
+        [
             [("screw_rms_m", self.screw_rms_m), ("screw_rms_rad", self.screw_rms_rad)],
             [
                 ("screw_resolution_m", self.screw_resolution_m.or(none)),
@@ -319,9 +317,15 @@ impl NoiseSettings {
                 ("motor_resolution_rad", self.motor_resolution_rad.or(none)),
             ],
             [("unknown_force_n", self.unknown_force_n), ("unknown_torque_nm", self.unknown_torque_nm)],
-        ];
-        let levels = levels.map(|of_kinds| of_kinds[part.kind as usize]);
-        let levels = levels.map(|(key, level)| required(faults, &["noise", key], level));
+        ]
+        .map(|of_kinds| of_kinds[kind as usize])
+    }
+
+    /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
+    fn sensors(&self, part: &PartSettings, faults: &mut Faults<'_>) -> Option<SensorNoise> {
+        let bandwidth_hz = required(faults, &["noise", "bandwidth_hz"], self.bandwidth_hz);
+        let radius = if part.kind == Kind::Linear { 1.0 } else { part.reference_radius_m.unwrap_or(1.0) };
+        let levels = self.levels(part.kind).map(|(key, level)| required(faults, &["noise", key], level));
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");
             faults.report(&["noise"], Diagnostic::new("bad_parameter", what));

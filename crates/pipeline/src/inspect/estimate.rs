@@ -66,10 +66,8 @@ pub struct LogEstimates {
     pub trace: Trace,
     /// One plot for each actuator.
     pub plots: Vec<EstimatePlot>,
-    /// Errors of the log, or of single actuators.
+    /// Errors of the log, or of single actuators: also where an estimate has no trace or no plot.
     pub diagnostics: Vec<Diagnostic>,
-    /// Why actuators that were estimated have no trace or no plot.
-    pub not_shown: Vec<Diagnostic>,
 }
 
 /// Estimates every actuator of a log, within `run.log_timeout_s`.
@@ -152,17 +150,27 @@ impl LogEstimates {
         row: EstimateRow,
         channels: Option<ActuatorChannels>,
     ) {
-        if let Some(channels) = channels {
-            if request.has_trace {
-                self.not_shown.extend(self.trace.add(log_path, &channels, part).err());
-            }
-            if request.has_plots {
-                let plot = estimate_plots::plot(log_path, &channels, part, &row.estimate);
-                plot.map_or_else(|diagnostic| self.not_shown.push(diagnostic), |plot| self.plots.push(plot));
-            }
-            channels.recycle_buffers();
-        }
         self.rows.push(EstimateRow { log_path: Some(log_path.to_owned()), ..row });
+        let shown = channels.map_or(Ok(()), |channels| self.show(log_path, request, part, channels));
+        self.diagnostics.extend(shown.err().map(|diagnostic| diagnostic.in_file(log_path)));
+    }
+
+    /// Traces and draws the actuator of the last row.
+    fn show(
+        &mut self,
+        log_path: &str,
+        request: &EstimateRequest,
+        part: &Part,
+        channels: ActuatorChannels,
+    ) -> Result<(), Diagnostic> {
+        if request.has_trace {
+            self.trace.add(log_path, &channels, part)?;
+        }
+        if let Some(row) = self.rows.last().filter(|_| request.has_plots) {
+            self.plots.push(estimate_plots::plot(log_path, &channels, part, &row.estimate)?);
+        }
+        channels.recycle_buffers();
+        Ok(())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-use strum::{EnumString, IntoStaticStr};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::row;
 
@@ -20,6 +20,7 @@ use crate::row;
     Deserialize,
     IntoStaticStr,
     EnumString,
+    VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -38,20 +39,6 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All quantities, in the order of tables.
-    pub const ALL: [Self; 10] = [
-        Self::GapM,
-        Self::LostMotionM,
-        Self::StiffnessNPerM,
-        Self::FrictionN,
-        Self::FrictionDryN,
-        Self::FrictionLoadShare,
-        Self::SkewS,
-        Self::LoadZeroN,
-        Self::LoadDelayS,
-        Self::Nis,
-    ];
-
     /// Name of the column.
     pub fn as_str(self) -> &'static str {
         self.into()

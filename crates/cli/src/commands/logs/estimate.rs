@@ -50,7 +50,6 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
         plots.extend(of_log.plots);
         diagnostics.extend(of_log.diagnostics);
     }
-    // An actuator whose estimate failed has neither trace nor plot: its error is among the diagnostics.
     if let Some(file) = &args.trace {
         write_trace(file, &trace, output)?;
     }
