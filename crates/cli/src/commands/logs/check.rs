@@ -220,7 +220,7 @@ fn proposals(facts: &BTreeMap<PartNumber, Vec<IdentifiedParams>>, config: &Confi
     let uncertainty =
         |p: &ParamComparison| p.uncertainty.map(|v| format!(" ± {:.1e}", NORMAL_95 * v)).unwrap_or_default();
     let columns: &table::Columns<'_, ParamComparison> = &[
-        (text("key", 0), &|p| p.key.to_owned()),
+        (text("key", 0), &|p| p.key.clone()),
         (number("identified (± 90 %)", 0), &|p| format!("{:.2e}{}", p.identified, uncertainty(p))),
         (number("configured", 0), &|p| p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"))),
     ];
