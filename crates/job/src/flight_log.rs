@@ -35,22 +35,29 @@ pub struct ProvenanceStamp {
     pub processed_utc: Timestamp,
 }
 
+/// An actuator of a log, and how its channels are read.
+#[derive(Debug)]
+pub struct Actuator {
+    /// Its columns.
+    pub columns: ActuatorColumns,
+    mapping: Arc<Mapping>,
+}
+
 /// Which flight a log is and what it holds, before any channel is read.
 #[derive(Debug)]
-pub struct FlightLog {
+pub struct FlightLog<'c> {
     log: Log,
     display_name: String,
-    /// How the channels of each position are read.
-    mappings: BTreeMap<Position, Arc<Mapping>>,
+    config: &'c Config,
+    installations: &'c Installations,
     /// Which flight it is.
     pub identity: Identity,
-    /// Its actuators.
-    pub positions: Vec<ActuatorColumns>,
+    all: Vec<Actuator>,
     /// blake3 of what will be read.
     pub digest: String,
 }
 
-impl FlightLog {
+impl<'c> FlightLog<'c> {
     /// Opens a log; `display_name` is its name in records and diagnostics.
     ///
     /// # Errors
@@ -58,8 +65,8 @@ impl FlightLog {
     pub fn open(
         files: &LogFiles,
         display_name: &str,
-        config: &Config,
-        installations: &Installations,
+        config: &'c Config,
+        installations: &'c Installations,
     ) -> Result<Self, Diagnostic> {
         let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
@@ -67,14 +74,12 @@ impl FlightLog {
         check_not_ahead(&identity.flight, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
         check_tail(&identity, display_name, config)?;
         let log = log.with_mapping(&config.mapping(&identity.flight.tail_number, None));
-        let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
-        let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
+        let all = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
+        let used = used(&all);
         let digest = log.digest(&used).map_err(in_log)?;
         log.announce(&used);
-        let mappings =
-            map_actuators.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
-        let positions = map_actuators.into_iter().map(|(at, _)| at).collect();
-        Ok(Self { log, display_name: display_name.to_owned(), mappings, identity, positions, digest })
+        let display_name = display_name.to_owned();
+        Ok(Self { log, display_name, config, installations, identity, all, digest })
     }
 
     /// Its name in records and diagnostics.
@@ -82,24 +87,18 @@ impl FlightLog {
         &self.display_name
     }
 
-    /// How the channels of a position are read.
-    pub(crate) fn channels_map(&self, at: &ActuatorColumns) -> Option<&Channels> {
-        self.mappings.get(&at.position).map(|mapping| &mapping.channels)
-    }
-
     /// Whether every page that is read carries a checksum.
     ///
     /// # Errors
     /// A diagnostic when a page header cannot be read.
     pub fn is_checked(&self) -> Result<bool, Diagnostic> {
-        let used: Vec<_> =
-            self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
-        self.log.has_page_checksums(&used).map_err(|e| e.diagnostic().in_file(&self.display_name))
+        let checked = self.log.has_page_checksums(&used(&self.all));
+        checked.map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
     /// Names of the positions, in order.
     pub fn position_names(&self) -> Vec<Position> {
-        self.positions.iter().map(|p| p.position.clone()).collect()
+        self.all.iter().map(|at| at.columns.position.clone()).collect()
     }
 
     /// The flight, as records name it.
@@ -109,19 +108,19 @@ impl FlightLog {
 
     /// The actuators of the log. A position that lacks a channel counts only where a unit is installed:
     /// `battery_load` may fit a pattern without being an actuator.
-    pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &ActuatorColumns> {
-        let id = &self.identity;
+    pub fn actuators(&self) -> impl Iterator<Item = &Actuator> {
+        let tail = &self.identity.flight.tail_number;
         // Which columns a position has may depend on its part, so a position without a unit may lack some.
-        let booked = |at: &Position| installations.contains_position(&id.flight.tail_number, at);
-        self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
+        let booked = |at: &Position| self.installations.contains_position(tail, at);
+        self.all.iter().filter(move |at| at.columns.lacking.is_empty() || booked(&at.columns.position))
     }
 
     /// The actuator in a position that the log had when its records were stored.
     ///
     /// # Errors
     /// A diagnostic when the log has no such position any more.
-    pub fn actuator_at(&self, position: &str) -> Result<&ActuatorColumns, Diagnostic> {
-        self.positions.iter().find(|at| at.position.as_str() == position).ok_or_else(|| {
+    pub fn actuator_at(&self, position: &str) -> Result<&Actuator, Diagnostic> {
+        self.all.iter().find(|at| at.columns.position.as_str() == position).ok_or_else(|| {
             Diagnostic::new("no_position", format!("the log has no position {position} any more"))
                 .in_file(&self.display_name)
         })
@@ -131,20 +130,14 @@ impl FlightLog {
     ///
     /// # Errors
     /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
-    pub fn record(
-        &self,
-        at: &ActuatorColumns,
-        config: &Config,
-        installations: &Installations,
-        stamp: &ProvenanceStamp,
-    ) -> Result<GapRecord, Diagnostic> {
+    pub fn record(&self, at: &Actuator, stamp: &ProvenanceStamp) -> Result<GapRecord, Diagnostic> {
         let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
-        let (installation, part) = self.unit(at, config, installations).map_err(in_file)?;
-        let (estimate, channels) = self.estimate(at, part, config).map_err(in_file)?;
+        let (installation, part) = self.unit(at).map_err(in_file)?;
+        let (estimate, channels) = self.estimate(at, part).map_err(in_file)?;
         channels.into_iter().for_each(ActuatorChannels::recycle_buffers);
         Ok(GapRecord {
             flight: self.flight(),
-            position: at.position.clone(),
+            position: at.columns.position.clone(),
             part_number: installation.unit().0.clone(),
             serial_number: installation.unit().1.clone(),
             unit_hours: installation.unit_hours(self.identity.flight.tail_hours_end),
@@ -152,9 +145,7 @@ impl FlightLog {
             provenance: Provenance {
                 log_path: self.display_name.clone(),
                 log_digest: self.digest.clone(),
-                config_digest: config
-                    .digest(&self.identity.flight.tail_number, &installation.part_number)
-                    .to_string(),
+                config_digest: self.config_digest(installation),
                 program_version: stamp.program_version.clone(),
                 run_id: stamp.run_id.clone(),
                 processed_utc: stamp.processed_utc,
@@ -162,21 +153,22 @@ impl FlightLog {
         })
     }
 
+    /// Digest of the settings of a unit's estimate.
+    pub fn config_digest(&self, installation: &Installation) -> String {
+        self.config.digest(&self.identity.flight.tail_number, &installation.part_number).to_string()
+    }
+
     /// The unit that sat in a position that day, and the settings of its part.
     ///
     /// # Errors
     /// A diagnostic when no unit is installed there, or the part is not configured.
-    pub fn unit<'u>(
-        &self,
-        at: &ActuatorColumns,
-        config: &'u Config,
-        installations: &'u Installations,
-    ) -> Result<(&'u Installation, &'u Part), Diagnostic> {
-        let id = &self.identity;
-        let installation = installations
-            .installed_at(&id.flight.tail_number, &at.position, id.flight.departure_utc)
-            .ok_or_else(|| no_installation(id, &at.position, installations))?;
-        Ok((installation, part_of(config, &installation.part_number)?))
+    pub fn unit(&self, at: &Actuator) -> Result<(&'c Installation, &'c Part), Diagnostic> {
+        let (flight, position) = (&self.identity.flight, &at.columns.position);
+        let installation = self
+            .installations
+            .installed_at(&flight.tail_number, position, flight.departure_utc)
+            .ok_or_else(|| no_installation(&self.identity, position, self.installations))?;
+        Ok((installation, part_of(self.config, &installation.part_number)?))
     }
 
     /// Estimates one actuator as a given part, regardless of the installations table. Its channels are returned, too,
@@ -186,27 +178,22 @@ impl FlightLog {
     /// A diagnostic when its channels cannot be read.
     pub fn estimate(
         &self,
-        at: &ActuatorColumns,
+        at: &Actuator,
         part: &Part,
-        config: &Config,
     ) -> Result<(GapEstimate, Option<ActuatorChannels>), Diagnostic> {
-        if !at.lacking.is_empty() {
+        if !at.columns.lacking.is_empty() {
             return Ok((GapEstimate::refused("channel_unmapped"), None));
         }
         let channels = self.channels(at, part)?;
-        Ok((estimate::estimate(&channels, part, &config.document.estimate)?, Some(channels)))
+        Ok((estimate::estimate(&channels, part, &self.config.document.estimate)?, Some(channels)))
     }
 
     /// Reads the channels of one actuator of a given part.
     ///
     /// # Errors
     /// A diagnostic when they cannot be read.
-    pub fn channels(&self, at: &ActuatorColumns, part: &Part) -> Result<ActuatorChannels, Diagnostic> {
-        let Some(channels) = self.channels_map(at) else {
-            let what = format!("the log was not opened for {}", at.position);
-            return Err(Diagnostic::new("no_position", what).in_file(&self.display_name));
-        };
-        let read = self.log.read_actuator(at, channels, part.geometry);
+    pub fn channels(&self, at: &Actuator, part: &Part) -> Result<ActuatorChannels, Diagnostic> {
+        let read = self.log.read_actuator(&at.columns, &at.mapping.channels, part.geometry);
         read.map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
@@ -219,6 +206,11 @@ impl FlightLog {
     pub fn column_types(&self) -> Vec<(String, String)> {
         self.log.column_types()
     }
+}
+
+/// What is read of some actuators.
+fn used(all: &[Actuator]) -> Vec<(&Channels, &ActuatorColumns)> {
+    all.iter().map(|at| (&at.mapping.channels, &at.columns)).collect()
 }
 
 /// Passes the channels of every actuator of a log to `take`, all as those of one part. The log needs no identity.
@@ -422,21 +414,22 @@ fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity,
     log.identity(|fields, departure| config.flights.facts(&path, fields, departure))
 }
 
-type Mapped = (ActuatorColumns, Arc<Mapping>);
-
 /// The actuators of a log, each as its aircraft and the part that sits there want it read.
 fn map_actuators(
     log: &Log,
     id: &Identity,
     config: &Config,
     installations: &Installations,
-) -> Result<Vec<Mapped>, ingest::Error> {
+) -> Result<Vec<Actuator>, ingest::Error> {
     let usual = config.mapping(&id.flight.tail_number, None);
     let found = log.actuators(&usual.channels, id.position.as_ref());
-    let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
+    let mut at: BTreeMap<Position, Actuator> = BTreeMap::new();
     let mut failed = None;
+    let mapped = |columns: ActuatorColumns, mapping: &Arc<Mapping>| {
+        (columns.position.clone(), Actuator { columns, mapping: Arc::clone(mapping) })
+    };
     match found {
-        Ok(found) => at.extend(found.into_iter().map(|p| (p.position.clone(), (p, Arc::clone(&usual))))),
+        Ok(found) => at.extend(found.into_iter().map(|columns| mapped(columns, &usual))),
         Err(error) => failed = Some(error),
     }
     let installed: BTreeSet<&PartNumber> = installations
@@ -451,7 +444,7 @@ fn map_actuators(
                 installations.installed_at(&id.flight.tail_number, &p.position, id.flight.departure_utc);
             installation.is_some_and(|installation| installation.part_number == *part)
         };
-        at.extend(found.into_iter().filter(sits).map(|p| (p.position.clone(), (p, Arc::clone(&mapping)))));
+        at.extend(found.into_iter().filter(sits).map(|columns| mapped(columns, &mapping)));
     }
     match failed {
         Some(error) if at.is_empty() => Err(error),

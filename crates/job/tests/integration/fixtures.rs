@@ -1,6 +1,7 @@
 //! The flights of another engine in `tests/data/flights`.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use ingest::LogFiles;
 use ingest::tables::ColumnAliases;
@@ -13,12 +14,12 @@ pub(crate) fn flights() -> PathBuf {
 }
 
 /// Their installations.
-pub(crate) fn installations() -> Installations {
+static INSTALLATIONS: LazyLock<Installations> = LazyLock::new(|| {
     ingest::tables::installations(&flights().join("installations.csv"), &ColumnAliases::new()).unwrap()
-}
+});
 
 /// One of their logs.
-pub(crate) fn open(log: &str, config: &Config) -> Result<FlightLog, Diagnostic> {
+pub(crate) fn open<'c>(log: &str, config: &'c Config) -> Result<FlightLog<'c>, Diagnostic> {
     let file = LogFiles::one(flights().join(format!("{log}.parquet")));
-    FlightLog::open(&file, log, config, &installations())
+    FlightLog::open(&file, log, config, &INSTALLATIONS)
 }

@@ -4,13 +4,13 @@ use job::Config;
 use job::config::Method;
 use records::{GapEstimate, Status};
 
-use crate::fixtures::{flights, installations, open};
+use crate::fixtures::{flights, open};
 
 fn estimate(config: &Config, log: &str) -> GapEstimate {
-    let (opened, installations) = (open(log, config).unwrap(), installations());
-    let at = opened.actuators(&installations).next().unwrap();
-    let (_, part) = opened.unit(at, config, &installations).unwrap();
-    opened.estimate(at, part, config).unwrap().0
+    let opened = open(log, config).unwrap();
+    let at = opened.actuators().next().unwrap();
+    let (_, part) = opened.unit(at).unwrap();
+    opened.estimate(at, part).unwrap().0
 }
 
 /// Only the published statistic is there; a load that never reverses is refused without the regression, too.

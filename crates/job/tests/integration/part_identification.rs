@@ -4,19 +4,18 @@ use job::part_identification::IdentifiedParams;
 use job::{Config, flight_log};
 use records::PartNumber;
 
-use crate::fixtures::{flights, installations, open};
+use crate::fixtures::{flights, open};
 
 /// `truth.json`: noise of 3 and 1 µm, steps of 2.3 and 0.3 µm, K of 5·10⁷ and 4.6·10⁷ N/m.
 #[test]
 fn noise_resolution_and_stiffness_are_read_off_the_logs() {
     let config = Config::read(&flights().join("pipeline.toml")).unwrap();
-    let installations = installations();
     for (log, part, stiffness) in
         [("A_nominal", "A", 5e7), ("B_worn_stiffness_assumed_15pc_high", "B", 4.6e7)]
     {
         let opened = open(log, &config).unwrap();
         let part = flight_log::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
-        let at = opened.actuators(&installations).next().unwrap();
+        let at = opened.actuators().next().unwrap();
         let channels = opened.channels(at, part).unwrap();
         let found = job::estimate::contact_regression(&channels, part).unwrap();
         let found = IdentifiedParams::of(&channels, found.as_deref().ok()).comparisons(part);

@@ -5,7 +5,7 @@ use job::estimate::{estimate, filter};
 use job::{Config, flight_log};
 use records::{PartNumber, Position};
 
-use crate::fixtures::{flights, installations, open};
+use crate::fixtures::{flights, open};
 
 fn config_text() -> String {
     std::fs::read_to_string(flights().join("pipeline.toml")).unwrap()
@@ -46,7 +46,7 @@ fn the_logs_of_a_locked_output_need_no_screw_position() {
     let opened = open("A_nominal", &config).unwrap();
     let part = flight_log::part_of(&config, &PartNumber::new("A").unwrap()).unwrap();
     assert!(part.settings.output.is_locked());
-    let at = opened.actuators(&installations()).next().unwrap();
+    let at = opened.actuators().next().unwrap();
     let channels = opened.channels(at, part).unwrap();
     let is_minus_motor = |(dx, motor): (&f64, &f64)| dx.to_bits() == (0.0 - motor).to_bits();
     assert!(channels.output_locked && channels.dx_m.iter().zip(&channels.motor_m).all(is_minus_motor));

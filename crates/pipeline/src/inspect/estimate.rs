@@ -115,12 +115,12 @@ impl LogEstimates {
         }
         let opened = FlightLog::open(files, log_path, config, installations)?;
         let flight = opened.flight();
-        for at in opened.actuators(installations) {
-            let estimated = opened.unit(at, config, installations).and_then(|(installation, part)| {
-                let (estimate, channels) = opened.estimate(at, part, config)?;
+        for at in opened.actuators() {
+            let estimated = opened.unit(at).and_then(|(installation, part)| {
+                let (estimate, channels) = opened.estimate(at, part)?;
                 let row = EstimateRow {
                     tail_number: Some(flight.tail_number.to_string()),
-                    position: Some(at.position.to_string()),
+                    position: Some(at.columns.position.to_string()),
                     part_number: Some(installation.part_number.to_string()),
                     serial_number: Some(installation.serial_number.to_string()),
                     flight_id: Some(flight.flight_id.to_string()),
@@ -129,7 +129,7 @@ impl LogEstimates {
                     tail_hours_end: flight.tail_hours_end,
                     estimate,
                     log_digest: Some(opened.digest.clone()),
-                    config_digest: config.digest(&flight.tail_number, &installation.part_number).to_string(),
+                    config_digest: opened.config_digest(installation),
                     program_version: request.program_version.to_owned(),
                     ..EstimateRow::default()
                 };

@@ -113,8 +113,8 @@ fn replay(
     catch_panic(log_path, || {
         let opened = FlightLog::open(&files, log_path, config, installations)?;
         let at = opened.actuator_at(record.position.as_str())?;
-        let (_, part) = opened.unit(at, config, installations)?;
-        let (estimate, channels) = opened.estimate(at, part, config)?;
+        let (_, part) = opened.unit(at)?;
+        let (estimate, channels) = opened.estimate(at, part)?;
         Ok(Recomputation { digest: opened.digest, channels, estimate })
     })
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use ingest::LogFiles;
 use ingest::parquet::writer::Encoding;
-use ingest::{ActuatorColumns, LogFiles};
 use job::Config;
-use job::flight_log::{FlightLog, catch_panic};
+use job::flight_log::{Actuator, FlightLog, catch_panic};
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
@@ -69,8 +69,7 @@ struct Normalization<'a> {
 impl Normalization<'_> {
     fn one(&self, files: &LogFiles, log_path: &str, done: &mut Normalized) -> Result<(), Diagnostic> {
         let opened = FlightLog::open(files, log_path, self.config, self.installations)?;
-        let complete = opened.actuators(self.installations).filter(|at| at.lacking.is_empty());
-        for at in complete {
+        for at in opened.actuators().filter(|at| at.columns.lacking.is_empty()) {
             match self.write(&opened, at) {
                 Ok(file) => done.written.push(file),
                 Err(diagnostic) => done.diagnostics.push(diagnostic.in_file(log_path)),
@@ -79,20 +78,19 @@ impl Normalization<'_> {
         Ok(())
     }
 
-    fn write(&self, opened: &FlightLog, at: &ActuatorColumns) -> Result<PathBuf, Diagnostic> {
+    fn write(&self, opened: &FlightLog<'_>, at: &Actuator) -> Result<PathBuf, Diagnostic> {
         let id = &opened.identity;
-        let (installation, part) = opened.unit(at, self.config, self.installations)?;
+        let (installation, part) = opened.unit(at)?;
         let channels = opened.channels(at, part)?;
         let flight =
             format!("{}_{}", id.flight.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight.flight_id);
-        let names = [id.flight.tail_number.as_str(), &flight, at.position.as_str()].map(file_name);
+        let names = [id.flight.tail_number.as_str(), &flight, at.columns.position.as_str()].map(file_name);
         let file = self.folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
         self.claim(&file, opened)?;
-        let config_digest = self.config.digest(&id.flight.tail_number, &installation.part_number);
         let provenance = BTreeMap::from([
             ("source_log".to_owned(), opened.display_name().to_owned()),
             ("source_digest".to_owned(), opened.digest.clone()),
-            ("config_digest".to_owned(), config_digest.to_string()),
+            ("config_digest".to_owned(), opened.config_digest(installation)),
             ("part_number".to_owned(), installation.part_number.to_string()),
             ("serial_number".to_owned(), installation.serial_number.to_string()),
         ]);
@@ -102,7 +100,7 @@ impl Normalization<'_> {
     }
 
     /// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log.
-    fn claim(&self, file: &Path, opened: &FlightLog) -> Result<(), Diagnostic> {
+    fn claim(&self, file: &Path, opened: &FlightLog<'_>) -> Result<(), Diagnostic> {
         let log_path = opened.display_name();
         let mut claims = self.claims.lock().unwrap_or_else(PoisonError::into_inner);
         let owner = match claims.get(file) {

@@ -145,8 +145,8 @@ fn of_log(
         }
         let plot = |position: &Arc<str>| {
             let at = opened.actuator_at(position)?;
-            let (_, part) = opened.unit(at, &config, &installations)?;
-            let (estimate, channels) = opened.estimate(at, part, &config)?;
+            let (_, part) = opened.unit(at)?;
+            let (estimate, channels) = opened.estimate(at, part)?;
             channels.map(|channels| estimate_plots::plot(&name, &channels, part, &estimate)).transpose()
         };
         positions.iter().map(plot).collect::<Result<Vec<_>, _>>()

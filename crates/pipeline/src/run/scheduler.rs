@@ -10,9 +10,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use ingest::ActuatorColumns;
 use jiff::Timestamp;
-use job::flight_log::{FlightLog, catch_panic, config_digest};
+use job::flight_log::{Actuator, FlightLog, catch_panic, config_digest};
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, PartNumber};
@@ -357,18 +356,18 @@ impl WorkerContext<'_> {
     }
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
-    fn records(&self, opened: &FlightLog) -> (Vec<GapRecord>, Vec<Diagnostic>) {
+    fn records(&self, opened: &FlightLog<'_>) -> (Vec<GapRecord>, Vec<Diagnostic>) {
         let stamp = ProvenanceStamp {
             run_id: self.inputs.run_id.clone(),
             program_version: self.inputs.program_version.clone(),
             processed_utc: Timestamp::now(),
         };
-        let actuators: Vec<_> = opened.actuators(&self.inputs.installations).collect();
+        let actuators: Vec<_> = opened.actuators().collect();
         let bytes = MemoryBudget::actuator_bytes(opened.rows());
-        let process_log = |at: &&ActuatorColumns| {
+        let process_log = |at: &&Actuator| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();
-            opened.record(at, &self.inputs.config, &self.inputs.installations, &stamp)
+            opened.record(at, &stamp)
         };
         let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
         for done in actuators.par_iter().with_max_len(1).map(process_log).collect::<Vec<_>>() {

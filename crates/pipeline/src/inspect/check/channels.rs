@@ -1,11 +1,11 @@
 //! Channels of one actuator: mapping, quality, and what the estimator would reject.
 
 use ingest::channel::position_ratio::position_ratio;
-use ingest::{ActuatorChannels, ActuatorColumns, Quality};
-use job::flight_log::FlightLog;
+use ingest::{ActuatorChannels, Quality};
+use job::flight_log::{Actuator, FlightLog};
 use job::part_identification::IdentifiedParams;
-use job::{Config, estimate, rejection};
-use records::{Diagnostic, Installations, PartNumber};
+use job::{estimate, rejection};
+use records::{Diagnostic, PartNumber};
 
 /// Tolerance of the slope of screw on motor around 1; beyond it the mapping is suspect.
 const SLOPE_TOLERANCE: f64 = 0.02;
@@ -96,17 +96,11 @@ fn clock(a: &ActuatorChannels) -> String {
     format!("{rate_hz:.3} Hz{hint}, {segments}{selected}{repaired}")
 }
 
-pub(super) fn actuator(
-    opened: &FlightLog,
-    name: &str,
-    at: &ActuatorColumns,
-    config: &Config,
-    installations: &Installations,
-) -> Result<ActuatorCheck, Diagnostic> {
-    let id = &opened.identity;
-    let (installation, part) = opened.unit(at, config, installations)?;
+pub(super) fn actuator(opened: &FlightLog<'_>, of_log: &Actuator) -> Result<ActuatorCheck, Diagnostic> {
+    let (id, at) = (&opened.identity, &of_log.columns);
+    let (installation, part) = opened.unit(of_log)?;
     let base = |channel: &'static str, column: Option<&String>, unit: &'static str| ChannelCheck {
-        log: name.to_owned(),
+        log: opened.display_name().to_owned(),
         tail_number: id.flight.tail_number.to_string(),
         flight_id: id.flight.flight_id.to_string(),
         position: at.position.to_string(),
@@ -128,7 +122,7 @@ pub(super) fn actuator(
             ..ActuatorCheck::default()
         });
     }
-    let a = opened.channels(at, part)?;
+    let a = opened.channels(of_log, part)?;
     let slope = if a.output_locked {
         Some("the output is locked: minus the motor position".to_owned())
     } else {

@@ -75,7 +75,7 @@ pub fn check_logs(
         let (of_log, installed, shown) = (Arc::clone(config), Arc::clone(installations), name.clone());
         let looked = within_time_limit(&name, config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
-            Ok(check_log(&opened, &shown, &of_log, &installed))
+            Ok(check_log(&opened))
         });
         match looked {
             Ok(mut found) => {
@@ -150,8 +150,8 @@ fn mapping_fault((part, codes): (&PartNumber, &Vec<Option<&'static str>>)) -> Op
     Some(Diagnostic::new(code, what).hint(remedy))
 }
 
-fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &Installations) -> LogCheck {
-    let id = &opened.identity;
+fn check_log(opened: &FlightLog<'_>) -> LogCheck {
+    let (id, name) = (&opened.identity, opened.display_name());
     let mut seen = LogCheck {
         name: name.to_owned(),
         flight: [
@@ -163,12 +163,12 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
         has_checksums: opened.is_checked().ok(),
         column_types: opened.column_types(),
         departure_utc: id.flight.departure_utc,
-        positions: opened.actuators(installations).map(|at| at.position.clone()).collect(),
+        positions: opened.actuators().map(|at| at.columns.position.clone()).collect(),
         digest: opened.digest.clone(),
         ..LogCheck::default()
     };
-    for at in opened.actuators(installations) {
-        match actuator(opened, name, at, config, installations) {
+    for at in opened.actuators() {
+        match actuator(opened, at) {
             Ok(ActuatorCheck { found, clock, identified }) => {
                 seen.channels.extend(found);
                 seen.clocks.extend(clock);
