@@ -163,7 +163,7 @@ pub(crate) fn execute_run(
     let OwnershipLedger { touched: mut units, renamed, .. } = ledger;
     report.absent = report.absent.saturating_sub(renamed.len());
     let tables = Bookkeeping::new(config, &inputs.installations);
-    report.moved = tables.write(&mut writer, &renamed)?.moved;
+    report.moved = tables.write(&mut writer, &renamed)?;
     let with_records = units.clone();
     units.extend(report.moved.iter().flat_map(|moved| [moved.former_unit(), moved.present_unit()]));
 

@@ -48,54 +48,35 @@ impl Treatment {
             is_of_position: false,
         };
         let position = Self { is_of_position: true, ..own };
-        let channel = Self { is_of_channel: true, ..own };
+        let channel = Self { scale: Scale::One, is_of_channel: true, ..own };
         match quantity {
-            Quantity::LostMotionM => Self {
-                limit: limits.lost_motion_share.or(Some(0.25)),
-                least_scatter: 0.002,
-                states: (Some("lost_motion_rising"), None),
-                ..own
-            },
-            Quantity::StiffnessNPerM => Self {
-                limit: limits.stiffness_share.or(Some(0.05)),
-                least_scatter: 0.001,
-                states: (Some("stiffening"), Some("softening")),
-                ..own
-            },
-            Quantity::FrictionN => Self {
-                limit: limits.friction_share.or(Some(0.1)),
-                states: (Some("friction_rising"), Some("friction_falling")),
-                ..own
-            },
             Quantity::GapM | Quantity::FrictionDryN | Quantity::FrictionLoadShare => own,
-            Quantity::SkewS => Self {
-                scale: Scale::One,
-                limit: limits.delay_s.or(Some(0.5e-3)),
-                least_scatter: 2e-5,
-                states: (Some("delay_moved"), Some("delay_moved")),
-                ..channel
-            },
+            Quantity::LostMotionM => {
+                let of = own.limited(limits.lost_motion_share, 0.25, 0.002, "lost_motion_rising");
+                Self { states: (of.states.0, None), ..of }
+            }
+            Quantity::StiffnessNPerM => {
+                let of = own.limited(limits.stiffness_share, 0.05, 0.001, "stiffening");
+                Self { states: (of.states.0, Some("softening")), ..of }
+            }
+            Quantity::FrictionN => {
+                let of = own.limited(limits.friction_share, 0.1, 0.02, "friction_rising");
+                Self { states: (of.states.0, Some("friction_falling")), ..of }
+            }
+            Quantity::SkewS => channel.limited(limits.delay_s, 0.5e-3, 2e-5, "delay_moved"),
             Quantity::LoadZeroN => Self {
                 scale: Scale::UsualLoad,
-                limit: limits.load_zero_share.or(Some(0.02)),
-                least_scatter: 0.002,
-                states: (Some("load_zero_moved"), Some("load_zero_moved")),
-                ..position
+                ..position.limited(limits.load_zero_share, 0.02, 0.002, "load_zero_moved")
             },
-            Quantity::LoadDelayS => Self {
-                scale: Scale::One,
-                limit: limits.load_delay_s.or(Some(1e-3)),
-                least_scatter: 1e-4,
-                states: (Some("load_delay_moved"), Some("load_delay_moved")),
-                ..channel
-            },
-            Quantity::Nis => Self {
-                limit: limits.nis_share.or(Some(1.0)),
-                least_scatter: 0.05,
-                states: (Some("innovations_moved"), Some("innovations_moved")),
-                ..position
-            },
+            Quantity::LoadDelayS => channel.limited(limits.load_delay_s, 1e-3, 1e-4, "load_delay_moved"),
+            Quantity::Nis => position.limited(limits.nis_share, 1.0, 0.05, "innovations_moved"),
         }
+    }
+
+    /// The same with a limit, configured or usual, a smallest scatter, and one state of a rise and of a fall.
+    fn limited(self, configured: Option<f64>, usual: f64, least_scatter: f64, state: &'static str) -> Self {
+        let limit = Some(configured.unwrap_or(usual));
+        Self { limit, least_scatter, states: (Some(state), Some(state)), ..self }
     }
 }
 

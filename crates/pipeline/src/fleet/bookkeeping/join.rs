@@ -90,15 +90,6 @@ impl std::fmt::Display for MovedFlights {
     }
 }
 
-/// What a rewrite of the bookkeeping columns changed.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Rebooked {
-    /// Rows of which any bookkeeping column changed.
-    pub rows: usize,
-    /// Flights that another unit has now.
-    pub moved: Vec<MovedFlights>,
-}
-
 impl Bookkeeping {
     /// The tables of a configuration.
     pub fn new(config: &Config, installations: &Installations) -> Self {
@@ -141,22 +132,27 @@ impl Bookkeeping {
         Ok(store.tables_digest()?.as_deref() == Some(self.digest.as_str()))
     }
 
-    /// Writes the tables into all records of the store, and the new paths of renamed logs.
+    /// Writes the tables into all records of the store, and the new paths of renamed logs. Returns the flights that another
+    /// unit has now.
     ///
     /// # Errors
     /// As [`Writer::rewrite`].
-    pub fn write(&self, writer: &mut Writer, renamed: &BTreeMap<String, String>) -> Result<Rebooked, Error> {
+    pub fn write(
+        &self,
+        writer: &mut Writer,
+        renamed: &BTreeMap<String, String>,
+    ) -> Result<Vec<MovedFlights>, Error> {
         if renamed.is_empty() && self.is_written(writer.store())? {
-            return Ok(Rebooked::default());
+            return Ok(Vec::new());
         }
         let moved = Mutex::new(MovedByPlace::new());
         let change = |batch: &RecordBatch| {
             let mut moved = moved.lock().unwrap_or_else(PoisonError::into_inner);
             with_new_paths(self.join(batch, |names, at| add_moved(&mut moved, names, at))?, renamed)
         };
-        let rows = writer.rewrite(&COLUMNS, &change)?;
+        writer.rewrite(&COLUMNS, &change)?;
         let moved = moved.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Rebooked { rows, moved: moved.into_values().collect() })
+        Ok(moved.into_values().collect())
     }
 
     /// A batch of records with the columns that the tables supply. A record that they do not know keeps what is stored.
