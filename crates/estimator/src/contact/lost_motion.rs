@@ -4,7 +4,10 @@ use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
-use crate::contact::stats::median_and_error;
+use crate::contact::stats::{median, median_and_error};
+
+/// Speed of the motor from which the screw moves with it for certain, m/s.
+const LEAST_SPEED_M_PER_S: f64 = 1e-3;
 
 /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap of
 /// the flanks times their stiffness.
@@ -27,25 +30,33 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
 /// load from above falls to zero and the one on which a load from below rises to it. Gap and friction wind-up together.
 ///
 /// Loads within 5 % of the 95 % load count, where the load changes by more than 10 % of it from 0.1 s before to 0.1 s after.
+/// On such a branch the screw's friction must press the flank that the load leaves: a screw that moves the other way has left
+/// it before. Each position is compared with the passage along the other branch before it, so that what moves both from loop
+/// to loop is no width.
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
     let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
     let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
-    let position = |side: f64, k: usize| {
+    // The side that the load comes from, and the position on its branch.
+    let on_branch = |k: usize| {
         let load_n = blocks.load_n[k] - contact.search.line.at.load_zero_n;
         let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
-        let is_on_branch = (0.0..=near_n).contains(&(side * load_n)) && side * turned_n < -turn_n;
-        let on_branch_m = || {
+        let side = load_n.signum();
+        let is_pressed = || scaling.is_locked() || side * blocks.speed_m_per_s(k) < -LEAST_SPEED_M_PER_S;
+        let is_on_branch = load_n.abs() <= near_n && side * turned_n < -turn_n && is_pressed();
+        let position_m = || {
             blocks.without_slow_parts_m(scaling, k, &contact.search.line.fit.beta)
                 - load_n * contact.compliance_m_per_n
         };
-        is_on_branch.then(on_branch_m).filter(|m| m.is_finite()).map(|m| (m, blocks.stretch(k)))
+        is_on_branch.then(position_m).filter(|m| m.is_finite()).map(|m| (side, m, blocks.stretch(k)))
     };
-    let branch_m = |side: f64| {
-        let inner = reach..blocks.len().saturating_sub(reach);
-        median_and_error(inner.filter_map(|k| position(side, k)))
-    };
-    let (upper, lower) = (branch_m(1.0)?, branch_m(-1.0)?);
-    Some((upper.0 - lower.0, upper.1.hypot(lower.1).hypot(contact.unexplained_m)))
+    let positions: Vec<_> = (reach..blocks.len().saturating_sub(reach)).filter_map(on_branch).collect();
+    let passages: Vec<_> = positions.chunk_by(|(before, ..), (side, ..)| before == side).collect();
+    let widths = passages.array_windows().flat_map(|[before, passage]| {
+        let before_m = median(&mut before.iter().map(|(_, m, _)| *m).collect::<Vec<_>>());
+        passage.iter().map(move |(side, m, stretch)| (side * (m - before_m), *stretch))
+    });
+    let (width_m, error_m) = median_and_error(widths)?;
+    Some((width_m, error_m.hypot(contact.unexplained_m)))
 }
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows within 25 % of it on either

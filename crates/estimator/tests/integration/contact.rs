@@ -374,6 +374,19 @@ fn lost_motion_is_gap_and_windup() {
     }
 }
 
+/// By hand as above: the loop is 6 µm wider than the gap, and its interval holds that.
+#[test]
+fn the_interval_of_the_loop_holds_it() {
+    for gap_m in [30e-6, 100e-6] {
+        let case = Case::with(gap_m, |c| c.profile.duration_s = 300.0);
+        let found: Vec<(f64, f64)> = (0..10).filter_map(|seed| case.gap(seed).loop_width_m).collect();
+        let errors_m = found.iter().map(|(width_m, se_m)| (width_m - gap_m - 6e-6, se_m));
+        let held = errors_m.clone().filter(|(error_m, se_m)| error_m.abs() < 1.645 * *se_m).count();
+        let mean_m = errors_m.map(|(error_m, _)| error_m).sum::<f64>() / 10.0;
+        assert!(held >= 7 && mean_m.abs() < 0.6e-6, "{held} of 10 hold, mean {mean_m:e} m: {found:?}");
+    }
+}
+
 #[test]
 fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
     let case = Case::with(100e-6, |c| c.sensors.screw.dropout_share = 0.05);
