@@ -70,7 +70,8 @@ fn fuzz_maintenance_and_estimates() {
         edit_text(choices, &mut bytes, &corpus);
         std::fs::write(&file, bytes).unwrap();
         let _ = maintenance_log::read(&config).map_err(|e| e.to_string());
-        let _ = external_estimates::read(&file).map_err(|e| e.to_string());
+        let _ =
+            external_estimates::read(&file, &std::collections::BTreeSet::new()).map_err(|e| e.to_string());
         let _ = TableBatch::read(&file)
             .map(|table| external_estimates::queries(&table).map_err(|e| e.to_string()));
     });

@@ -165,6 +165,11 @@ pub(crate) enum ErrorKind {
     #[error("column `{column}` holds no value in {rows} rows")]
     #[strum(serialize = "channel_empty", message = "check the sensor, or map the redundant channel")]
     AllMissing { column: String, rows: u64 },
+    #[error(
+        "column `{column}` leaps to {raw} and back in {percent:.1} % of the samples: a code for missing values"
+    )]
+    #[strum(serialize = "missing_code")]
+    MissingCode { column: String, raw: f64, percent: f64 },
     #[error("column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part")]
     #[strum(message = "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`")]
     UnitForPart { column: String, unit: &'static str, wanted: &'static str },
@@ -184,7 +189,7 @@ pub(crate) enum ErrorKind {
         serialize = "bad_table",
         message = "map the column names under `[columns]` (docs/configuration.md)"
     )]
-    TableColumn { column: String, nearest: Option<String>, has_semicolons: bool },
+    TableColumn { column: String, nearest: Option<String>, is_mapped: bool },
     #[error("the table cannot be used: {detail}")]
     #[strum(serialize = "bad_table", message = "columns and formats are in docs/configuration.md")]
     Table { row: Option<u64>, column: Option<String>, detail: String },
@@ -271,6 +276,7 @@ impl ErrorKind {
             | Self::TimeImplausible { column, .. }
             | Self::TimeStandsStill { column, .. }
             | Self::AllMissing { column, .. }
+            | Self::MissingCode { column, .. }
             | Self::ListLengths { column, .. }
             | Self::ClocksDiffer { column, .. }
             | Self::UnitForPart { column, .. }
@@ -292,11 +298,20 @@ impl ErrorKind {
                 Some(characters) => format!("`{near}`? {characters}"),
                 None => format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`"),
             },
-            Self::TableColumn { nearest: Some(near), .. } => {
+            Self::TableColumn { nearest: Some(near), is_mapped: true, .. } => {
                 format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
+            }
+            Self::TableColumn { column, nearest, is_mapped: false } => {
+                let near = nearest.as_ref().map(|near| format!("`{near}`? ")).unwrap_or_default();
+                format!(
+                    "{near}The column must be called `{column}` in the table: docs/configuration.md has its columns"
+                )
             }
             Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
                 format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
+            }
+            Self::MissingCode { raw, .. } => {
+                format!("list it: `missing = [{raw}]` in the channel's table of the configuration")
             }
             Self::MetadataContradicts { key, noted, .. } => format!(
                 "set `{key}` of the channel to {noted}; if the file is wrong, set its `ignore_metadata = true`"
@@ -315,9 +330,6 @@ impl ErrorKind {
             }
             Self::Decode { .. } | Self::RowCount { .. } => {
                 "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`".into()
-            }
-            Self::TableColumn { has_semicolons: true, .. } => {
-                "the fields are separated by `;`: save the table with commas, and numbers with a point".into()
             }
             Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
                 "names are mapped under `[channel]`, `[clock]` and `[identity]`".into()

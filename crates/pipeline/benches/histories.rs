@@ -3,6 +3,7 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it measured")]
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
@@ -18,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .ok_or("usage: histories STORE|ESTIMATES.parquet")?;
     let begun = Instant::now();
     let histories = if source.ends_with(".parquet") {
-        external_estimates::read(Path::new(&source))?
+        external_estimates::read(Path::new(&source), &BTreeSet::new())?
     } else {
         load_histories(&Store::open(&source)?)?
     };

@@ -35,15 +35,19 @@ fn selection(py: Python<'_>, units: [Option<String>; 3], as_of: Option<&str>) ->
     Ok(UnitSelection { tail_number, serial_number, part_number, as_of_utc })
 }
 
-/// The rows of a table from memory, counted through.
-fn chunks(batches: Vec<RecordBatch>) -> Vec<TableBatch> {
+/// The histories of a table from memory, its rows counted through.
+fn external(
+    batches: Vec<RecordBatch>,
+    config: &job::config::Config,
+) -> Result<pipeline::fleet::histories::Histories, pipeline::Error> {
     let mut before = 0;
     let chunk = |batch: RecordBatch| {
         let rows = batch.num_rows();
         before += rows;
         TableBatch::new("estimates".as_ref(), batch, before - rows)
     };
-    batches.into_iter().map(chunk).collect()
+    let chunks: Vec<TableBatch> = batches.into_iter().map(chunk).collect();
+    external_estimates::from_batches(&chunks, &config.parts_by_largest_gap())
 }
 
 /// Stored records that fit.
@@ -91,8 +95,7 @@ pub(crate) fn trend(
         [estimates, queries].map(|table| table.map(arrow_capsule::batches).transpose());
     let (estimates, queries) = (estimates?, queries?);
     let found = config.with(py, |config, installations| {
-        let chunks = estimates.map(chunks);
-        let histories = chunks.map(|chunks| external_estimates::from_batches(&chunks)).transpose()?;
+        let histories = estimates.map(|batches| external(batches, config)).transpose()?;
         let queries = queries.map(|rows| TableBatch::as_text("queries".as_ref(), &rows)).transpose()?;
         let queries = queries.as_ref().map(external_estimates::queries).transpose()?;
         Ok(trends::assess(config, installations, histories, queries.as_deref(), &ask)?.now)
@@ -135,7 +138,7 @@ pub(crate) fn backtest_forecasts(
     let batches = estimates.map(arrow_capsule::batches).transpose()?;
     let rows = config.with(py, |config, installations| {
         let histories = match batches {
-            Some(batches) => external_estimates::from_batches(&chunks(batches))?,
+            Some(batches) => external(batches, config)?,
             None => trends::load_histories(&open_store(config, installations)?)?,
         };
         backtest::of_histories(config, installations, histories)

@@ -9,7 +9,7 @@ use crate::measured::rise::Rise;
 use crate::measured::{Jump, Measured};
 use crate::prior::FleetPrior;
 use crate::settings::Settings;
-use crate::statement::history::{self, History};
+use crate::statement::history::{History, RECORD_FLIGHTS};
 use crate::statement::level;
 use crate::statement::types::{ChangePoint, ChangePointKind, ForecastMethod, MIN_ESTIMATES};
 
@@ -47,7 +47,13 @@ impl<'a> UnitFit<'a> {
         let measured = Measured::new(data, settings);
         let history = History::read(data, series.unit_hours_at_start, &prior);
         let mut changes = history.changes.clone();
-        changes.extend(&measured.events);
+        let is_told = |fall: &ChangePoint| {
+            let told =
+                near(fall.departure_us, &history.changes, data).any(|change| change.kind.is_unexplained());
+            told || data.maintenance_near(data.flight_at(fall.departure_us)).next().is_some()
+        };
+        let is_news = |event: &&ChangePoint| event.kind != ChangePointKind::Reset || !is_told(event);
+        changes.extend(measured.events.iter().filter(is_news));
         changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
         let ended: Vec<Option<Posterior>> =
@@ -111,19 +117,28 @@ fn consistent_fit(measured: &Measured, history: &History<'_>, fleet: &FleetPrior
 
 /// The jump of the level as a change point, unless the history has it already.
 fn jump_event(jump: &Jump, known: &[ChangePoint], data: UnitData<'_>) -> Option<ChangePoint> {
-    let at = data.flights.partition_point(|flight| flight.departure_us < jump.departure_us);
-    let near = data.flights.get(at.saturating_sub(history::RECORD_FLIGHTS))?.departure_us
-        ..=data.flights[(at + history::RECORD_FLIGHTS).min(data.flights.len() - 1)].departure_us;
-    if known.iter().any(|change| near.contains(&change.departure_us)) {
+    if near(jump.departure_us, known, data).next().is_some() {
         return None;
     }
     let step_m = jump.after_m - jump.before_m;
-    let kind = match data.is_recorded(at) {
+    let kind = match data.is_recorded(data.flight_at(jump.departure_us)) {
         true => ChangePointKind::Recorded,
         false if step_m < 0.0 => ChangePointKind::Reset,
         false => ChangePointKind::Step,
     };
     Some(ChangePoint { departure_us: jump.departure_us, kind, step_m, se_m: jump.error_m, certainty: 1.0 })
+}
+
+/// The changes within a few flights of a departure.
+fn near<'a>(
+    departure_us: i64,
+    changes: &'a [ChangePoint],
+    data: UnitData<'_>,
+) -> impl Iterator<Item = &'a ChangePoint> {
+    let at = data.flight_at(departure_us);
+    let (from, to) = (at.saturating_sub(RECORD_FLIGHTS), (at + RECORD_FLIGHTS).min(data.flights.len() - 1));
+    let dates_us = data.flights[from].departure_us..=data.flights[to].departure_us;
+    changes.iter().filter(move |change| dates_us.contains(&change.departure_us))
 }
 
 /// The onset of wear that a posterior found in a segment, as a change point.

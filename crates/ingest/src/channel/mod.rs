@@ -2,6 +2,7 @@
 
 pub(crate) mod buffer_pool;
 pub(crate) mod column_builder;
+pub(crate) mod missing_code;
 pub mod noise_floor;
 pub mod position_ratio;
 pub(crate) mod quality;

@@ -7,6 +7,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use crate::channel::buffer_pool;
+use crate::channel::missing_code::missing_code;
 use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
 use crate::channel::stats::ChannelStats;
 use crate::channel::turns::unwrap_turns;
@@ -202,8 +203,7 @@ impl<'s> ChannelSampling<'s> {
 
     /// The channel in SI at its own rows; those that are not wanted may be missing.
     fn readings(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
-        let map = self.map;
-        if let Some(values) = &map.condition {
+        if let Some(values) = &self.map.condition {
             let read = if RawValue::has_text(values) {
                 self.table.matches(&self.samples, values)?
             } else {
@@ -212,6 +212,15 @@ impl<'s> ChannelSampling<'s> {
             self.same_count(read.len(), self.column())?;
             return Ok(self.base.keep(read).into());
         }
+        let read = self.converted(geometry, wanted)?;
+        let Some((at, share)) = missing_code(&read.values) else { return Ok(read) };
+        let raw = self.base.keep(self.table.numbers(&self.samples, None, None)?.0)[at];
+        let column = self.column().to_owned();
+        Err(self.table.error(ErrorKind::MissingCode { column, raw, percent: 100.0 * share }))
+    }
+
+    fn converted(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
+        let map = self.map;
         let mut si = to_si(self.column(), map, geometry).map_err(|f| self.table.error(f))?;
         if !map.ignore_metadata && self.table.layout.name_column.is_none() {
             let (scale, offset) = self.table.scale_and_offset(&self.samples.leaf, map)?;

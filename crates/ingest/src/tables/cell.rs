@@ -24,13 +24,12 @@ const KNOWN: [&str; 12] = [
     "date_utc",
 ];
 
-/// A column that is not there, with the nearest that is.
-pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
+/// A column that is not there, with the nearest that is, in a table whose names the configuration maps or not.
+pub(super) fn missing(file: &Path, wanted: &str, header: &[String], is_mapped: bool) -> Error {
     // A column with a name of ours keeps its meaning.
     let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
     let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
-    let has_semicolons = matches!(header, [one] if one.contains(';'));
-    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest, has_semicolons })
+    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest, is_mapped })
 }
 
 /// Reads a name.

@@ -40,7 +40,8 @@ pub struct TableBatch {
     pub(super) file: PathBuf,
     pub(super) header: Vec<String>,
     pub(super) batch: RecordBatch,
-    pub(super) names: ColumnAliases,
+    /// Names that the configuration gives the columns; `None` where it cannot.
+    pub(super) names: Option<ColumnAliases>,
     /// Rows of the table before these.
     before: usize,
 }
@@ -89,7 +90,7 @@ impl TableBatch {
     /// Rows from memory, after `before` other rows of the table; diagnostics show `name` as their file.
     pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
         let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
-        Self { file: name.to_owned(), header, batch, names: ColumnAliases::new(), before }
+        Self { file: name.to_owned(), header, batch, names: None, before }
     }
 
     /// Numbers of its rows.
@@ -105,7 +106,7 @@ impl TableBatch {
 
     /// What this table calls a column.
     fn alias<'n>(&'n self, name: &'n str) -> &'n str {
-        self.names.get(name).map_or(name, String::as_str)
+        self.names.as_ref().and_then(|names| names.get(name)).map_or(name, String::as_str)
     }
 
     /// Where a column stands.
@@ -113,7 +114,8 @@ impl TableBatch {
     /// # Errors
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
-        self.find(names).ok_or_else(|| missing(&self.file, self.alias(names[0]), &self.header))
+        let is_mapped = self.names.is_some();
+        self.find(names).ok_or_else(|| missing(&self.file, self.alias(names[0]), &self.header, is_mapped))
     }
 
     /// A column as text; without one, all none.
@@ -301,13 +303,21 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         opened.read_to_end(&mut text)
     })?;
     if let Some(format) = foreign(&text) {
-        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8")));
+        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8, with commas")));
     }
     // Spreadsheets open their UTF-8 with a byte order mark.
     let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
     let format = Format::default().with_header(true).with_comment(b'#');
     let (header, _) = format.infer_schema(&text[mark..], Some(0)).map_err(ErrorKind::table)?;
     let names: Vec<&str> = header.fields().iter().map(|field| field.name().trim()).collect();
+    if let Some(separator) =
+        [';', '\t'].into_iter().find(|c| names.first().is_some_and(|first| first.contains(*c)))
+    {
+        let separator = separator.escape_default();
+        return Err(ErrorKind::table(format!(
+            "its fields are separated by `{separator}`: save it with commas, and numbers with a point"
+        )));
+    }
     bounds::check("columns", names.len() as u64, TABLE_COLUMNS as u64)?;
     let mut known = BTreeSet::new();
     if let Some(twice) = names.iter().find(|name| !name.is_empty() && !known.insert(**name)) {
@@ -332,7 +342,7 @@ fn foreign(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         [b'P', b'K', 3, 4, ..] => Some("an Excel workbook"),
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("text in UTF-16"),
-        _ => None,
+        _ => str::from_utf8(bytes).err().map(|_| "no text in UTF-8"),
     }
 }
 

@@ -41,7 +41,7 @@ impl TableBatch {
     /// The same table, whose columns go by a user's own names.
     #[must_use]
     pub(crate) fn with_aliases(mut self, names: &ColumnAliases) -> Self {
-        self.names.clone_from(names);
+        self.names = Some(names.clone());
         self
     }
 

@@ -1,6 +1,6 @@
 //! Flights of units from tables: the store's own, or estimates made elsewhere.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use arrow::array::{Array, AsArray, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
@@ -14,11 +14,14 @@ use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, number};
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
 const OTHER_GAP: &str = "gap_midrange_fitted_m";
+/// The columns with the largest gap along the stroke, where it varies, and its standard error.
+const LARGEST_GAP: &str = "gap_largest_m";
+const LARGEST_GAP_ERROR: &str = "gap_largest_se_m";
 /// The column with the digest of the settings of the estimate.
 const SETTINGS: &str = "config_digest";
 
 /// The columns that a table made elsewhere may bring; `serial_number`, `departure_utc` and `gap_m` it must.
-pub(crate) const COLUMNS: [&str; 14] = [
+pub(crate) const COLUMNS: [&str; 16] = [
     "serial_number",
     "serial",
     "part_number",
@@ -32,12 +35,16 @@ pub(crate) const COLUMNS: [&str; 14] = [
     "load_reversals",
     "gap_m",
     "gap_se_m",
+    LARGEST_GAP,
+    LARGEST_GAP_ERROR,
     "flags",
 ];
 
 /// The columns of the store that a history is made from.
 pub(crate) fn stored_columns() -> Vec<&'static str> {
-    let stored = COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
+    // The store returns the largest gap as the gap of a part whose limits apply to it.
+    let elsewhere = ["serial", "tail", LARGEST_GAP, LARGEST_GAP_ERROR];
+    let stored = COLUMNS.into_iter().filter(|name| !elsewhere.contains(name));
     stored.chain([OTHER_GAP, SETTINGS]).collect()
 }
 
@@ -55,16 +62,21 @@ pub(crate) fn histories<R: Send>(
     (Histories { units: units.into_iter().collect(), is_booked }, further.into_iter().collect())
 }
 
-/// Adds the flights of an estimates table to those of their units.
+/// Adds the flights of an estimates table to those of their units. In flights of the parts `by_largest`, the largest gap along
+/// the stroke is the gap, where the table has it.
 ///
 /// # Errors
 /// When a column that must be there is not, or has another type, and as [`add_stored`].
-pub(crate) fn add_external(rows: &mut RowsByUnit<()>, chunk: &TableBatch) -> Result<(), ingest::Error> {
+pub(crate) fn add_external(
+    rows: &mut RowsByUnit<()>,
+    chunk: &TableBatch,
+    by_largest: &BTreeSet<String>,
+) -> Result<(), ingest::Error> {
     chunk.column(&["serial_number", "serial"])?;
     let flags = chunk.texts(chunk.find(&["flags"]))?;
     // A record with any flag contradicts itself, so that it alone confirms nothing. A list without flags is written as `[]`.
     let other_gap_m = |row, gap_m| flags.get(row).filter(|flags| *flags != "[]").map(|_| gap_m);
-    add(rows, chunk, other_gap_m, |_| ())
+    add(rows, chunk, by_largest, other_gap_m, |_| ())
 }
 
 /// Adds the flights of the store's records to those of their units, each with what else `further` makes of its row.
@@ -86,13 +98,14 @@ pub(crate) fn add_stored<R>(
         let is_disputed = of_row.as_string_opt::<i32>()?.iter().any(|flag| flag == Some(DISAGREE));
         at(&others_m, row).filter(|_| is_disputed)
     };
-    add(rows, chunk, other_gap_m, further)
+    add(rows, chunk, &BTreeSet::new(), other_gap_m, further)
 }
 
 /// Adds the flights of some rows. `other_gap_m` gives the gap that contradicts that of a row, m.
 fn add<R>(
     rows: &mut RowsByUnit<R>,
     chunk: &TableBatch,
+    by_largest: &BTreeSet<String>,
     other_gap_m: impl Fn(usize, f64) -> Option<f64>,
     further: impl Fn(usize) -> R,
 ) -> Result<(), ingest::Error> {
@@ -101,6 +114,8 @@ fn add<R>(
     let departures = chunk.timestamps(Some(departure))?;
     let gaps_m = chunk.numbers(Some(chunk.column(&["gap_m"])?))?;
     let (errors_m, reversals) = (numbers("gap_se_m")?, numbers("load_reversals")?);
+    let (largest_m, largest_errors_m) = (numbers(LARGEST_GAP)?, numbers(LARGEST_GAP_ERROR)?);
+    let parts = chunk.texts(chunk.find(&["part_number"]))?;
     let (hours, meters) = (numbers("flight_hours")?, numbers("tail_hours_end")?);
     let (flights, settings) =
         (chunk.texts(chunk.find(&["flight_id"]))?, chunk.texts(chunk.find(&[SETTINGS]))?);
@@ -109,7 +124,12 @@ fn add<R>(
         let departure_us = departures.is_valid(row).then(|| departures.value(row));
         let departure_us = departure_us.ok_or_else(|| wrong("it is empty".into()))?;
         Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
-        let gap_m = at(&gaps_m, row);
+        let is_by_largest =
+            |_: &f64| !by_largest.is_empty() && parts.get(row).is_some_and(|part| by_largest.contains(part));
+        let (gap_m, gap_se_m) = match at(&largest_m, row).filter(is_by_largest) {
+            Some(gap_m) => (Some(gap_m), at(&largest_errors_m, row)),
+            None => (at(&gaps_m, row), at(&errors_m, row)),
+        };
         if let Some(settings) = settings.get(row).filter(|_| gap_m.is_some()) {
             unit.settings.add(settings, 1, departure_us);
         }
@@ -119,7 +139,7 @@ fn add<R>(
         let extras = FlightExtras {
             flight_hours: number(&hours, row),
             tail_hours_end: number(&meters, row),
-            gap_se_m: signed_error(at(&errors_m, row), gap_m.zip(other_m)),
+            gap_se_m: signed_error(gap_se_m, gap_m.zip(other_m)),
             load_reversals: at(&reversals, row).map_or(u64::MAX, |n| n as u64),
         };
         unit.rows.push(((flown, extras), further(row)));
@@ -182,7 +202,7 @@ mod tests {
     }
 
     fn add_plain(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        add_external(rows, &chunk(batch))
+        add_external(rows, &chunk(batch), &BTreeSet::new())
     }
 
     /// The histories of a table in batches.

@@ -1,5 +1,6 @@
 //! External tables: estimates to be assessed, and the dates of the assessments.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use ingest::tables::{TableBatch, TableSplits, name, utc};
@@ -15,15 +16,15 @@ use jiff::Timestamp;
 pub type AsOfQuery = (UnitKey, Timestamp);
 
 /// Reads an estimates table: `serial_number` (or `serial`), `departure_utc`, `gap_m`, and what else the
-/// contract allows.
+/// contract allows. `by_largest` has the parts whose limits apply to the largest gap along the stroke.
 ///
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
-pub fn read(file: &Path) -> Result<Histories, Error> {
+pub fn read(file: &Path, by_largest: &BTreeSet<String>) -> Result<Histories, Error> {
     let table = TableSplits::open(file, Some(&builder::COLUMNS), &KeyColumns::COLUMNS)?;
     let parts = of_parts(table.len(), |rows, part| {
         let mut chunks = table.batches(part..part + 1)?;
-        Ok(chunks.try_for_each(|chunk| add_external(rows, &chunk?))?)
+        Ok(chunks.try_for_each(|chunk| add_external(rows, &chunk?, by_largest))?)
     })?;
     Ok(builder::histories(parts, false).0)
 }
@@ -32,8 +33,8 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    let parts = of_parts(chunks.len(), |rows, part| Ok(add_external(rows, &chunks[part])?))?;
+pub fn from_batches(chunks: &[TableBatch], by_largest: &BTreeSet<String>) -> Result<Histories, Error> {
+    let parts = of_parts(chunks.len(), |rows, part| Ok(add_external(rows, &chunks[part], by_largest)?))?;
     Ok(builder::histories(parts, false).0)
 }
 

@@ -20,10 +20,10 @@ use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
 use crate::assess::trends;
 use crate::error::Error;
 use crate::findings::FollowUp;
-use crate::fleet::bookkeeping::inspections;
 use crate::fleet::bookkeeping::installation_index::dates_ahead;
 use crate::fleet::bookkeeping::join::Bookkeeping;
 use crate::fleet::bookkeeping::maintenance_log::unknown_units;
+use crate::fleet::bookkeeping::{inspections, maintenance_log};
 use crate::logs::discover;
 use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::event::Event;
@@ -119,6 +119,7 @@ pub(crate) fn execute_run(
     // Before a store is made: a refused run leaves nothing behind.
     refuse_placeholders(config, &installations)?;
     inspections::read(config)?;
+    maintenance_log::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
     let mut writer = store.lock(&Holder::this_process(), context.wait)?;

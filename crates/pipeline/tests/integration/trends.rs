@@ -1,5 +1,7 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 
+use std::collections::BTreeSet;
+
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::backtest;
@@ -188,7 +190,7 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
         let rows = assess_with(config, &flown(60), None);
-        rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
+        rows.into_iter().map(|row| row.usage_axis).collect::<BTreeSet<_>>()
     };
     let of_all = "[trend]\naxis = \"flights\"";
     assert_eq!(axes(&fleet::config_with("[trend]", of_all)), [Some("flights".to_owned())].into());
@@ -246,7 +248,7 @@ fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
     let states = |rows: &[GapRecord]| -> Vec<records::UnitState> {
         assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
     };
-    let nothing = std::collections::BTreeSet::new();
+    let nothing = BTreeSet::new();
     let with_records = [(Some("EMA-27-1040".to_owned()), "S05".to_owned())].into();
     let night = |before: &[records::UnitState], with_records, config: &Config| {
         changes(config, before, &assess(&rows), RunFacts { run_id: "now", with_records, moved: &[] })
@@ -356,7 +358,7 @@ fn contradicting_rows_of_a_flight_are_named_and_decide_nothing() {
     let rows: String =
         (1..=12).map(|n| day(n, "30e-6")).chain([day(12, "42e-6"), day(12, "30e-6")]).collect();
     std::fs::write(&file, format!("serial_number,departure_utc,gap_m,flight_hours\n{rows}")).unwrap();
-    let histories = pipeline::fleet::external_estimates::read(&file).unwrap();
+    let histories = pipeline::fleet::external_estimates::read(&file, &BTreeSet::new()).unwrap();
     let ask = UnitSelection {
         as_of_utc: Some("2026-01-12T06:00:00Z".parse().unwrap()),
         ..UnitSelection::default()

@@ -195,8 +195,8 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     Ok((rows, faults))
 }
 
-/// Rejects values that are not finite, and errors that are not positive. A number that no unit can have is left out: one
-/// such record must not end the assessment of a fleet.
+/// Rejects values that are not finite, and errors that are not positive. Hours that no aircraft can have are left out, and a
+/// gap that no unit can have is cut and flagged: one such record must not end the assessment of a fleet, nor be lost.
 fn check(row: &mut Observation) -> Result<(), Error> {
     const MAX_FLIGHT_HOURS: f64 = 1e5;
     const MAX_METER_HOURS: f64 = 1e9;
@@ -205,19 +205,23 @@ fn check(row: &mut Observation) -> Result<(), Error> {
     const MIN_GAP_SE_M: f64 = 1e-18;
     let departure_us = row.departure_us;
     let numbers = [
-        ("flight_hours", &mut row.flight_hours, 0.0..=MAX_FLIGHT_HOURS),
-        ("tail_hours_end", &mut row.tail_hours_end, 0.0..=MAX_METER_HOURS),
-        ("gap_m", &mut row.gap_m, -MAX_GAP_M..=MAX_GAP_M),
-        ("gap_se_m", &mut row.gap_se_m, MIN_GAP_SE_M..=MAX_GAP_M),
+        ("flight_hours", row.flight_hours),
+        ("tail_hours_end", row.tail_hours_end),
+        ("gap_m", row.gap_m),
+        ("gap_se_m", row.gap_se_m),
     ];
-    for (what, number, plausible) in numbers {
+    for (what, number) in numbers {
         let is_refused =
             |value: &f64| !value.is_finite() || (what == "gap_se_m" && *value < f64::MIN_POSITIVE);
         if let Some(value) = number.filter(is_refused) {
             return Err(Error::Observation { what, departure_us, value });
         }
-        *number = number.filter(|value| plausible.contains(value));
     }
+    row.flight_hours = row.flight_hours.filter(|hours| (0.0..=MAX_FLIGHT_HOURS).contains(hours));
+    row.tail_hours_end = row.tail_hours_end.filter(|hours| (0.0..=MAX_METER_HOURS).contains(hours));
+    row.is_doubtful |= row.gap_m.is_some_and(|gap_m| gap_m.abs() > MAX_GAP_M);
+    row.gap_m = row.gap_m.map(|gap_m| gap_m.clamp(-MAX_GAP_M, MAX_GAP_M));
+    row.gap_se_m = row.gap_se_m.map(|se_m| se_m.clamp(MIN_GAP_SE_M, MAX_GAP_M));
     Ok(())
 }
 

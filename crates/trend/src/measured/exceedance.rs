@@ -1,7 +1,7 @@
 //! Records above the limit: unconfirmed, confirmed, ended.
 
 use crate::measured::level::Level;
-use crate::measured::record::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED, Record};
+use crate::measured::record::{HYSTERESIS, RECALLED, Record};
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// The gap is at or above its limit.
@@ -18,9 +18,9 @@ pub(crate) enum Exceedance {
     Held,
 }
 
-/// Least number of records at or above the limit, among the last ones, that are no exception although others came in between.
-const REPEATED: usize = 3;
-const REPEATED_AMONG: usize = 6;
+/// Least number of records at or above the limit among so many last ones, which are no exception although others came in
+/// between.
+const REPEATED: [(usize, usize); 2] = [(3, 6), (4, 12)];
 
 /// Records at or above the limit, one after the other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -64,12 +64,12 @@ pub(crate) fn exceedance(
             continue;
         }
         current.below += 1;
-        let least_m = (JUMP_SHARE * limit_m).max(JUMP_ERRORS * record.error_m);
-        let has_returned = current.before_m.is_some_and(|before_m| record.gap_m <= before_m + least_m);
-        if current.below == 1 && (current.is_confirmed || !has_returned) {
+        if current.below == 1 {
             run = Some(current);
         } else if current.is_confirmed {
             ended_at = Some(k);
+            // Nothing on record made the gap smaller.
+            events.push(fall(&records, k - 1));
         } else {
             events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
         }
@@ -101,11 +101,13 @@ pub(crate) fn exceedance(
 /// Records above the limit that come back after others below it, since the last renewal; one of them must be sound.
 fn repeated(records: &[Record], is_above: impl Fn(&Record) -> bool) -> Option<Exceedance> {
     let of_life = records.chunk_by(|before, here| before.renewals == here.renewals).last()?;
-    let near = &of_life[of_life.len().saturating_sub(REPEATED_AMONG)..];
-    let above: Vec<&Record> = near.iter().filter(|record| is_above(record)).collect();
-    let rises = near.array_windows().filter(|[before, here]| !is_above(before) && is_above(here)).count();
-    let is_repeated = rises > 1 && above.len() >= REPEATED && above.iter().any(|record| record.is_sound);
-    is_repeated.then_some(Exceedance::Repeated { records: above.len(), among: near.len() })
+    REPEATED.into_iter().find_map(|(least, among)| {
+        let near = &of_life[of_life.len().saturating_sub(among)..];
+        let above: Vec<&Record> = near.iter().filter(|record| is_above(record)).collect();
+        let rises = near.array_windows().filter(|[before, here]| !is_above(before) && is_above(here)).count();
+        let is_repeated = rises > 1 && above.len() >= least && above.iter().any(|record| record.is_sound);
+        is_repeated.then_some(Exceedance::Repeated { records: above.len(), among: near.len() })
+    })
 }
 
 /// The middle of the last three sound records before a record, in its period.
@@ -113,6 +115,14 @@ fn before(records: &[Record], at: usize) -> Option<f64> {
     let period = records[at].period;
     let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);
     crate::math::median(near.map(|r| r.gap_m).collect())
+}
+
+/// The fall to the first of two records below the limit, which end an exceedance.
+fn fall(records: &[Record], at: usize) -> ChangePoint {
+    let Record { departure_us, gap_m, error_m, .. } = records[at];
+    let kind = ChangePointKind::Reset;
+    let step_m = gap_m - records[at - 1].gap_m;
+    ChangePoint { departure_us, kind, step_m, se_m: error_m, certainty: 1.0 }
 }
 
 fn event(first: &Record, run: &Run, kind: ChangePointKind) -> ChangePoint {

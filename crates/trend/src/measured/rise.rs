@@ -1,12 +1,17 @@
 //! Local line: the rise of the last records, and when it meets the limit.
 
+use std::borrow::Cow;
+
 use crate::math::NORMAL_95;
 use crate::measured::level::{Line, WILD};
 use crate::measured::record::Record;
 use crate::settings::Settings;
 
 /// Numbers of last records through which a line is laid.
-const WINDOWS: [usize; 8] = [3, 4, 5, 6, 8, 12, 16, 20];
+const WINDOWS: [usize; 10] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20];
+
+/// Standard deviation by which an installation moves all its records, a share of the limit.
+const INSTALLATION_SHARE: f64 = 0.03;
 
 /// Standard errors of the slope, and share of the limit and errors of the rise, from which a line is significant.
 const SLOPE_ERRORS: f64 = 4.0;
@@ -44,14 +49,14 @@ pub(crate) struct Rise {
     pub(crate) p95_hours: f64,
 }
 
-/// The rise of the last records of a period, where a line through some of them is significant.
+/// The rise of the last records since a renewal, where a line through some of them is significant.
 pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     let last = sound.last()?;
-    let most = sound.iter().rev().take_while(|r| r.period == last.period).count();
+    let most = sound.iter().rev().take_while(|r| r.renewals == last.renewals).count();
     let lines = WINDOWS.into_iter().filter(|count| *count <= most).filter_map(|count| {
-        let records = &sound[sound.len() - count..];
-        significant(records, settings.limit_m)
-            .or_else(|| significant(&without_outliers(records)?, settings.limit_m))
+        let records = comparable(&sound[sound.len() - count..], settings.limit_m);
+        significant(&records, settings.limit_m)
+            .or_else(|| significant(&without_outliers(&records)?, settings.limit_m))
             .map(|line| (count, line))
     });
     let mut found: Option<Rise> = None;
@@ -84,6 +89,15 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
         p05_hours: rise.p05_hours * (rise.m_per_hour / steepest).clamp(SPED_UP, 1.0),
         ..rise
     })
+}
+
+/// Records of one installation as they are; those of several with the error that each installation adds.
+fn comparable(records: &[Record], limit_m: f64) -> Cow<'_, [Record]> {
+    if records.array_windows().all(|[a, b]| a.period == b.period) {
+        return Cow::Borrowed(records);
+    }
+    let widened = |r: &Record| Record { error_m: r.error_m.hypot(INSTALLATION_SHARE * limit_m), ..*r };
+    records.iter().map(widened).collect()
 }
 
 /// The line of some records, where it explains them and rises, or where they rise from each to the next.

@@ -64,7 +64,7 @@ impl<'a> History<'a> {
         // Maintenance that no step shows counts at the first flight after it.
         let without_step = data.maintenance.iter().filter(|entry| !with_step.contains(entry));
         history.changes.extend(without_step.filter_map(|entry| {
-            let first = data.flights.get(data.flights.partition_point(|f| f.departure_us < entry.utc_us))?;
+            let first = data.flights.get(data.flight_at(entry.utc_us))?;
             let (departure_us, kind) = (first.departure_us, ChangePointKind::Recorded);
             Some(ChangePoint { departure_us, kind, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
         }));
@@ -162,6 +162,11 @@ impl<'a> History<'a> {
 }
 
 impl<'a> UnitData<'a> {
+    /// The first flight at or after a departure.
+    pub(crate) fn flight_at(self, departure_us: i64) -> usize {
+        self.flights.partition_point(|flight| flight.departure_us < departure_us)
+    }
+
     /// Whether installations or maintenance explain a change at a flight.
     pub(crate) fn is_recorded(self, flight: usize) -> bool {
         let is_moved = |pair: &[Flight]| pair[0].installation != pair[1].installation;
@@ -177,7 +182,7 @@ impl<'a> UnitData<'a> {
     }
 
     /// Maintenance within a few measured flights of a step.
-    fn maintenance_near(self, flight: usize) -> impl Iterator<Item = &'a MaintenanceEvent> {
+    pub(crate) fn maintenance_near(self, flight: usize) -> impl Iterator<Item = &'a MaintenanceEvent> {
         let near = self.near(flight);
         let dates_us = near[0].departure_us..=near[near.len() - 1].departure_us;
         self.maintenance.iter().filter(move |entry| dates_us.contains(&entry.utc_us))

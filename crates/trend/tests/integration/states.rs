@@ -59,9 +59,9 @@ fn happen(d: &mut Drawn, step: &str) {
         "wild" => wild_records(d),
         "slow_wear" => d.rise((60, 300), (d.um / LIMIT_UM, (d.um + 10.0) / LIMIT_UM), (1.0, 1.0)),
         "in_turn" => {
-            for _ in 0..d.count(3, 20) {
+            for _ in 0..d.count(count().0, 20) {
                 d.jump(1, 1);
-                d.log(d.um);
+                d.above((1, count().1), (0.0, 0.0));
             }
         }
         other => panic!("{other} happens to no unit"),

@@ -23,7 +23,7 @@ const SHARES: [(f64, f64, &str); 4] = [
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {
-        Some(file) => pipeline::fleet::external_estimates::read(file)?,
+        Some(file) => pipeline::fleet::external_estimates::read(file, &config.parts_by_largest_gap())?,
         None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
     };
     let found = backtest::of_histories(&config, &installations, histories)?;

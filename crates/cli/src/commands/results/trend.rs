@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 
 use ingest::tables::TableBatch;
 use job::Config;
@@ -29,14 +30,15 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if args.quantities || args.changes {
         return quantities(args, &ask, &config, &installations, output);
     }
-    let histories = args.external.estimates.as_deref().map(external_estimates::read).transpose()?;
+    let read = |file: &Path| external_estimates::read(file, &config.parts_by_largest_gap());
+    let histories = args.external.estimates.as_deref().map(read).transpose()?;
     let queries = args.queries.as_deref().map(|file| external_estimates::queries(&TableBatch::read(file)?));
     let queries = queries.transpose()?;
     let found = trends::assess(&config, &installations, histories, queries.as_deref(), &ask)?;
     let mut nothing = "no unit was queried\n".to_owned();
     if found.now.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
-            Some(file) => KnownNames::Estimates(file.clone(), external_estimates::read(file)?),
+            Some(file) => KnownNames::Estimates(file.clone(), read(file)?),
             None => KnownNames::of(&config),
         };
         known.check_units(&args.units)?;

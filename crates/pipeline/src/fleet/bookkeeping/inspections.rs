@@ -81,7 +81,11 @@ pub(crate) fn latest<'i>(
             && (installed.installed_utc..=as_of).contains(&inspection.date_utc)
             && renewed.is_none_or(|renewed| renewed < inspection.date_utc)
     };
-    inspections.iter().filter(is_of_now).max_by_key(|inspection| inspection.date_utc)
+    // Of several at one time, the largest play counts, whatever the order of the rows.
+    let order = |a: &&InspectionRow, b: &&InspectionRow| {
+        a.date_utc.cmp(&b.date_utc).then(a.play_m.total_cmp(&b.play_m))
+    };
+    inspections.iter().filter(is_of_now).max_by(order)
 }
 
 /// A measured play, m.

@@ -1,0 +1,119 @@
+//! Codes that a recorder writes where it has no value, such as −9999, and that no mapping lists.
+//!
+//! Such samples would count as measured: every seventh load at −9999 N makes a gap a fifth too small.
+
+/// Samples that are looked at, in windows of a thousandth of them.
+const LOOKS: usize = 1 << 14;
+const WINDOW: usize = 256;
+
+/// Fewest samples with a code, and their least share of those that are looked at.
+const FEWEST: usize = 20;
+const LEAST_SHARE: f64 = 0.005;
+
+/// How far a code lies from both neighbours, in lower quartiles of the steps between samples.
+const FAR: f64 = 20.0;
+
+/// Least share of the samples with a value that lie far from both neighbours, and of those far samples that have this value.
+const MOSTLY: f64 = 0.8;
+
+/// Where a channel holds a missing-value code, and the share of the samples that do: one value that lies, nearly wherever it
+/// comes, far to the same side of the sample before and of the one after.
+///
+/// Vibration leaps as well, but neither to one value nor so far in its own steps.
+pub(crate) fn missing_code(values: &[f64]) -> Option<(usize, f64)> {
+    let every = (values.len() / (LOOKS / WINDOW)).max(WINDOW);
+    let windows = (0..values.len()).step_by(every).map(|start| start..values.len().min(start + WINDOW));
+    let windows: Vec<Vec<usize>> = windows.map(|window| changes(values, window)).collect();
+    let mut steps: Vec<f64> = windows
+        .iter()
+        .flat_map(|window| window.array_windows().map(|[a, b]| (values[*b] - values[*a]).abs()))
+        .collect();
+    if steps.len() < FEWEST {
+        return None;
+    }
+    let quartile = steps.len() / 4;
+    let far = FAR * *steps.select_nth_unstable_by(quartile, f64::total_cmp).1;
+    let is_far = |[a, b, c]: &&[usize; 3]| {
+        let (from, to) = (values[*b] - values[*a], values[*b] - values[*c]);
+        from.abs() > far && to.abs() > far && from.signum() == to.signum()
+    };
+    let mut leaps: Vec<usize> = windows
+        .iter()
+        .flat_map(|window| window.array_windows().filter(is_far).map(|[_, at, _]| *at))
+        .collect();
+    leaps.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let same = |a: &usize, b: &usize| values[*a].to_bits() == values[*b].to_bits();
+    let of_code = leaps.chunk_by(same).max_by_key(|some| some.len())?;
+    let all = windows.iter().flatten().filter(|at| same(at, &of_code[0])).count();
+    let (count, looked_at) = (of_code.len() as f64, windows.iter().map(Vec::len).sum::<usize>() as f64);
+    let is_code = of_code.len() >= FEWEST
+        && count >= LEAST_SHARE * looked_at
+        && count >= MOSTLY * all as f64
+        && count >= MOSTLY * leaps.len() as f64;
+    is_code.then(|| (of_code[0], count / looked_at))
+}
+
+/// The samples of a window at which the value changes: a code may last for several.
+fn changes(values: &[f64], window: std::ops::Range<usize>) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::with_capacity(window.len());
+    for at in window.filter(|at| values[*at].is_finite()) {
+        if kept.last().is_none_or(|last| values[*last].to_bits() != values[at].to_bits()) {
+            kept.push(at);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A load of 3 kN at 1 Hz with noise and vibration, logged at 200 Hz in steps of `resolution`.
+    fn load(vibration_n: f64, resolution: f64, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        // The generator of Knuth's MMIX; the sum of twelve even numbers is nearly normal.
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / 2.0_f64.powi(53)
+        };
+        let mut noise = || (0..12).map(|_| even()).sum::<f64>() - 6.0;
+        let value = |k: i32| {
+            let clean = 3000.0 * (f64::from(k) * 0.0314).sin() + 5.0 * noise() + vibration_n * noise();
+            (clean / resolution).round() * resolution
+        };
+        (0..40_000).map(value).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Codes outside and inside the range of the load, from every third to every hundredth row, alone and in pairs.
+        #[test]
+        fn a_code_is_found_and_nothing_else(
+            every in 3_usize..100, code in prop_oneof![Just(-9999.0_f64), Just(0.0), Just(1e5), Just(-999.25)],
+            lasts in 1_usize..3, vibration_n in 0.0_f64..600.0, resolution in prop_oneof![Just(1e-9), 0.1_f64..200.0],
+            seed in 0_u64..1000,
+        ) {
+            let sound = load(vibration_n, resolution, seed);
+            prop_assert_eq!(missing_code(&sound), None);
+            // Vibration hides a code within the range of the load.
+            prop_assume!(every > 2 * lasts && (code.abs() > 5000.0 && vibration_n < 100.0 || vibration_n < 3.0 && resolution < 10.0));
+            let mut coded = sound;
+            for at in (every..coded.len() - 2).step_by(every) {
+                coded[at..at + lasts].fill(code);
+            }
+            let found = missing_code(&coded);
+            prop_assert!(found.is_some_and(|(at, _)| coded[at] == code), "{:?}", found);
+        }
+    }
+
+    /// A load that alternates between two values, as under vibration at half of the rate, has no code.
+    #[test]
+    fn vibration_at_half_of_the_rate_is_no_code() {
+        let values: Vec<f64> =
+            (0..40_000).map(|k| f64::from(k % 2 * 2 - 1) * 500.0 + f64::from(k / 4000)).collect();
+        assert_eq!(missing_code(&values), None);
+    }
+}
