@@ -9,6 +9,7 @@ use records::Diagnostic;
 use records::sanitize::{escape_cell, escape_invisible};
 
 use pipeline::Event;
+use pipeline::logs::discover;
 
 use crate::args::{Global, LogFormat};
 use crate::exit::{Code, Failure};
@@ -54,23 +55,35 @@ impl Output {
         }
     }
 
-    /// Refuses to write over an input: a configuration file, or one of the tables that it names.
+    /// Refuses to write over an input: a configuration file, a table or a log that it names, a file that the command names
+    /// twice; or into the store.
     ///
     /// # Errors
     /// If the file is one of them.
     pub(crate) fn refuse_input(&self, file: &Path) -> Result<(), Failure> {
-        let Ok(target) = file.canonicalize() else { return Ok(()) };
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let Ok(folder) = folder.canonicalize() else { return Ok(()) };
+        let target =
+            file.canonicalize().unwrap_or_else(|_| folder.join(file.file_name().unwrap_or_default()));
         let mut inputs = self.configs.clone();
+        let mut is_inside = false;
         if let Ok(config) = Config::read_settings(&self.configs) {
             let logs = &config.document.logs;
             let tables = [Some(&logs.installations), logs.flights.as_ref(), logs.maintenance.as_ref()];
             let tables = tables.into_iter().chain([logs.inspections.as_ref()]).flatten();
             inputs.extend(tables.map(|table| config.path(table)));
+            is_inside = config.store().canonicalize().is_ok_and(|store| target.starts_with(store))
+                || (target.exists() && discover::is_log(&config, &target));
         }
-        if inputs.iter().all(|input| input.canonicalize().ok().as_ref() != Some(&target)) {
+        let is_target = |input: &Path| input.canonicalize().is_ok_and(|input| input == target);
+        let times_named = std::env::args_os().filter(|argument| is_target(Path::new(argument))).count();
+        if !is_inside && times_named < 2 && !inputs.iter().any(|input| is_target(input)) {
             return Ok(());
         }
-        let what = format!("{} is an input of this configuration; it was not changed", file.display());
+        let what = format!(
+            "{} is an input of this command or configuration, or lies in its store; it was not changed",
+            file.display()
+        );
         Err(Failure::usage("would_overwrite", what, "name another output file"))
     }
 

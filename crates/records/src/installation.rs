@@ -148,6 +148,17 @@ impl Installations {
         self
     }
 
+    /// Two places that one unit has at once by the numbers of today, which aliases made of two units: what is wrong, in words.
+    pub fn merged_by_aliases(&self) -> Option<String> {
+        let (earlier, later) = *clashes(&self.rows, Installation::unit).first()?;
+        let [one, other] = [&self.rows[earlier - 1], &self.rows[later - 1]];
+        let (_, serial) = one.unit();
+        Some(format!(
+            "by the aliases, {} on {} and {} on {} are both {serial} at {}",
+            one.serial_number, one.tail_number, other.serial_number, other.tail_number, other.installed_utc
+        ))
+    }
+
     /// Every installation in one position of a tail, by date.
     pub fn of_position(&self, tail: &str, position: &str) -> &[Installation] {
         let key =

@@ -41,7 +41,7 @@ use crate::error::Error;
 use crate::{Samples, model};
 use fit::design_matrix::{DRY, FORCE, LOAD_RATE, SHARE, SPEED};
 use fit::flank_fit::{self, FlankFit};
-use fit::gauss_newton::GaussNewtonResult;
+use fit::gauss_newton::{GaussNewtonResult, LATEST_S};
 use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
 
@@ -139,8 +139,10 @@ fn look(
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
+    // A load that is later still moves the gap.
+    let is_in_time = contact.search.line.state.load_delay_s.abs() < LATEST_S;
     // Channels of absurd size overflow the sums of the fit.
-    if gap_m.is_finite() && gap_se_m.is_finite() && gives_way && is_possible {
+    if gap_m.is_finite() && gap_se_m.is_finite() && gives_way && is_possible && is_in_time {
         Ok((scaling, contact))
     } else {
         Err(Rejection::MotionUnexplained)

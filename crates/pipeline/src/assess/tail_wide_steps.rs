@@ -20,14 +20,14 @@ pub(crate) struct TailWide<'m> {
 }
 
 impl<'m> TailWide<'m> {
-    /// Searches the units of the tails. Unrecorded changes count: a step of several units at once, and a
-    /// step or reset when what is fitted of all of them `moved`.
+    /// Searches the units of the tails. Unrecorded steps and resets count: those of several units at once, and those when
+    /// what is fitted of all of them `moved`.
     pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &'m [RecorderChange]) -> Self {
         let mut on_tails: BTreeMap<&str, Vec<UnitOnTail>> = BTreeMap::new();
         let mut levels_m: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         let steps_of = |(history, trend): &(&'_ History, &Assessment)| {
             let mut steps: BTreeMap<String, Vec<(i64, f64)>> = BTreeMap::new();
-            for change in trend.changes.iter().filter(|change| change.kind == ChangePointKind::Step) {
+            for change in trend.changes.iter().filter(|change| is_sudden(change)) {
                 let Some((_, tail)) = made_on(change, history) else { continue };
                 steps.entry(tail.to_owned()).or_default().push((change.departure_us, change.step_m));
             }
@@ -55,14 +55,8 @@ impl<'m> TailWide<'m> {
     pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
         let (flown, tail) = made_on(change, history)?;
         let is_within = |step: &TailWideStep| (step.first_us..=step.last_us).contains(&change.departure_us);
-        let is_wide = match change.kind {
-            ChangePointKind::Step => {
-                let steps = self.steps.get(tail).map_or(&[][..], Vec::as_slice);
-                steps.iter().any(is_within) || self.is_explained(flown, tail)
-            }
-            ChangePointKind::Reset => self.is_explained(flown, tail),
-            _ => false,
-        };
+        let steps = self.steps.get(tail).map_or(&[][..], Vec::as_slice);
+        let is_wide = is_sudden(change) && (steps.iter().any(is_within) || self.is_explained(flown, tail));
         is_wide.then_some(tail)
     }
 
@@ -107,6 +101,11 @@ fn of_step(tail: &str, step: &TailWideStep, level_m: f64) -> Option<QuantityChan
         ),
         ..QuantityChange::default()
     })
+}
+
+/// Whether a change of the gap was sudden and is not on record.
+fn is_sudden(change: &ChangePoint) -> bool {
+    matches!(change.kind, ChangePointKind::Step | ChangePointKind::Reset)
 }
 
 /// The first flight after a change, and its tail.

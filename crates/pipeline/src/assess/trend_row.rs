@@ -162,6 +162,13 @@ impl RowSources<'_> {
         let age = trend.stale_days.filter(|_| !is_said);
         let age = age.map(|days| format!("no sound record for {days:.0} days"));
         let faults = self.series.faults;
+        let latest = trend.latest.filter(|latest| latest.is_impossible());
+        let impossible = latest.map(|latest| {
+            format!(
+                "the latest gap, {:.1} µm, cannot be: check the signs of the channels",
+                1e6 * latest.gap_m
+            )
+        });
         let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
         // A report of a past date leaves later records out on purpose.
         let now = Timestamp::now().max(*as_of);
@@ -171,6 +178,11 @@ impl RowSources<'_> {
             flagged,
             age,
             counted(faults.contradictions, "flights with records that contradict each other"),
+            counted(
+                faults.overlaps,
+                "flights depart while the one before still flies: is one flight recorded twice?",
+            ),
+            impossible,
             counted(faults.negative_usage, "rows with negative usage, left out"),
             counted(faults.meter_readings, "hour-meter readings that contradict the others, left out"),
             counted(history.flights().len() - history.until(now).len(), "records dated ahead, left out"),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::{Installations, QuantityChange, QuantityRow, UnitState};
+use records::{Diagnostic, Installations, QuantityChange, QuantityRow, UnitState};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series};
 
@@ -245,7 +245,8 @@ pub fn assess(
     };
     let mut histories = histories.map_or_else(|| load_histories(&store()?), Ok)?;
     let days: Vec<Timestamp> = queries.iter().map(|(_, as_of)| *as_of).collect();
-    let selected: Vec<UnitKey> = queries.iter().map(|(named, _)| unit_of(named, &histories)).collect();
+    let selected = queries.iter().map(|(named, _)| unit_of(named, &histories));
+    let selected = selected.collect::<Result<Vec<UnitKey>, Error>>()?;
     // A unit that never flew has an assessment all the same.
     for unit in &selected {
         histories.units.entry(unit.clone()).or_default();
@@ -259,11 +260,20 @@ pub fn assess(
     Ok(StoreAssessment { now, ..StoreAssessment::default() })
 }
 
-/// The unit that a query means.
-fn unit_of(named: &UnitKey, histories: &Histories) -> UnitKey {
-    let is_complete = named.0.is_some() || histories.units.contains_key(named);
-    let known = || histories.units.keys().find(|name| name.1 == named.1);
-    if is_complete { named } else { known().unwrap_or(named) }.clone()
+/// The unit that a query means; an error where several parts have its serial number and none is named.
+fn unit_of(named: &UnitKey, histories: &Histories) -> Result<UnitKey, Error> {
+    if named.0.is_some() || histories.units.contains_key(named) {
+        return Ok(named.clone());
+    }
+    let mut known = histories.units.keys().filter(|name| name.1 == named.1);
+    match (known.next(), known.next()) {
+        (Some((Some(one), serial)), Some((Some(other), _))) => {
+            let what = format!("parts {one} and {other} both have a unit {serial}");
+            let hint = "name the part in a column `part_number` of the queries";
+            Err(Error::refused(Diagnostic::new("bad_table", what).hint(hint)))
+        }
+        (known, _) => Ok(known.unwrap_or(named).clone()),
+    }
 }
 
 /// Every unit's flights in the store.

@@ -1,6 +1,6 @@
 //! External tables: estimates to be assessed, and the dates of the assessments.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use ingest::tables::{TableBatch, TableSplits, name, utc};
@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::fleet::builder::{self, add_external};
 use crate::fleet::histories::{Histories, UnitKey};
 use crate::fleet::row_keys::KeyColumns;
-use crate::fleet::unit_rows::of_parts;
+use crate::fleet::unit_rows::{PartsByUnit, of_parts};
 use jiff::Timestamp;
 
 /// A unit, and the date of its assessment; later data are ignored.
@@ -26,7 +26,7 @@ pub fn read(file: &Path, by_largest: &BTreeSet<String>) -> Result<Histories, Err
         let mut chunks = table.batches(part..part + 1)?;
         Ok(chunks.try_for_each(|chunk| add_external(rows, &chunk?, by_largest))?)
     })?;
-    Ok(builder::histories(parts, false).0)
+    Ok(builder::histories(with_parts(parts), false).0)
 }
 
 /// The histories of an estimates table in memory.
@@ -35,7 +35,23 @@ pub fn read(file: &Path, by_largest: &BTreeSet<String>) -> Result<Histories, Err
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch], by_largest: &BTreeSet<String>) -> Result<Histories, Error> {
     let parts = of_parts(chunks.len(), |rows, part| Ok(add_external(rows, &chunks[part], by_largest)?))?;
-    Ok(builder::histories(parts, false).0)
+    Ok(builder::histories(with_parts(parts), false).0)
+}
+
+/// The same rows, those without a part number as flights of the one unit with their serial number that has a part.
+fn with_parts(mut parts: PartsByUnit<()>) -> PartsByUnit<()> {
+    let mut named: BTreeMap<String, Vec<UnitKey>> = BTreeMap::new();
+    for unit in parts.keys().filter(|unit| unit.0.is_some()) {
+        named.entry(unit.1.clone()).or_default().push(unit.clone());
+    }
+    for (serial, units) in named {
+        if let [unit] = units.as_slice()
+            && let Some(rows) = parts.remove(&(None, serial))
+        {
+            parts.entry(unit.clone()).or_default().extend(rows);
+        }
+    }
+    parts
 }
 
 /// The units and days of a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.

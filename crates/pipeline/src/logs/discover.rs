@@ -370,6 +370,15 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 
+/// Whether a pattern of `logs.files` names a file, which is given without links.
+pub fn is_log(config: &Config, file: &Path) -> bool {
+    let folder = config.folder.canonicalize().unwrap_or_else(|_| config.folder.clone());
+    let file = file.strip_prefix(&folder).unwrap_or(file);
+    let names =
+        |pattern: &String| glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches_path(file));
+    config.document.logs.files.iter().any(names)
+}
+
 /// The path of a log in records and messages. Bytes that are no text are written as `%ff`, so that each file has a path of
 /// its own.
 fn log_path(config: &Config, path: &Path) -> String {

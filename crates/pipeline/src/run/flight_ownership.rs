@@ -327,26 +327,26 @@ impl<'a> OwnershipLedger<'a> {
             .is_some_and(|before| before.estimated + before.refused > 0 && plan::is_same_flight(before, log))
     }
 
-    /// Keys under which the same samples are stored: the log was the same, and its flight had another identity.
+    /// Keys and log digests under which the same samples are stored: their flight had another identity, and the log was this
+    /// one, or one of the same content that is gone.
     fn moved_from(
         &self,
         account: &LogRecord,
         records: &[GapRecord],
         writer: &Writer,
-    ) -> Result<Vec<RecordKey>, Error> {
-        let Some(digest) = account.log_digest.as_ref().filter(|_| !records.is_empty()) else {
-            return Ok(Vec::new());
-        };
+    ) -> Result<Vec<(RecordKey, String)>, Error> {
         let own = self.plan.accounts.get(&account.log_path);
-        let gone = self.plan.gone.get(digest).into_iter().flatten();
-        let before = own.into_iter().chain(gone).filter(|before| before.log_digest.as_ref() == Some(digest));
+        let gone = account.log_digest.as_ref().and_then(|digest| self.plan.gone.get(digest));
+        let before = own.into_iter().chain(gone.into_iter().flatten());
         let before = before.filter(|before| !plan::is_same_flight(before, account));
         let keys: BTreeSet<RecordKey> = before.flat_map(LogRecord::keys).collect();
-        if keys.is_empty() {
+        if keys.is_empty() || records.is_empty() {
             return Ok(Vec::new());
         }
-        let held = writer.held(&keys)?.into_iter();
-        Ok(held.filter(|(_, record)| record.log_digest == *digest).map(|(key, _)| key).collect())
+        let new: Vec<HeldRecord> = records.iter().map(HeldRecord::of).collect();
+        let mut held = writer.held(&keys)?;
+        held.retain(|_, stored| new.iter().any(|new| stored.is_same_as(new)));
+        Ok(held.into_iter().map(|(key, stored)| (key, stored.log_digest)).collect())
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
@@ -393,9 +393,13 @@ impl<'a> OwnershipLedger<'a> {
         let pieces = pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0);
         for piece in pieces.filter(|piece| !self.is_stored(piece)).collect::<Vec<_>>() {
             // Records of this run that are taken back: they were stored before their other pieces were known.
-            let keys = piece.keys();
-            keys.iter().for_each(|key| drop(self.own.remove(key)));
-            results.push(self.store(refused(piece, &own), keys, report));
+            let digest = piece.log_digest.clone().unwrap_or_default();
+            let taken = |key: RecordKey| {
+                self.own.remove(&key);
+                (key, digest.clone())
+            };
+            let taken = piece.keys().into_iter().map(taken).collect();
+            results.push(self.store(refused(piece, &own), taken, report));
         }
         results
     }
@@ -403,7 +407,7 @@ impl<'a> OwnershipLedger<'a> {
     fn store(
         &mut self,
         done: ProcessedLog,
-        moved_from: Vec<RecordKey>,
+        moved_from: Vec<(RecordKey, String)>,
         report: &mut RunSummary,
     ) -> LogResult {
         let ProcessedLog { mut account, records, diagnostics } = done;

@@ -61,10 +61,14 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
         |found: Vec<ingest::Error>| Error::Refused(found.iter().map(ingest::Error::diagnostic).collect());
     let table =
         ingest::tables::installations(&file, &config.document.columns.installations).map_err(refused)?;
-    let aliases =
-        config.document.logs.aliases.as_ref().map(|file| ingest::tables::aliases(&config.path(file)));
-    let aliases = aliases.transpose().map_err(|error| refused(vec![error]))?;
-    Ok(table.with_aliases(&aliases.unwrap_or_default()))
+    let Some(file) = config.document.logs.aliases.as_ref().map(|file| config.path(file)) else {
+        return Ok(table);
+    };
+    let aliases = ingest::tables::aliases(&file).map_err(|error| refused(vec![error]))?;
+    let table = table.with_aliases(&aliases);
+    let Some(what) = table.merged_by_aliases() else { return Ok(table) };
+    let hint = "an alias leads from a former number of a unit to its number of today, not to another unit";
+    Err(Error::refused(Diagnostic::new("bad_table", what).in_file(file.display()).hint(hint)))
 }
 
 /// Dry run: returns the plan of a run without executing it.

@@ -32,8 +32,8 @@ pub struct LogResult {
     pub account: LogRecord,
     /// Its records; each takes the place of a stored one with the same key.
     pub records: Vec<GapRecord>,
-    /// Keys under which the same samples were stored before: their flight was given another identity since.
-    pub moved_from: Vec<RecordKey>,
+    /// Keys and log digests of the stored records of the same samples, whose flight was given another identity since.
+    pub moved_from: Vec<(RecordKey, String)>,
 }
 
 stored_row! {
@@ -96,7 +96,7 @@ pub struct Writer {
 enum Decision<'a> {
     /// This record takes its place.
     Replaced(&'a GapRecord),
-    /// It goes if it has the samples of this log digest, which have another key now.
+    /// It goes if it is of the log with this digest: its samples have another key now.
     Moved(Option<&'a str>),
 }
 
@@ -276,8 +276,9 @@ pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(
 fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     let mut decisions = MergeDecisions::new();
     for result in results {
-        let moved = Decision::Moved(result.account.log_digest.as_deref());
-        decisions.extend(result.moved_from.iter().map(|key| (key.clone(), moved)));
+        for (key, digest) in &result.moved_from {
+            decisions.insert(key.clone(), Decision::Moved(Some(digest)));
+        }
         let replaced = |record| (RecordKey::of(record), Decision::Replaced(record));
         decisions.extend(result.records.iter().map(replaced));
     }

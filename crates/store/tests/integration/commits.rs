@@ -54,7 +54,8 @@ fn results() -> impl Strategy<Value = LogResult> {
             records: there.iter().map(|position| record(tail, flight, position, gap_m)).collect(),
             moved_from: gone
                 .iter()
-                .map(|position| RecordKey::of(&record(tail, flight, position, 0.0)))
+                .map(|position| record(tail, flight, position, 0.0))
+                .map(|gone| (RecordKey::of(&gone), gone.provenance.log_digest))
                 .collect(),
         }
     })
@@ -72,7 +73,7 @@ proptest! {
         let mut map: BTreeMap<RecordKey, GapRecord> = BTreeMap::new();
         for (i, commit) in commits.iter().enumerate() {
             for result in commit {
-                map.retain(|key, _| !result.moved_from.contains(key));
+                map.retain(|key, _| result.moved_from.iter().all(|(gone, _)| gone != key));
                 map.extend(result.records.iter().map(|record| (RecordKey::of(record), record.clone())));
             }
             writer.commit(commit).unwrap();

@@ -119,7 +119,10 @@ fn a_table_always_has_a_file() {
     let mut retired = result(1, 0, 30e-6);
     writer.commit(&[retired.clone()]).unwrap();
     writer.compact().unwrap();
-    let position = |name| store::RecordKey::of(&record(1, 0, name, 0.0));
+    let position = |name| {
+        let gone = record(1, 0, name, 0.0);
+        (store::RecordKey::of(&gone), gone.provenance.log_digest)
+    };
     retired.moved_from = crate::fixtures::POSITIONS.map(position).to_vec();
     retired.records.clear();
     (retired.account.estimated, retired.account.refused) = (0, 0);

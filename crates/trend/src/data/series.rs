@@ -5,6 +5,9 @@ use crate::error::Error;
 /// Microseconds of a day.
 pub(crate) const DAY_US: i64 = 86_400_000_000;
 
+/// Microseconds of an hour.
+const HOUR_US: f64 = 3.6e9;
+
 /// One flight of a unit, as a caller knows it; order does not matter.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Observation {
@@ -119,6 +122,8 @@ pub(crate) struct UnitData<'a> {
 pub struct RowFaults {
     /// Flights with records that contradict each other: the largest gap is kept, as a flagged one.
     pub contradictions: usize,
+    /// Flights that depart before half of the one before has passed.
+    pub overlaps: usize,
     /// Rows with negative usage, which is left out.
     pub negative_usage: usize,
     /// Hour-meter readings that contradict the others, which a caller left out.
@@ -186,13 +191,24 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     rows.sort_unstable_by(order);
     rows.dedup_by(|next, kept| {
         let is_same = (next.departure_us, next.installation) == (kept.departure_us, kept.installation);
-        if is_same && next.gap_m.is_some() && next.gap_m != kept.gap_m && !kept.is_doubtful {
+        if is_same && differ(next.gap_m, kept.gap_m) && !kept.is_doubtful {
             kept.is_doubtful = true;
             faults.contradictions += 1;
         }
         is_same
     });
+    let is_in_flight = |[earlier, later]: &&[Observation; 2]| {
+        let lasted_us = earlier.flight_hours.unwrap_or(0.0) * HOUR_US;
+        earlier.installation == later.installation
+            && ((later.departure_us.saturating_sub(earlier.departure_us)) as f64) < lasted_us / 2.0
+    };
+    faults.overlaps = rows.array_windows().filter(is_in_flight).count();
     Ok((rows, faults))
+}
+
+/// Whether the gaps of two rows of one flight differ by more than single precision rounds.
+fn differ(one_m: Option<f64>, other_m: Option<f64>) -> bool {
+    one_m.zip(other_m).is_some_and(|(one_m, other_m)| (one_m - other_m).abs() > 1e-6 * other_m.abs())
 }
 
 /// Rejects values that are not finite, and errors that are not positive. Hours that no aircraft can have are left out, and a

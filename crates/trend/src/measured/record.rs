@@ -41,6 +41,13 @@ pub struct Record {
     pub(crate) renewals: u32,
 }
 
+impl Record {
+    /// Whether it is so far below zero that it shows a fault, and nothing of the unit.
+    pub fn is_impossible(&self) -> bool {
+        !self.is_sound && self.gap_m < -IMPOSSIBLE_ERRORS * self.error_m
+    }
+}
+
 /// The last records of a unit, and the renewing maintenance after the last of them.
 pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<i64>) {
     let mut seen: Vec<(usize, &Flight, Gap)> =

@@ -13,6 +13,8 @@ use crate::contact::friction::friction_model::{Friction, FrictionState};
 
 /// Each flank must be touched this long, s.
 const REQUIRED_CONTACT_S: f64 = 1.0;
+/// The longest delay of the load that is allowed for, s.
+pub(crate) const LATEST_S: f64 = 0.04;
 /// Below this a flank was not touched at all, s.
 const MIN_CONTACT_S: f64 = 0.1;
 
@@ -118,8 +120,7 @@ fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> F
         },
         // Friction at rest is 2.2 times that in motion at most.
         stribeck: (state.stribeck + lacking(STRIBECK)).clamp(0.0, 1.2),
-        // 40 ms at most.
-        load_delay_s: (state.load_delay_s + lacking(LOAD_RATE) * LATE_S).clamp(-0.04, 0.04),
+        load_delay_s: (state.load_delay_s + lacking(LOAD_RATE) * LATE_S).clamp(-LATEST_S, LATEST_S),
         skew_s: state.skew_s - beta[SPEED] / SPEED_M_PER_S,
         ..*state
     }
