@@ -80,10 +80,7 @@ impl Output {
         if !is_inside && times_named < 2 && !inputs.iter().any(|input| is_target(input)) {
             return Ok(());
         }
-        let what = format!(
-            "{} is an input of this command or configuration, or lies in its store; it was not changed",
-            file.display()
-        );
+        let what = format!("{} is an input or a part of the store; it was not changed", file.display());
         Err(Failure::usage("would_overwrite", what, "name another output file"))
     }
 

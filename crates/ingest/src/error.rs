@@ -301,11 +301,9 @@ impl ErrorKind {
             Self::TableColumn { nearest: Some(near), is_mapped: true, .. } => {
                 format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
             }
-            Self::TableColumn { column, nearest, is_mapped: false } => {
-                let near = nearest.as_ref().map(|near| format!("`{near}`? ")).unwrap_or_default();
-                format!(
-                    "{near}The column must be called `{column}` in the table: docs/configuration.md has its columns"
-                )
+            Self::TableColumn { nearest, is_mapped: false, .. } => {
+                let near = nearest.as_ref().map(|near| format!("rename `{near}`? ")).unwrap_or_default();
+                format!("{near}the table must have a column of this name (docs/configuration.md)")
             }
             Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
                 format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")

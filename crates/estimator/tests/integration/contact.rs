@@ -250,6 +250,19 @@ fn the_skew_between_the_positions_is_found_with_its_sign() {
     }
 }
 
+/// A load that is later, or earlier, than the fit allows for would move the gap without a sign of it.
+#[test]
+fn a_load_that_is_much_too_late_or_early_is_refused() {
+    let late: Fault = |c| c.sensors.load.delay_s = 0.08;
+    let early: Fault = |c| (c.sensors.motor.delay_s, c.sensors.screw.delay_s) = (0.12, 0.12);
+    for fault in [late, early] {
+        let case = Case::with(100e-6, fault);
+        for seed in 0..3 {
+            assert_eq!(case.outcome(&case.fly(seed)).unwrap_err(), Rejection::MotionUnexplained);
+        }
+    }
+}
+
 /// The gap is the distance of the stiff flanks extrapolated to zero load: a toe of 40 % of the stiffness and a depth d
 /// adds 2·0.6·d. A Hertzian flank has no stiff part; its extrapolation from 30 to 100 % of the load is 60 µm wider.
 #[test]

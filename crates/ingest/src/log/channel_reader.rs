@@ -161,7 +161,7 @@ impl<'s> ChannelSampling<'s> {
                 buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
                 self.table.base.get_or_init(|| base).clone()
             } else {
-                self.stamps = stamps.map(|stamps| kept(&base, stamps).into()).unwrap_or_default();
+                self.stamps = stamps.map(|stamps| base.keep_stamps(stamps).into()).unwrap_or_default();
                 base
             }
         };
@@ -198,7 +198,7 @@ impl<'s> ChannelSampling<'s> {
         }
         let even = || Timestamps::uniform(self.base.rows, self.base.step_s.recip());
         let stamps = self.read_base()?.0.unwrap_or_else(even);
-        Ok(self.stamps.get_or_init(|| kept(&self.base, stamps)))
+        Ok(self.stamps.get_or_init(|| self.base.keep_stamps(stamps)))
     }
 
     /// The channel in SI at its own rows; those that are not wanted may be missing.
@@ -312,9 +312,4 @@ impl<'s> ChannelSampling<'s> {
         let series = TimeSeries { at_s: &own_s, values: &values, step_s };
         Ok(Channel { turn_m: read.turn_m, ..interpolate_at(series, &at_s, between).into() })
     }
-}
-
-/// The stamps of the rows that count.
-fn kept(base: &TimeBase, stamps: Timestamps) -> Timestamps {
-    Timestamps { seconds: base.keep(stamps.seconds), ..stamps }
 }

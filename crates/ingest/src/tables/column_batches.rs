@@ -303,7 +303,7 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         opened.read_to_end(&mut text)
     })?;
     if let Some(format) = foreign(&text) {
-        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8, with commas")));
+        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8")));
     }
     // Spreadsheets open their UTF-8 with a byte order mark.
     let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };

@@ -3,7 +3,9 @@
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
 //! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
 //! are left out, or spread evenly if `tick_s` is given. After a step of more than one and a half times the usual one,
-//! the filter starts again. Rows that are in order stay as they are.
+//! the filter starts again, unless single rows are lost so often that no stretch would last, up to a quarter of them: those
+//! count as missing samples.
+//! Rows that are in order stay as they are.
 
 use std::ops::Range;
 
@@ -17,6 +19,12 @@ pub(crate) const DAY_S: f64 = 86_400.0;
 
 /// A step longer than this many usual steps is a break: the filter cannot predict across it.
 pub(crate) const BREAK_STEPS: f64 = 1.5;
+
+/// Most rows lost in a row that count as missing samples, and the share of the rows with a break before them from which they do.
+const MOST_LOST: f64 = 5.0;
+const OFTEN_LOST: f64 = 0.01;
+/// Stands for a lost row among the rows that count.
+pub(super) const LOST: u32 = u32::MAX;
 
 /// A declared rate and the stamps may differ by this share: more is another rate, not a better one.
 const RATE_TOLERANCE: f64 = 0.25;
@@ -48,7 +56,7 @@ pub(crate) struct TimeBase {
     pub(crate) step_s: f64,
     /// Rows there are.
     pub(crate) rows: usize,
-    /// The rows that count, in order of time; none when every row counts as it stands.
+    /// The rows that count, in order of time, [`LOST`] among them; none when every row counts as it stands.
     pub(crate) kept: Option<Vec<u32>>,
     /// Unbroken stretches, in kept rows.
     pub(crate) segments: Vec<Range<usize>>,
@@ -72,12 +80,25 @@ pub struct TimestampRepairs {
 }
 
 impl TimeBase {
-    /// The values of the rows that count, in order of time.
+    /// The values of the rows that count, in order of time; NaN for a lost row.
     pub(crate) fn keep(&self, values: Vec<f64>) -> Vec<f64> {
         match &self.kept {
             None => values,
-            Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
+            Some(kept) => {
+                kept.iter().map(|&row| values.get(row as usize).copied().unwrap_or(f64::NAN)).collect()
+            }
         }
+    }
+
+    /// The stamps of the rows that count; a lost row has that of even rows.
+    pub(crate) fn keep_stamps(&self, stamps: Timestamps) -> Timestamps {
+        let mut seconds = self.keep(stamps.seconds);
+        for row in 1..seconds.len() {
+            if seconds[row].is_nan() {
+                seconds[row] = seconds[row - 1] + self.step_s;
+            }
+        }
+        Timestamps { seconds, ..stamps }
     }
 
     /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
@@ -216,8 +237,29 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let segments = split_at(count, &breaks);
     let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
     debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
-    let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
-    Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs })
+    let lost = |row: usize| {
+        let steps = step(row) / step_s;
+        let lost = steps.round() - 1.0;
+        ((1.0..=MOST_LOST).contains(&lost) && (steps - lost - 1.0).abs() < 0.3).then_some(lost as usize)
+    };
+    let is_often = breaks.len() as f64 > OFTEN_LOST * count as f64;
+    let all_lost: usize = breaks.iter().filter_map(|row| lost(*row)).sum();
+    if !is_often || all_lost == 0 || all_lost > count / 3 {
+        let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
+        return Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs });
+    }
+    let (mut filled, mut left) = (Vec::new(), Vec::new());
+    for segment in segments {
+        match lost(segment.start.max(1)).filter(|_| segment.start > 0) {
+            Some(lost) => filled.extend(std::iter::repeat_n(LOST, lost)),
+            None if segment.start > 0 => left.push((filled.len(), at(segment.start) - at(0))),
+            None => {}
+        }
+        filled.extend(segment.map(|row| kept.as_ref().map_or(row as u32, |kept| kept[row])));
+    }
+    let rows: Vec<usize> = left.iter().map(|(row, _)| *row).collect();
+    let segments = split_at(filled.len(), &rows);
+    Ok(TimeBase { step_s, rows: t.len(), segments, breaks: left, kept: Some(filled), repairs })
 }
 
 /// Whether rows were written backwards or in no order, so that sorting them loses nothing. Two recordings whose rows
@@ -410,6 +452,27 @@ mod tests {
         assert_eq!(base.repairs, TimestampRepairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
     }
 
+    /// Of 700 rows at 100 Hz every seventh is lost, and ten in a row: the seventh ones are missing samples, the ten a break.
+    #[test]
+    fn rows_that_are_often_lost_are_missing_samples() {
+        let is_there = |row: &u32| row % 7 != 3 && !(300..310).contains(row);
+        let rows: Vec<u32> = (0..700).filter(is_there).collect();
+        let seconds: Vec<f64> = rows.iter().map(|row| 0.01 * f64::from(*row)).collect();
+        let found = base(&seconds, &usual()).unwrap();
+        assert_eq!(found.segments, [0..300, 300..690]);
+        let values = found.keep(rows.iter().map(|row| f64::from(*row)).collect());
+        let wanted = (0..700).filter(|row| !(300..310).contains(row));
+        for (row, value) in wanted.zip(values) {
+            assert!(if is_there(&row) { value == f64::from(row) } else { value.is_nan() }, "{row}: {value}");
+        }
+        let even = found.keep_stamps(stamps(&seconds)).seconds;
+        assert!((0..300).all(|row| (even[row] - 0.01 * row as f64).abs() < 1e-9), "{even:?}");
+        // A row that is seldom lost begins a new stretch.
+        let seldom: Vec<f64> =
+            (0..700).filter(|row| row % 350 != 3).map(|row| 0.01 * f64::from(row)).collect();
+        assert_eq!(base(&seldom, &usual()).unwrap().segments, [0..3, 3..352, 352..698]);
+    }
+
     #[test]
     fn a_deep_fall_is_refused_with_its_row_or_splits_the_log() {
         let t = [0.0, 0.1, 5.0, 5.1, 1.0, 1.1, 1.2];
@@ -520,10 +583,11 @@ mod tests {
             distinct.dedup();
             prop_assume!(distinct.len() > 1);
             let base = base(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
-            let kept = base.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            let samples = base.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            let kept: Vec<u32> = samples.iter().copied().filter(|row| *row != LOST).collect();
             prop_assert!(kept.windows(2).all(|w| t[w[0] as usize] < t[w[1] as usize]));
             prop_assert_eq!(kept.len(), distinct.len());
-            prop_assert_eq!(base.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), kept.len());
+            prop_assert_eq!(base.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), samples.len());
         }
     }
 }

@@ -108,7 +108,8 @@ fn fuzz_logs() {
         std::fs::write(&file, bytes).unwrap();
         for mapping in &mappings {
             match read(mapping) {
-                Ok(samples) => assert!(samples <= 400, "{samples} samples of 400 rows"),
+                // A third of the rows may be lost ones, which count as missing samples.
+                Ok(samples) => assert!(samples <= 400 + 400 / 3, "{samples} samples of 400 rows"),
                 Err(error) => drop(error.diagnostic()),
             }
         }

@@ -110,8 +110,9 @@ fn of_open(
     found
 }
 
-/// A closed request is opened again when the unit returns from stock as it was; it is followed by a new one when the
-/// unit is worse than when it was closed, or is found so by flights after its repair.
+/// A closed request is opened again when the unit returns from stock as it was, or when its repair is no longer in the
+/// maintenance table; it is followed by a new one when the unit is worse than when it was closed, or is found so by flights
+/// after its repair.
 fn of_closed(
     request: &WorkRequest,
     finding: &Finding,
@@ -123,8 +124,9 @@ fn of_closed(
         return state_change(request, finding, now);
     }
     let is_after = |fact: Option<Timestamp>| fact > request.closed_utc;
+    let is_withdrawn = || tables.repair_after(&finding.unit, request.opened_utc).is_none();
     match request.closed_by.as_deref() {
-        Some("removed") => {
+        Some(by) if by == "removed" || (by == "maintained" && is_withdrawn()) => {
             let again = open(finding, tables, now)?;
             let id = request.request_id.clone();
             Some(WorkEvent { event: WorkEventKind::Reopened, request_id: id, ..again })
