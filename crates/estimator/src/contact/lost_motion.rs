@@ -50,7 +50,7 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
         is_on_branch.then(position_m).filter(|m| m.is_finite()).map(|m| (side, m, blocks.stretch(k)))
     };
     let positions: Vec<_> = (reach..blocks.len().saturating_sub(reach)).filter_map(on_branch).collect();
-    let passages: Vec<_> = positions.chunk_by(|(before, ..), (side, ..)| before == side).collect();
+    let passages: Vec<_> = positions.chunk_by(|(before, ..), (side, ..)| before * side > 0.0).collect();
     let widths = passages.array_windows().flat_map(|[before, passage]| {
         let before_m = median(&mut before.iter().map(|(_, m, _)| *m).collect::<Vec<_>>());
         passage.iter().map(move |(side, m, stretch)| (side * (m - before_m), *stretch))

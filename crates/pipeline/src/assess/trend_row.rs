@@ -162,7 +162,7 @@ impl RowSources<'_> {
         let age = trend.stale_days.filter(|_| !is_said);
         let age = age.map(|days| format!("no sound record for {days:.0} days"));
         let faults = self.series.faults;
-        let latest = trend.latest.filter(|latest| latest.is_impossible());
+        let latest = trend.latest.filter(trend::Record::is_impossible);
         let impossible = latest.map(|latest| {
             format!(
                 "the latest gap, {:.1} µm, cannot be: check the signs of the channels",

@@ -372,7 +372,8 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
 
 /// Whether a pattern of `logs.files` names a file, which is given without links.
 pub fn is_log(config: &Config, file: &Path) -> bool {
-    let folder = config.folder.canonicalize().unwrap_or_else(|_| config.folder.clone());
+    // The folder of a bare file name is empty, which no path leads to.
+    let folder = config.folder.join(".").canonicalize().unwrap_or_default();
     let file = file.strip_prefix(&folder).unwrap_or(file);
     let names =
         |pattern: &String| glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches_path(file));
