@@ -302,8 +302,8 @@ impl ErrorKind {
                 format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
             }
             Self::TableColumn { nearest, is_mapped: false, .. } => {
-                let near = nearest.as_ref().map(|near| format!("rename `{near}`? ")).unwrap_or_default();
-                format!("{near}the table must have a column of this name (docs/configuration.md)")
+                let near = nearest.as_ref().map(|near| format!("`{near}`? ")).unwrap_or_default();
+                format!("{near}docs/configuration.md has the names of this table's columns")
             }
             Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
                 format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
