@@ -177,7 +177,11 @@ impl TestFleet {
         for log in self.glob(&how.from) {
             let mut own = if how.is_anonymous { Facts::new() } else { facts(&log) };
             own.retain(|(key, _)| !how.facts.contains_key(key));
-            own.extend(how.facts.iter().filter_map(|(key, value)| Some((key.clone(), value.clone()?))));
+            let name = log.file_stem().unwrap().to_str().unwrap();
+            let fact = |(key, value): (&String, &Option<String>)| {
+                Some((key.clone(), value.as_ref()?.replace("{log}", name)))
+            };
+            own.extend(how.facts.iter().filter_map(fact));
             let mut table = Table::read(&log).columns();
             table.retain(|(name, _)| (columns.is_none() || is(&columns, name)) && !is(&without, name));
             for (name, values) in &mut table {
@@ -192,7 +196,6 @@ impl TestFleet {
             }
             let rows = table.first().map_or(0, |(_, values)| values.len());
             table.extend(how.add.iter().map(|(name, value)| (name.clone(), vec![*value; rows])));
-            let name = log.file_stem().unwrap().to_str().unwrap();
             write_log(&self.path(&how.to.replace("{log}", name)), table, &own);
         }
     }
@@ -238,7 +241,7 @@ pub(crate) struct LogRewrite {
     /// Without the facts of the log.
     #[serde(default)]
     is_anonymous: bool,
-    /// Facts that replace those of the log; null removes one.
+    /// Facts that replace those of the log, in which `{log}` is its name, too; null removes one.
     #[serde(default)]
     facts: BTreeMap<String, Option<String>>,
 }

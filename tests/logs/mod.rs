@@ -1,5 +1,4 @@
-//! Logs: layouts, corrupt files, reference logs and logs with known gaps.
+//! Logs: layouts that are made row by row, and logs with known gaps.
 
 mod ground_truth;
-mod hostile_names;
 pub(crate) mod layouts;
