@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::gate::is_gate;
-use crate::harness::{TestFleet, facts, rewrite};
+use crate::harness::{TestFleet, facts, facts_with, rewrite};
 
 const TABLE: &str = "sample-data/installations.csv";
 
@@ -91,5 +91,34 @@ fn any_order_of_commands_ends_where_one_run_does() {
         let joined = fleet.exported();
         fleet.run_ok(&["run", "-q"]);
         assert_eq!(fleet.exported(), joined, "seed {seed}");
+    }
+}
+
+/// A recorder sends a log again under the same name, first with its departure corrected and then with its tail: each time the
+/// records of the same samples under the old identity go.
+#[test]
+fn a_log_sent_again_with_another_identity_is_one_flight() {
+    let fleet = TestFleet::sample();
+    let kept = fleet.logs_of("N413FP").remove(0);
+    fleet.logs().iter().filter(|log| **log != kept).for_each(|log| std::fs::remove_file(log).unwrap());
+    let source = fleet.path("source.parquet");
+    std::fs::rename(&kept, &source).unwrap();
+    let send = |facts: &[(String, String)]| {
+        rewrite(&source, &kept, &facts.to_vec(), |_| true, |_| true);
+        fleet.run_ok(&["run", "-q"]);
+        let rows = fleet.rows(&["store", "export"]);
+        let names = |row: &Value| ["tail_number", "departure_utc"].map(|name| row[name].clone());
+        (rows.len(), rows.iter().map(names).collect::<Vec<_>>())
+    };
+    let (count, _) = send(&facts(&source));
+    let later = "2026-11-02T10:00:00Z";
+    for (key, value) in [("departure_utc", later), ("tail_number", "N414FP")] {
+        let corrected = facts_with(&source, key, value);
+        let (now, names) = send(&corrected);
+        assert_eq!(now, count, "{key}: {names:?}");
+        let column = usize::from(key == "departure_utc");
+        assert!(
+            names.iter().all(|row| row[column].as_str().is_some_and(|found| found.starts_with(&value[..6])))
+        );
     }
 }
