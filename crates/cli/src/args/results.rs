@@ -136,7 +136,7 @@ pub(crate) struct ReportArgs {
     pub output: PathBuf,
     #[command(flatten)]
     pub units: UnitFilterArgs,
-    /// Date of the assessments; default: that of the newest record. Later data are ignored.
+    /// Date of the assessments; default: now, or as `trend.as_of` says. Later data are ignored.
     #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
     /// Also draw the diagnostic plots of the latest flights from their logs, linked from the unit's page: of each unit that

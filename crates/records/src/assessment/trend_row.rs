@@ -36,9 +36,9 @@ row! {
         pub part_number: Option<String>,
         /// Serial number of the unit.
         pub serial_number: String,
-        /// Tail and position of the unit's last flight.
+        /// Tail and position by the installations table, else of the last flight.
         pub tail_number: Option<String>,
-        /// Tail and position of the unit's last flight.
+        /// Tail and position by the installations table, else of the last flight.
         pub position: Option<String>,
         /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
