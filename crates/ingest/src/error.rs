@@ -308,6 +308,9 @@ impl ErrorKind {
             Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
                 format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
             }
+            Self::IdentityInvalid { fact, .. } if !fact.ends_with("_utc") => {
+                format!("check this value, and where `[identity]` takes the {fact} from")
+            }
             Self::MissingCode { raw, .. } => {
                 format!("list it: `missing = [{raw}]` in the channel's table of the configuration")
             }

@@ -104,7 +104,11 @@ fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let found: Vec<PathBuf> = found.filter(|path| !is_temporary(path, folder)).collect();
     if found.is_empty() {
         let what = format!("no *.parquet files found under {}", display_path(folder));
-        return Err(Failure::usage("no_log_matched", what, "give the folder that holds your logs"));
+        return Err(Failure::usage(
+            "no_log_matched",
+            what,
+            "give the folder that holds your logs; docs/convert-logs.md converts CSV and others",
+        ));
     }
     Ok(found)
 }
