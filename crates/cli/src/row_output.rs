@@ -200,3 +200,22 @@ pub(crate) fn columns(
     let columns = names.iter().map(column).collect::<Result<Vec<_>, _>>().map_err(|e| broken(&e))?;
     RecordBatch::try_from_iter_with_nullable(columns).map_err(|e| broken(&e))
 }
+
+#[cfg(test)]
+mod tests {
+    use arrow::array::{ListBuilder, StringBuilder};
+
+    use super::*;
+
+    #[test]
+    fn items_of_a_list_are_joined_by_semicolons() {
+        let mut flags = ListBuilder::new(StringBuilder::new());
+        flags.append_value([Some("load_spikes"), Some("soft_contact")]);
+        flags.append_value([None::<&str>; 0]);
+        let batch =
+            RecordBatch::try_from_iter([("flags", Arc::new(flags.finish()) as Arc<dyn Array>)]).unwrap();
+        let mut text = Vec::new();
+        write(&batch, Format::Csv, &mut text).unwrap();
+        assert_eq!(String::from_utf8(text).unwrap(), "flags\nload_spikes;soft_contact\n\"\"\n");
+    }
+}
