@@ -2,7 +2,7 @@
 //!
 //! Such samples would count as measured: every seventh load at −9999 N makes a gap a fifth too small.
 
-/// Samples that are looked at, in windows of a thousandth of them.
+/// Samples that are looked at, in all and in one window.
 const LOOKS: usize = 1 << 14;
 const WINDOW: usize = 256;
 

@@ -68,8 +68,10 @@ pub(crate) fn exceedance(
             run = Some(current);
         } else if current.is_confirmed {
             ended_at = Some(k);
-            // Nothing on record made the gap smaller.
-            events.push(fall(&records, k - 1));
+            // Nothing on record made the gap smaller. Records near the limit fall below it by their scatter.
+            if records[k - 1].gap_m < HYSTERESIS * limit_m {
+                events.push(fall(&records, k - 1));
+            }
         } else {
             events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
         }
