@@ -1,5 +1,6 @@
 //! Console output: results to stdout, messages to stderr, colour only on terminals.
 
+use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
@@ -68,15 +69,18 @@ impl Output {
         let mut inputs = self.configs.clone();
         let mut is_inside = false;
         if let Ok(config) = Config::read_settings(&self.configs) {
-            let logs = &config.document.logs;
-            let tables = [Some(&logs.installations), logs.flights.as_ref(), logs.maintenance.as_ref()];
-            let tables = tables.into_iter().chain([logs.inspections.as_ref()]).flatten();
-            inputs.extend(tables.map(|table| config.path(table)));
+            inputs.extend(config.document.logs.tables().map(|table| config.path(table)));
             is_inside = config.store().canonicalize().is_ok_and(|store| target.starts_with(store))
                 || (target.exists() && discover::is_log(&config, &target));
         }
         let is_target = |input: &Path| input.canonicalize().is_ok_and(|input| input == target);
-        let times_named = std::env::args_os().filter(|argument| is_target(Path::new(argument))).count();
+        // An option and its value are one argument in `--output=FILE` and `-oFILE`.
+        let is_named = |argument: &OsString| {
+            let text = argument.to_string_lossy();
+            let value = text.split_once('=').map(|(_, value)| value).or_else(|| text.strip_prefix("-o"));
+            is_target(Path::new(argument)) || value.is_some_and(|value| is_target(Path::new(value)))
+        };
+        let times_named = std::env::args_os().filter(is_named).count();
         if !is_inside && times_named < 2 && !inputs.iter().any(|input| is_target(input)) {
             return Ok(());
         }

@@ -47,13 +47,12 @@ impl<'a> UnitFit<'a> {
         let measured = Measured::new(data, settings);
         let history = History::read(data, series.unit_hours_at_start, &prior);
         let mut changes = history.changes.clone();
-        let is_told = |fall: &ChangePoint| {
-            let told =
-                near(fall.departure_us, &history.changes, data).any(|change| change.kind.is_unexplained());
-            told || data.maintenance_near(data.flight_at(fall.departure_us)).next().is_some()
+        let is_known = |fall: &ChangePoint| {
+            near(fall.departure_us, &history.changes, data).any(|change| change.kind.is_unexplained())
+                || data.maintenance_near(data.flight_at(fall.departure_us)).next().is_some()
         };
-        let is_news = |event: &&ChangePoint| event.kind != ChangePointKind::Reset || !is_told(event);
-        changes.extend(measured.events.iter().filter(is_news));
+        let is_new = |event: &&ChangePoint| event.kind != ChangePointKind::Reset || !is_known(event);
+        changes.extend(measured.events.iter().filter(is_new));
         changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, data)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
         let ended: Vec<Option<Posterior>> =

@@ -69,21 +69,16 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::channel::noise_floor::tests::noise_of;
 
     /// A load of 3 kN at 1 Hz with noise and vibration, logged at 200 Hz in steps of `resolution`.
     fn load(vibration_n: f64, resolution: f64, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        // The generator of Knuth's MMIX; the sum of twelve even numbers is nearly normal.
-        let mut even = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / 2.0_f64.powi(53)
+        let noise = noise_of(seed, 40_000, vibration_n.hypot(5.0));
+        let value = |(k, noise_n): (usize, f64)| {
+            let clean_n = 3000.0 * (k as f64 * 0.0337).sin() + noise_n;
+            (clean_n / resolution).round() * resolution
         };
-        let mut noise = || (0..12).map(|_| even()).sum::<f64>() - 6.0;
-        let value = |k: i32| {
-            let clean = 3000.0 * (f64::from(k) * 0.0337).sin() + 5.0 * noise() + vibration_n * noise();
-            (clean / resolution).round() * resolution
-        };
-        (0..40_000).map(value).collect()
+        noise.into_iter().enumerate().map(value).collect()
     }
 
     proptest! {

@@ -186,12 +186,16 @@ fn chi_squared_share(freedom: f64, deviate: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    /// White noise of a given rms: sums of twelve uniform numbers, the same in every run.
     fn noise(count: usize, rms: f64) -> Vec<f64> {
-        let mut state = 42_u64;
+        noise_of(42, count, rms)
+    }
+
+    /// White noise of a given rms: sums of twelve uniform numbers, the same in every run of a seed.
+    pub(crate) fn noise_of(seed: u64, count: usize, rms: f64) -> Vec<f64> {
+        let mut state = seed;
         let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64

@@ -105,6 +105,12 @@ pub struct LogSettings {
 }
 
 impl LogSettings {
+    /// Every table that belongs to the logs, as its setting names it.
+    pub fn tables(&self) -> impl Iterator<Item = &String> {
+        let optional = [&self.aliases, &self.flights, &self.maintenance, &self.inspections];
+        std::iter::once(&self.installations).chain(optional.into_iter().flatten())
+    }
+
     /// Whether files of one flight are declared to be its pieces.
     pub fn has_pieces(&self) -> bool {
         self.pieces == Some(true)

@@ -114,8 +114,12 @@ fn add<R>(
     let departures = chunk.timestamps(Some(departure))?;
     let gaps_m = chunk.numbers(Some(chunk.column(&["gap_m"])?))?;
     let (errors_m, reversals) = (numbers("gap_se_m")?, numbers("load_reversals")?);
-    let (largest_m, largest_errors_m) = (numbers(LARGEST_GAP)?, numbers(LARGEST_GAP_ERROR)?);
-    let parts = chunk.texts(chunk.find(&["part_number"]))?;
+    let largest = if by_largest.is_empty() {
+        None
+    } else {
+        let parts = chunk.texts(chunk.find(&["part_number"]))?;
+        Some((parts, numbers(LARGEST_GAP)?, numbers(LARGEST_GAP_ERROR)?))
+    };
     let (hours, meters) = (numbers("flight_hours")?, numbers("tail_hours_end")?);
     let (flights, settings) =
         (chunk.texts(chunk.find(&["flight_id"]))?, chunk.texts(chunk.find(&[SETTINGS]))?);
@@ -124,12 +128,12 @@ fn add<R>(
         let departure_us = departures.is_valid(row).then(|| departures.value(row));
         let departure_us = departure_us.ok_or_else(|| wrong("it is empty".into()))?;
         Timestamp::from_microsecond(departure_us).map_err(|e| wrong(e.to_string()))?;
-        let is_by_largest =
-            |_: &f64| !by_largest.is_empty() && parts.get(row).is_some_and(|part| by_largest.contains(part));
-        let (gap_m, gap_se_m) = match at(&largest_m, row).filter(is_by_largest) {
-            Some(gap_m) => (Some(gap_m), at(&largest_errors_m, row)),
-            None => (at(&gaps_m, row), at(&errors_m, row)),
-        };
+        let largest = largest.as_ref().and_then(|(parts, largest_m, largest_errors_m)| {
+            let gap_m = at(largest_m, row)
+                .filter(|_| parts.get(row).is_some_and(|part| by_largest.contains(part)))?;
+            Some((Some(gap_m), at(largest_errors_m, row)))
+        });
+        let (gap_m, gap_se_m) = largest.unwrap_or_else(|| (at(&gaps_m, row), at(&errors_m, row)));
         if let Some(settings) = settings.get(row).filter(|_| gap_m.is_some()) {
             unit.settings.add(settings, 1, departure_us);
         }

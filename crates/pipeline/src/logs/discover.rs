@@ -266,12 +266,7 @@ fn matching(
     let mut named = BTreeMap::new();
     let (mut silent, mut tables) = (BTreeSet::new(), TableFolders::default());
     // `**` reaches our own results and tables, which are no logs.
-    let logs = &config.document.logs;
-    let user_tables: Vec<PathBuf> = std::iter::once(&logs.installations)
-        .chain(&logs.flights)
-        .chain(&logs.aliases)
-        .map(|table| config.path(table))
-        .collect();
+    let user_tables: Vec<PathBuf> = config.document.logs.tables().map(|table| config.path(table)).collect();
     let store = config.store();
     let is_ours = |path: &Path| path.starts_with(&store) || user_tables.iter().any(|table| table == path);
     for pattern in patterns {

@@ -18,8 +18,8 @@ pub(crate) enum Exceedance {
     Held,
 }
 
-/// Least number of records at or above the limit among so many last ones, which are no exception although others came in
-/// between.
+/// Records at or above the limit that are no exception although others came in between: their least number, and the number
+/// of last records among which it counts.
 const REPEATED: [(usize, usize); 2] = [(3, 6), (4, 12)];
 
 /// Records at or above the limit, one after the other.

@@ -65,7 +65,7 @@ impl Variant {
         }
     }
 
-    /// Why no proposal covers these logs beside others.
+    /// Why no proposal covers these logs together with others.
     fn fault(&self) -> String {
         let lacking = Role::NEEDED.iter().filter(|role| self.lacks(**role));
         match lacking.map(|role| role.as_str()).collect::<Vec<_>>().as_slice() {
