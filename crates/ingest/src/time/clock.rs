@@ -2,7 +2,7 @@
 //!
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
 //! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
-//! are left out, or spread evenly if `tick_s` is given. After a step of more than one and a half times the usual one,
+//! are left out, or spread evenly if `tick_s` is given, as are rows whose stamps jitter by a large part of the step. After a step of more than one and a half times the usual one,
 //! the filter starts again, unless single rows are lost so often that no stretch would last, up to a quarter of them: those
 //! count as missing samples.
 //! Rows that are in order stay as they are.
@@ -23,6 +23,11 @@ pub(crate) const BREAK_STEPS: f64 = 1.5;
 /// Most rows lost in a row that count as missing samples, and the share of the rows with a break before them from which they do.
 const MOST_LOST: f64 = 5.0;
 const OFTEN_LOST: f64 = 0.01;
+/// Stamps jitter if at least this share of the steps is no whole multiple of the usual one, within this share of it.
+const JITTERED: f64 = 0.25;
+const JITTER_STEPS: f64 = 0.2;
+/// Fewer rows do not show jitter.
+const JITTERED_ROWS: usize = 100;
 /// Stands for a lost row among the rows that count.
 pub(super) const LOST: u32 = u32::MAX;
 
@@ -77,6 +82,8 @@ pub struct TimestampRepairs {
     pub out_of_order: usize,
     /// Rows that repeat a stamp, left out.
     pub repeated: usize,
+    /// Rows spread evenly, since their stamps jitter.
+    pub jittered: usize,
 }
 
 impl TimeBase {
@@ -201,8 +208,11 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let max_back_s = clock.max_back_s.unwrap_or(usual_s);
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
     let pieces = split_at_resets(stamps, max_back_s, clock.split_at_jumps)?;
-    if let Some(tick_s) = clock.tick_s {
-        let step_s = clock.rate_hz.map_or_else(|| coarse_step(&stamps.seconds, tick_s), f64::recip);
+    let jittered_s =
+        if clock.tick_s.is_some() || is_in_no_order { None } else { jittered_step(&stamps.seconds) };
+    if let Some(tick_s) = clock.tick_s.or(jittered_s) {
+        let seen_s = || jittered_s.unwrap_or_else(|| coarse_step(&stamps.seconds, tick_s));
+        let step_s = clock.rate_hz.map_or_else(seen_s, f64::recip);
         pieces.iter().for_each(|piece| spread_ticks(&mut stamps.seconds[piece.clone()], step_s, tick_s));
     }
     let t = &stamps.seconds;
@@ -232,8 +242,9 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
         return Err(ErrorKind::TimeUnit { column: stamps.column.clone(), found });
     }
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
-    let repairs =
-        TimestampRepairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
+    let jittered = jittered_s.map_or(0, |_| count);
+    let repeated = t.len() - unstamped - count;
+    let repairs = TimestampRepairs { unstamped, filled, out_of_order: falls, repeated, jittered };
     let segments = split_at(count, &breaks);
     let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
     debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
@@ -358,6 +369,23 @@ fn coarse_step(seconds: &[f64], tick_s: f64) -> f64 {
     if rows == 0 { tick_s } else { time_s / rows as f64 }
 }
 
+/// The mean step of rows whose stamps jitter by so much that steps look like breaks; `None` if they do not. Lost and
+/// swapped rows make steps of whole multiples of the usual one.
+fn jittered_step(seconds: &[f64]) -> Option<f64> {
+    let steps: Vec<f64> =
+        seconds.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| !step.is_nan()).collect();
+    let usual_s = usual_step(steps.iter().copied().filter(|step| *step > 0.0).collect());
+    let share = |is_it: fn(f64) -> bool| {
+        steps.iter().filter(|step| is_it(**step / usual_s)).count() as f64 / steps.len() as f64
+    };
+    let is_jittered = steps.len() >= JITTERED_ROWS
+        && share(|steps| steps <= 0.0 || steps > BREAK_STEPS) > OFTEN_LOST
+        && share(|steps| (steps - 1.0).abs() > 2.0) < OFTEN_LOST
+        && share(|steps| (steps - steps.round()).abs() > JITTER_STEPS) > JITTERED;
+    let whole = || steps.iter().filter(|step| step.abs() <= MOST_LOST * usual_s);
+    is_jittered.then(|| whole().sum::<f64>() / whole().count() as f64)
+}
+
 /// Spreads rows evenly over coarse ticks. A row lies within the tick that stamps it; where the stamps
 /// leave the even rows behind by more than a tick and a break, time broke there.
 fn spread_ticks(seconds: &mut [f64], step_s: f64, tick_s: f64) {
@@ -449,7 +477,10 @@ mod tests {
     fn repeated_missing_and_swapped_stamps_are_mended_and_counted() {
         let base = base(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
         assert_eq!(base.kept, Some(vec![0, 2, 1, 5]));
-        assert_eq!(base.repairs, TimestampRepairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
+        assert_eq!(
+            base.repairs,
+            TimestampRepairs { unstamped: 1, out_of_order: 1, repeated: 1, ..Default::default() }
+        );
     }
 
     /// Of 700 rows at 100 Hz every seventh is lost, and ten in a row: the seventh ones are missing samples, the ten a break.
@@ -574,6 +605,21 @@ mod tests {
         assert_eq!((base.repairs.filled, base.repairs.unstamped), (2, 1));
         assert_eq!(base.segments, [0..4, 4..6]);
         assert_eq!(base.breaks, [(4, 9.0)]);
+    }
+
+    /// A recorder at 200 Hz whose stamps are off by up to 3 ms either way; it rests for a second after row 3000.
+    #[test]
+    fn rows_whose_stamps_jitter_are_spread_evenly() {
+        let truth = |row: u32| 0.005 * f64::from(row) + if row < 3000 { 0.0 } else { 1.0 };
+        let jitter = |row: u32| 0.006 * ((f64::from(row).sin() * 43_758.5).rem_euclid(1.0) - 0.5);
+        let mut jittered = stamps(&(0..6000).map(|row| truth(row) + jitter(row)).collect::<Vec<_>>());
+        let base = build_time_base(&mut jittered, &usual()).unwrap();
+        assert_eq!(
+            (base.kept, base.segments, base.repairs.jittered),
+            (None, vec![0..3000, 3000..6000], 6000)
+        );
+        assert!((base.step_s / 0.005 - 1.0).abs() < 0.01, "{} s", base.step_s);
+        assert!((0..6000).all(|row| (jittered.seconds[row as usize] - truth(row)).abs() < 0.008));
     }
 
     proptest! {

@@ -78,6 +78,7 @@ fn clock(a: &ActuatorChannels) -> String {
     let repaired = [
         (r.out_of_order, "out of order"),
         (r.repeated, "repeated"),
+        (r.jittered, "spread evenly, since they jitter"),
         (r.unstamped, "without a timestamp"),
         (r.filled, "filled in from the rate"),
     ];
