@@ -28,8 +28,8 @@ const MAPPING: [&str; 8] = [
 const UNIT: [(&str, &str); 6] = [
     (
         "rate_too_low",
-        "check `clock.unit` (ms against s) and `clock.rate_hz`: by these times the log has too few samples a second; \
-         if they are right, record at 20 samples a second or more",
+        "check `clock.unit` (ms against s), and `clock.tick_s` if rows share timestamps: by these times the log has too \
+         few samples a second; if they are right, record at 20 samples a second or more",
     ),
     (
         "load_too_small",
@@ -46,7 +46,8 @@ const UNIT: [(&str, &str); 6] = [
     ),
     (
         "motion_unexplained",
-        "check that load and positions are of the same actuator, and `stiffness_n_per_m` of the part",
+        "check that load and positions are of the same actuator, `stiffness_n_per_m` of the part, and `wraps_at` of a \
+         motor angle that starts again at each turn",
     ),
     (
         STIFFNESS_UNLIKE,

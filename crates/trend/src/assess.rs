@@ -1,22 +1,20 @@
 //! Assessment of one unit at a date.
 
-use crate::data::series::{DAY_US, Flight, Series};
+use crate::data::series::{DAY_US, Series};
 use crate::error::Error;
 use crate::math::{NORMAL_95, normal_cdf};
 use crate::measured::exceedance::Exceedance;
 use crate::measured::level::Level;
 use crate::measured::rise::Rise;
-use crate::prior::FleetPrior;
+use crate::prior::{FleetPrior, UsageAxis};
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
-use crate::statement::types::{Crossing, ForecastMethod, Rate, Utilization, WearStatus};
+use crate::statement::types::{Crossing, ForecastMethod, Rate, WearStatus};
+use crate::statement::utilization::utilization;
 use crate::unit_fit::{Fit, UnitFit};
-
-/// Number of last days that give the utilisation.
-const UTILIZATION_DAYS: i64 = 90;
 
 /// Assesses a unit at a date from its flights until then.
 ///
@@ -111,6 +109,7 @@ fn by_line(rise: &Rise, settings: &Settings, elapsed_hours: f64) -> Assessment {
             p95_hours: within(rise.p95_hours),
         }),
         method: Some(ForecastMethod::Line),
+        axis: Some(UsageAxis::Hours),
         rate: Some(Rate {
             p05_m_per_hour: rise.m_per_hour - reach,
             m_per_hour: rise.m_per_hour,
@@ -135,6 +134,7 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
     Assessment {
         crossing: Some(remaining.crossing()),
         method: Some(fit.method),
+        axis: Some(fit.prior.axis),
         rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
         wear: wear_status(growth_probability),
         growth_probability: Some(growth_probability),
@@ -158,21 +158,6 @@ fn chance_by(hours: f64, rise: &Rise) -> f64 {
     }
     let spread = (rise.p50_hours / rise.p05_hours.max(f64::MIN_POSITIVE)).ln() / NORMAL_95;
     normal_cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
-}
-
-/// The pace of the last ninety days of flights; nothing when they show no hours.
-fn utilization(flights: &[Flight]) -> Option<Utilization> {
-    let last = flights.last()?;
-    let since = |flight: &Flight| last.departure_us.saturating_sub(flight.departure_us);
-    let first = &flights[flights.partition_point(|f| since(f) > UTILIZATION_DAYS * DAY_US)];
-    let (hours, days) = (last.hours - first.hours, since(first) as f64 / DAY_US as f64);
-    let flights = last.flights - first.flights;
-    (hours > 0.0 && days > 0.0).then(|| Utilization {
-        hours_per_day: hours / days,
-        hours_per_day_se: hours / days / flights.max(1.0).sqrt(),
-        flights_per_day: flights / days,
-        hours_per_flight: hours / flights,
-    })
 }
 
 /// Between one half and 95 % neither growth nor its absence is reported.

@@ -15,7 +15,7 @@ use crate::completion;
 #[derive(Debug, ClapArgs)]
 pub(crate) struct QueryArgs {
     /// `tail`, `serial`, `flight` or `position`; may be left out where the value is known.
-    #[arg(value_name = "BY", required_unless_present_any = ["tail", "serial", "flight", "position"])]
+    #[arg(value_name = "BY", required_unless_present_any = ["tail", "serial", "flight", "position", "part", "since", "until", "last"])]
     pub first: Option<String>,
     /// Value to match.
     #[arg(value_name = "ID", add = ArgValueCompleter::new(completion::queried))]

@@ -54,7 +54,9 @@ pub(crate) fn note_future(as_of: Option<Timestamp>, output: &Output) {
     const A_DAY: jiff::SignedDuration = jiff::SignedDuration::from_hours(24);
     if let Some(as_of) = as_of.filter(|as_of| *as_of > Timestamp::now() + A_DAY) {
         let date = as_of.strftime("%Y-%m-%d");
-        output.note(&format!("--as-of {date} is in the future: states assume that no unit flies until then"));
+        output.note(&format!(
+            "--as-of {date} is in the future: until then, usage goes on at each unit's own rate"
+        ));
     }
 }
 

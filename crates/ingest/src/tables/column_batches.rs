@@ -319,6 +319,11 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         )));
     }
     bounds::check("columns", names.len() as u64, TABLE_COLUMNS as u64)?;
+    if let Some(line) = commented_row(&text[mark..], names.len()) {
+        return Err(ErrorKind::table(format!(
+            "line {line} begins with `#` and has as many fields as the header: put its first field in quotes, or delete the line"
+        )));
+    }
     let mut known = BTreeSet::new();
     if let Some(twice) = names.iter().find(|name| !name.is_empty() && !known.insert(**name)) {
         return Err(ErrorKind::table(format!("the header has column `{twice}` twice: rename or remove one")));
@@ -335,6 +340,16 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         |error| ErrorKind::table(format!("{error} (lines that are blank or comments are not counted)"));
     let batches = Box::new(reader.map(move |batch| batch.map_err(unread)));
     Ok(Rows { schema, batches, before: 0 })
+}
+
+/// The first line that is a comment by its `#`, and a row by its number of fields; the header comes before it.
+fn commented_row(text: &[u8], fields: usize) -> Option<usize> {
+    let lines = text.split(|byte| *byte == b'\n').zip(1..);
+    let mut rows = lines.skip_while(|(line, _)| line.is_empty() || line.starts_with(b"#"));
+    let is_row = |line: &[u8]| {
+        line.starts_with(b"#") && line.iter().filter(|byte| **byte == b',').count() + 1 == fields
+    };
+    rows.find(|(line, _)| fields > 1 && is_row(line)).map(|(_, line)| line)
 }
 
 /// Format of a table that is no CSV in UTF-8, by its first bytes.

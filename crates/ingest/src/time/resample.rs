@@ -32,7 +32,8 @@ pub(crate) fn interpolate_at(
     between: Interpolation,
 ) -> Vec<f64> {
     let TimeSeries { at_s, values, step_s } = channel;
-    let same_s = 1e-6 * step_s;
+    // Seconds since 1970 are rounded to 2.4e-7 s.
+    let same_s = (1e-6 * step_s).max(1e-6_f64.min(1e-2 * step_s));
     let known: Vec<u32> = (0..values.len() as u32).filter(|&i| !values[i as usize].is_nan()).collect();
     let (mut next, mut given) = (0, 0);
     let mut interpolated = |instant: f64| {

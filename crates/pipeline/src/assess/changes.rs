@@ -179,7 +179,9 @@ fn cause(
             (Cause::Limit, format!("limit_m changed from {from} to {to} ({place})"))
         }
         _ if !moved.is_empty() => (Cause::Bookkeeping, moved.join("; ")),
-        _ if !has_flights => (Cause::Bookkeeping, "its records were withdrawn".to_owned()),
+        _ if !has_flights => {
+            (Cause::Bookkeeping, "its records were withdrawn, or are another unit's now".to_owned())
+        }
         Some(before)
             if before.settings_digest.as_ref().zip(now.settings_digest.as_ref()).is_some_and(differ) =>
         {
@@ -197,6 +199,9 @@ fn cause(
             (Cause::Bookkeeping, "it was removed in the installations table".to_owned())
         }
         _ if run.with_records.contains(&unit) => (Cause::Records, "records of this run".to_owned()),
-        _ => (Cause::Date, "no record of its own: the date, or records of other units".to_owned()),
+        _ => (
+            Cause::Date,
+            "no record of its own: the date, the operator's tables, or records of other units".to_owned(),
+        ),
     }
 }

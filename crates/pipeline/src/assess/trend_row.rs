@@ -97,7 +97,7 @@ impl RowSources<'_> {
             growth_probability: trend.growth_probability,
             wear_law: trend.law.map(|(law, _)| law.to_string()),
             wear_law_probability: trend.law.map(|(_, share)| share),
-            usage_axis: prior.map(|prior| prior.axis.to_string()),
+            usage_axis: trend.axis.or_else(|| Some(prior?.axis)).map(|axis| axis.to_string()),
             trend_p_value: None,
             change_points: trend.changes.iter().filter_map(|change| self.change_point(change)).collect(),
             limit_m,

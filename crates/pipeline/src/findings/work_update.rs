@@ -90,6 +90,10 @@ fn of_open(
         let reason = format!("removed from {} of {} on {date}", last.position, last.tail_number);
         return closed(WorkEventKind::Removed, reason, removed);
     }
+    if finding.is_none() && !tables.is_known(&name) {
+        let reason = "no installation and no record is this unit's any more".to_owned();
+        return closed(WorkEventKind::Removed, reason, now);
+    }
     let known = TailPosition { tail_number: request.tail_number.clone(), position: request.position.clone() };
     let installed = tables.place(&name);
     let place = installed.map_or_else(|| known.clone(), TailPosition::of);
@@ -192,6 +196,11 @@ impl<'a> Tables<'a> {
     fn removal(&self, name: &UnitKey) -> Option<(&'a Installation, Timestamp)> {
         let last = self.installations.removal(name, self.at)?;
         Some((last, last.removed_utc?))
+    }
+
+    /// Whether a unit has ever been installed.
+    fn is_known(&self, name: &UnitKey) -> bool {
+        !self.installations.of(name).is_empty()
     }
 
     /// Where a unit is installed.

@@ -17,6 +17,8 @@ const OTHER_GAP: &str = "gap_midrange_fitted_m";
 /// The columns with the largest gap along the stroke, where it varies, and its standard error.
 const LARGEST_GAP: &str = "gap_largest_m";
 const LARGEST_GAP_ERROR: &str = "gap_largest_se_m";
+/// How tables made elsewhere write that a record has no flag.
+const NO_FLAG: [&str; 8] = ["[]", "false", "0", "none", "nan", "null", "na", "-"];
 /// The column with the digest of the settings of the estimate.
 const SETTINGS: &str = "config_digest";
 
@@ -74,8 +76,9 @@ pub(crate) fn add_external(
 ) -> Result<(), ingest::Error> {
     chunk.column(&["serial_number", "serial"])?;
     let flags = chunk.texts(chunk.find(&["flags"]))?;
-    // A record with any flag contradicts itself, so that it alone confirms nothing. A list without flags is written as `[]`.
-    let other_gap_m = |row, gap_m| flags.get(row).filter(|flags| *flags != "[]").map(|_| gap_m);
+    // A record with any flag contradicts itself, so that it alone confirms nothing.
+    let is_flag = |text: &&str| !NO_FLAG.contains(&text.to_ascii_lowercase().as_str());
+    let other_gap_m = |row, gap_m| flags.get(row).filter(is_flag).map(|_| gap_m);
     add(rows, chunk, by_largest, other_gap_m, |_| ())
 }
 

@@ -92,11 +92,12 @@ impl FlightExtras {
         self.gap_se_m.is_sign_negative()
     }
 
-    /// The flight as the trend knows it, in an installation. The standard error spans both estimators where they disagree.
-    pub(crate) fn observation(&self, flown: &FlightRow, installation: u32) -> Observation {
+    /// The flight as the trend knows it, in an installation, with its number among those that depart with it. The standard error spans both estimators where they disagree.
+    pub(crate) fn observation(&self, flown: &FlightRow, installation: u32, flight: u32) -> Observation {
         Observation {
             departure_us: flown.departure_us,
             installation,
+            flight,
             flight_hours: known(self.flight_hours),
             tail_hours_end: known(self.tail_hours_end),
             load_reversals: (self.load_reversals != u64::MAX).then_some(self.load_reversals),

@@ -20,6 +20,7 @@ use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
 use crate::assess::trends;
 use crate::error::Error;
 use crate::findings::FollowUp;
+use crate::fleet::bookkeeping::inspections::InspectionRow;
 use crate::fleet::bookkeeping::installation_index::dates_ahead;
 use crate::fleet::bookkeeping::join::Bookkeeping;
 use crate::fleet::bookkeeping::maintenance_log::unknown_units;
@@ -122,8 +123,8 @@ pub(crate) fn execute_run(
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
     refuse_placeholders(config, &installations)?;
-    inspections::read(config)?;
-    maintenance_log::read(config)?;
+    let inspections = inspections::read(config)?.unwrap_or_default();
+    let maintenance = maintenance_log::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
     let mut writer = store.lock(&Holder::this_process(), context.wait)?;
@@ -133,7 +134,8 @@ pub(crate) fn execute_run(
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed;
     report.unknown_units = unknown_units(config, &installations);
-    report.dates_ahead = dates_ahead(&installations, started_utc);
+    let others = maintenance_log::dates(&maintenance).chain(inspections.iter().map(InspectionRow::date));
+    report.dates_ahead = dates_ahead(&installations, others, started_utc);
     let config_path = config.file.display().to_string();
     let to_do: Vec<LogRecord> =
         plan.work.iter().map(|work| summary::not_reached(work, &report.run_id)).collect();

@@ -245,6 +245,7 @@ impl RunSummary {
         self.quiet = quiet(accounts.clone(), days, self.newest_departure_utc);
         self.quiet_now = quiet(accounts.clone(), days, Some(Timestamp::now())).len();
         self.notes.extend(coverage::departures_in_another_zone(config, accounts.clone()));
+        self.notes.extend(coverage::logs_without_row(config, accounts.clone()));
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }

@@ -202,7 +202,8 @@ fn a_date_ahead_whose_day_and_month_exchanged_are_past_names_that_date() {
     let (installed, removed) = (utc("2026-08-24T00:00:00Z"), utc("2026-12-10T06:00:00Z"));
     let installation = fleet::installation(["N1", "left", "P", "S"], installed, Some(removed));
     let table = Installations::new(vec![installation]).unwrap();
-    let named = |now: &str| dates_ahead(&table, utc(now)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    let named =
+        |now: &str| dates_ahead(&table, [], utc(now)).iter().map(ToString::to_string).collect::<Vec<_>>();
     let likely =
         "P / S: `removed_utc` is 2026-12-10, a date to come; day and month may be exchanged (2026-10-12)";
     assert_eq!(named("2026-11-23T00:00:00Z"), [likely]);

@@ -123,7 +123,7 @@ fn requests_open_move_close_and_reopen_as_the_stories_tell() {
         }
         stories += 1;
     }
-    assert_eq!(stories, 7);
+    assert_eq!(stories, 8);
 }
 
 /// Numbers never repeat, whatever is interleaved; a run between two commands sees their events.

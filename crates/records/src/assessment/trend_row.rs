@@ -80,7 +80,7 @@ row! {
         pub wear_law: Option<String>,
         /// Probability of `wear_law`.
         pub wear_law_probability: Option<f64>,
-        /// What the wear of the part number follows: `flight_hours`, `flights` or `load_reversals`.
+        /// What the forecast counts wear in: `flight_hours`, `flights` or `load_reversals`.
         pub usage_axis: Option<String>,
         /// Always null; kept for scripts that select it.
         pub trend_p_value: Option<f64>,
@@ -116,13 +116,13 @@ row! {
         pub check_probability: Option<f64>,
         /// Probability that the gap is at or above `limit_m` on `as_of_utc`.
         pub over_limit_probability: Option<f64>,
-        /// Flight hours per day in the last ninety days.
+        /// Flight hours per day at present.
         pub hours_per_day: Option<f64>,
         /// Standard error of `hours_per_day`.
         pub hours_per_day_se: Option<f64>,
-        /// Flights per day in the last ninety days.
+        /// Flights per day at present.
         pub flights_per_day: Option<f64>,
-        /// Flight hours per flight in the last ninety days.
+        /// Flight hours per flight at present.
         pub hours_per_flight: Option<f64>,
         /// Source of the hours: `flights_table`, `tail_hours` or `logged_flights`.
         pub usage_source: Option<String>,

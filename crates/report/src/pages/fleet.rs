@@ -235,7 +235,7 @@ fn inspection_agreement(report: &Report) -> String {
     let differences: Vec<f64> = checks.filter_map(ReportInspectionRow::difference_m).collect();
     let words = match Agreement::of(&differences) {
         Some(found) => format!(
-            "Estimate minus inspection over {}: {} ± {} µm (90 %); shown, never applied.",
+            "Estimate minus inspection over {}: {} ± {} µm (90 %); no estimate is corrected by it.",
             counted(differences.len(), "pair"),
             micrometres(found.bias_m),
             micrometres(found.half_width_m),

@@ -16,6 +16,8 @@ pub struct Observation {
     /// The installation, interned: one period of the unit on one tail and position. A unit that was
     /// taken off and came back to the same tail has a new one, or another unit's hours would be its.
     pub installation: u32,
+    /// Which of the flights that depart at one time, where only their day is known; else 0.
+    pub flight: u32,
     /// Length of the flight, hours.
     pub flight_hours: Option<f64>,
     /// The tail's total hours after the flight.
@@ -96,8 +98,9 @@ pub struct MaintenanceEvent {
 ///    is the flight's own hours, and the usual ones where it states none.
 /// 3. Hours beyond the flight's own belong to flights without a row. They count as flights and as
 ///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
-/// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the larger gap, then the
-///    smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is flagged.
+/// 4. Two rows of one installation, departure and flight number are one flight: the row with a gap wins, then the larger
+///    gap, then the smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is flagged.
+/// 5. Where no row has flown for longer than 0 hours, the hours are unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
@@ -182,6 +185,9 @@ impl Series {
 fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observation>, RowFaults), Error> {
     let mut rows: Vec<Observation> = rows.into_iter().collect();
     let mut faults = RowFaults::default();
+    if rows.iter().all(|row| row.flight_hours.is_none_or(|hours| hours == 0.0)) {
+        rows.iter_mut().for_each(|row| row.flight_hours = None);
+    }
     for row in &mut rows {
         let is_negative = |hours: Option<f64>| hours.is_some_and(|hours| hours < 0.0);
         faults.negative_usage +=
@@ -190,7 +196,8 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     }
     rows.sort_unstable_by(order);
     rows.dedup_by(|next, kept| {
-        let is_same = (next.departure_us, next.installation) == (kept.departure_us, kept.installation);
+        let flight = |row: &Observation| (row.departure_us, row.installation, row.flight);
+        let is_same = flight(next) == flight(kept);
         if is_same && differ(next.gap_m, kept.gap_m) && !kept.is_doubtful {
             kept.is_doubtful = true;
             faults.contradictions += 1;
@@ -200,6 +207,7 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     let is_in_flight = |[earlier, later]: &&[Observation; 2]| {
         let lasted_us = earlier.flight_hours.unwrap_or(0.0) * HOUR_US;
         earlier.installation == later.installation
+            && earlier.flight == later.flight
             && ((later.departure_us.saturating_sub(earlier.departure_us)) as f64) < lasted_us / 2.0
     };
     faults.overlaps = rows.array_windows().filter(is_in_flight).count();
@@ -246,7 +254,7 @@ fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
     let number = |v: Option<f64>| v.unwrap_or(f64::INFINITY);
     let larger = |o: &Observation| o.gap_m.map(|gap_m| -gap_m);
     let numbers = |o: &Observation| [larger(o), o.gap_se_m, o.tail_hours_end, o.flight_hours].map(number);
-    let place = |o: &Observation| (o.departure_us, o.installation, o.gap_m.is_none());
+    let place = |o: &Observation| (o.departure_us, o.installation, o.flight, o.gap_m.is_none());
     let by_number = || numbers(a).iter().zip(numbers(b)).map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne());
     place(a)
         .cmp(&place(b))

@@ -2,6 +2,7 @@
 
 use crate::measured::level::Level;
 use crate::measured::record::Record;
+use crate::prior::UsageAxis;
 use crate::statement::state::{Reason, State};
 use crate::statement::types::{ChangePoint, Crossing, ForecastMethod, Rate, Utilization, WearStatus};
 use crate::wear::bank::WearClass;
@@ -37,6 +38,8 @@ pub struct Assessment {
     pub crossing: Option<Crossing>,
     /// What the crossing was computed by.
     pub method: Option<ForecastMethod>,
+    /// The usage that the forecast counts wear in.
+    pub axis: Option<UsageAxis>,
     /// Flight hours since the last flight, at the unit's own rate.
     pub elapsed_hours: f64,
     /// Probability that the act limit is met before the next check ([`crate::Settings::check_interval_hours`]).

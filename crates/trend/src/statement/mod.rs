@@ -6,3 +6,4 @@ pub(crate) mod history;
 pub(crate) mod level;
 pub(crate) mod state;
 pub(crate) mod types;
+pub(crate) mod utilization;

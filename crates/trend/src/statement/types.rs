@@ -42,7 +42,7 @@ pub struct Crossing {
     pub p95_hours: Option<f64>,
 }
 
-/// Recent utilisation of a unit, from the last ninety days of its flights.
+/// Present utilisation of a unit, from its last ninety days of flights or its last busier weeks.
 ///
 /// Dates, forecasts, removals and probabilities all convert flight hours by this one figure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -115,6 +115,7 @@ impl Drawn {
         self.rows.push(Observation {
             departure_us: self.flight * DAY_US / 2,
             installation: self.installation,
+            flight: 0,
             flight_hours: Some(HOURS),
             tail_hours_end: Some(HOURS * self.flight as f64 + 5000.0 * f64::from(self.installation)),
             load_reversals: Some(120),

@@ -40,10 +40,10 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
     row_output::write_rows(&args.rows, output, || with_remedies(&records), || verdict + &page(&records))?;
     if records.is_empty() {
         let names = selected(&query).into_iter().filter_map(|(column, name)| Some((column, name.as_ref()?)));
-        let names = names.map(|(column, name)| format!("{} `{name}`", called(column)));
+        let names: Vec<String> = names.map(|(column, name)| format!("{} `{name}`", called(column))).collect();
+        let of = if names.is_empty() { String::new() } else { format!(" of {}", names.join(", ")) };
         output.note(&format!(
-            "no record of {}{}; list all units of the store with `freeplay trend`",
-            names.collect::<Vec<_>>().join(", "),
+            "no record{of}{}; list all units of the store with `freeplay trend`",
             range(args)
         ));
     }

@@ -123,7 +123,12 @@ fn evidence(subject: &Subject<'_>, fit: &QuantityChanges) -> String {
 
 /// Likely cause of the unit's own change.
 fn cause(subject: &Subject<'_>) -> &'static str {
-    if subject.treatment.is_of_sensor() { "its sensor or wiring" } else { ChangeScope::Unit.cause() }
+    match subject.quantity {
+        // The innovations of the filter also grow with the gap.
+        Quantity::Nis => "its gap, its sensor or wiring",
+        _ if subject.treatment.is_of_sensor() => "its sensor or wiring",
+        _ => ChangeScope::Unit.cause(),
+    }
 }
 
 /// A step that a tail or a part made.

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use job::Config;
 
 use records::time::{day_text, days_between};
-use records::{Installations, PartNumber, TrendRow};
+use records::{Installation, Installations, PartNumber, TrendRow};
 use serde::Serialize;
 use store::LogRecord;
 
@@ -154,7 +154,32 @@ pub(crate) fn departures_in_another_zone<'a>(
     })
 }
 
-/// Installed positions whose channels no log has, with the number of their aircraft.
+/// Logs of which the flights table has no row, where they are most of its aircraft's logs in its time.
+pub(crate) fn logs_without_row<'a>(
+    config: &Config,
+    accounts: impl Iterator<Item = &'a LogRecord>,
+) -> Option<String> {
+    const MIN_LOGS: usize = 3;
+    let has_row = |account: &LogRecord| {
+        let (tail, id, at) =
+            (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
+        let of_tail = || config.flights.of_tail(tail.as_str());
+        let (first, last) = (of_tail().next()?.departure_utc, of_tail().last()?.departure_utc);
+        let is_row = of_tail().any(|flight| flight.departure_utc == at);
+        (first..=last).contains(&at).then(|| is_row || config.flights.of(tail, id, at).is_some())
+    };
+    let found: Vec<bool> = accounts.filter_map(has_row).collect();
+    let (all, without) = (found.len(), found.iter().filter(|has_row| !**has_row).count());
+    let table = config.document.logs.flights.as_deref().unwrap_or_default();
+    (without >= MIN_LOGS && 2 * without > all).then(|| {
+        format!(
+            "{table}: {without} of {all} logs have no row by flight number or departure; a row within 12 hours of such a log \
+             counts as its flight; write flight numbers as the logs do, or departures in UTC"
+        )
+    })
+}
+
+/// Installed positions whose channels none of the latest logs has, with the number of their aircraft.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct UnmappedPositions {
@@ -168,29 +193,34 @@ impl std::fmt::Display for UnmappedPositions {
         let tails = if self.tails == 1 { "1 tail".to_owned() } else { format!("{} tails", self.tails) };
         write!(
             f,
-            "{} of {tails}: units are installed there, and no log has their channels; check the names of columns and \
-             positions under `[channel]`",
+            "{} of {tails}: units are installed there, and no recent log has their channels; check the names of columns \
+             and positions under `[channel]`",
             self.positions.join(", ")
         )
     }
 }
 
-/// The installed positions, of aircraft with a processed log, that no log has.
+/// The installed positions, of aircraft with a processed log, that none of its latest logs has.
 pub(crate) fn unmapped_positions<'a>(
     accounts: impl Iterator<Item = &'a LogRecord>,
     installations: &Installations,
 ) -> Vec<UnmappedPositions> {
-    let mut logged = BTreeMap::<&str, BTreeSet<&str>>::new();
+    const LATEST: usize = 5;
+    let mut logs = BTreeMap::<&str, Vec<&LogRecord>>::new();
     for account in accounts.filter(|account| account.estimated + account.refused > 0) {
-        let Some(tail) = &account.tail_number else { continue };
-        logged.entry(tail).or_default().extend(account.positions.iter().map(String::as_str));
+        account.tail_number.iter().for_each(|tail| logs.entry(tail).or_default().push(account));
     }
+    logs.values_mut().for_each(|logs| logs.sort_by_key(|log| std::cmp::Reverse(log.departure_utc)));
+    let is_missing = |installation: &&Installation| {
+        let logs = logs.get(installation.tail_number.as_str()).map_or(&[][..], |logs| logs);
+        let is_in = |log: &&&LogRecord| log.positions.iter().any(|at| *at == installation.position.as_str());
+        logs.first().and_then(|newest| newest.departure_utc).is_some_and(|at| installation.covers(at))
+            && !logs.iter().take(LATEST).any(|log| is_in(&log))
+    };
     let mut missing = BTreeMap::<&str, BTreeSet<&str>>::new();
-    for installation in installations.iter() {
-        let (tail, position) = (installation.tail_number.as_str(), installation.position.as_str());
-        if logged.get(tail).is_some_and(|positions| !positions.contains(position)) {
-            missing.entry(tail).or_default().insert(position);
-        }
+    for installation in installations.iter().filter(is_missing) {
+        let tail = installation.tail_number.as_str();
+        missing.entry(tail).or_default().insert(installation.position.as_str());
     }
     let mut tails = BTreeMap::<BTreeSet<&str>, usize>::new();
     missing.into_values().for_each(|positions| *tails.entry(positions).or_default() += 1);

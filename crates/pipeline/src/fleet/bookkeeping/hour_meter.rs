@@ -1,7 +1,8 @@
 //! Check of hour-meter readings against each other: one misread digit must not become usage.
 //!
 //! Of two readings of one aircraft the later one is not smaller, and the meter gains no more hours than passed between the
-//! ends of the two flights. The longest chain of readings that agree is kept.
+//! ends of the two flights. The longest chain of readings that agree is kept. Of these, the readings of a meter that stands
+//! still while the aircraft flies are left out.
 
 use trend::Observation;
 
@@ -10,11 +11,15 @@ const ALLOWANCE_HOURS: f64 = 2.0;
 /// Readings that a chain may skip in a row.
 const MAX_SKIPPED: usize = 200;
 
-/// Drops the readings that contradict the others, installation by installation, and returns their number. Where fewer than
-/// half agree, the meter does not count hours, and all its readings are dropped.
+/// A meter that gains less than this share of the hours stated for the flights stands still.
+const LEAST_GAIN: f64 = 0.5;
+
+/// Drops the readings that contradict the others or the stated hours, installation by installation, and returns their
+/// number. Where fewer than half agree, the meter does not count hours, and all its readings are dropped.
 pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
-    let mut order: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].tail_hours_end.is_some()).collect();
-    order.sort_by_key(|&row| (rows[row].installation, rows[row].departure_us));
+    let mut all: Vec<usize> = (0..rows.len()).collect();
+    all.sort_by_key(|&row| (rows[row].installation, rows[row].departure_us));
+    let order: Vec<usize> = all.iter().copied().filter(|&row| rows[row].tail_hours_end.is_some()).collect();
     let is_of_one = |a: &usize, b: &usize| rows[*a].installation == rows[*b].installation;
     let contradicting = |of_one: &[usize]| {
         let readings: Vec<Reading> = of_one.iter().filter_map(|&row| Reading::of(&rows[row])).collect();
@@ -23,7 +28,29 @@ pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
     };
     let dropped: Vec<usize> = order.chunk_by(is_of_one).flat_map(contradicting).collect();
     dropped.iter().for_each(|&row| rows[row].tail_hours_end = None);
-    dropped.len()
+    let mut still = 0;
+    // Installation and reading of the last meter that gained, and the hours stated since.
+    let mut gained: Option<(u32, f64, f64)> = None;
+    for row in all {
+        let row = &mut rows[row];
+        let before = gained.filter(|(installation, ..)| *installation == row.installation);
+        let stated_h = before.map_or(0.0, |(.., stated_h)| stated_h) + row.flight_hours.unwrap_or(0.0);
+        gained = before.map(|(installation, meter_h, _)| (installation, meter_h, stated_h));
+        let Some(reading_h) = row.tail_hours_end else { continue };
+        let lag_h = |(_, meter_h, _): (u32, f64, f64)| {
+            let gain_h = reading_h - meter_h;
+            (gain_h < LEAST_GAIN * stated_h).then_some(stated_h - gain_h)
+        };
+        match before.and_then(lag_h) {
+            // A rounded reading lags by less; its flight has its own hours all the same.
+            Some(lag_h) => {
+                row.tail_hours_end = None;
+                still += usize::from(lag_h > ALLOWANCE_HOURS);
+            }
+            None => gained = Some((row.installation, reading_h, 0.0)),
+        }
+    }
+    dropped.len() + still
 }
 
 /// A reading, and when its flight ended.
@@ -101,6 +128,15 @@ mod tests {
             }
         }
         assert_eq!(kept(rows((0..20).map(sound))).0, 0);
+    }
+
+    /// The meter stands still for five flights, and counts on as if it had not.
+    #[test]
+    fn a_meter_that_stands_still_counts_only_while_it_moves() {
+        let sound = |at: usize| 2_000.0 + 2.0 * at as f64;
+        let (dropped, kept) = kept(rows((0..20).map(|at| sound(if (8..13).contains(&at) { 7 } else { at }))));
+        // The first one may be a rounded reading.
+        assert_eq!((dropped, kept), (4, (0..20).map(|at| !(8..13).contains(&at)).collect()));
     }
 
     #[test]

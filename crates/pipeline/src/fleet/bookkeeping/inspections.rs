@@ -8,6 +8,7 @@ use records::time::days_between;
 use records::{Installation, SerialNumber};
 
 use crate::error::Error;
+use crate::fleet::bookkeeping::installation_index::DateAhead;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::UnitKey;
 
@@ -32,6 +33,12 @@ pub(crate) struct InspectionRow {
 impl InspectionRow {
     pub(crate) fn is_of(&self, unit: &UnitKey) -> bool {
         self.serial_number == unit.1 && (self.part_number.is_none() || self.part_number == unit.0)
+    }
+
+    /// When it was made.
+    pub(crate) fn date(&self) -> DateAhead {
+        let part_number = self.part_number.clone().unwrap_or_else(|| "any part".to_owned());
+        DateAhead::new(part_number, self.serial_number.clone(), "date_utc", self.date_utc)
     }
 
     /// Median of the last estimates before it, m, and their number.

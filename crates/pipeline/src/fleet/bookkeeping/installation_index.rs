@@ -47,17 +47,28 @@ impl<'a> InstallationIndex<'a> {
     }
 }
 
-/// A date of the installations table that is still to come.
+/// A date of the installations, maintenance or inspections table that is still to come.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct DateAhead {
     pub part_number: String,
     pub serial_number: String,
-    /// `installed_utc` or `removed_utc`.
+    /// `installed_utc`, `removed_utc`, or the date of a maintenance or an inspection.
     pub column: &'static str,
     pub date: Timestamp,
     /// The same date with day and month exchanged, if that is past.
     pub exchanged: Option<Timestamp>,
+}
+
+impl DateAhead {
+    pub(crate) fn new(
+        part_number: String,
+        serial_number: String,
+        column: &'static str,
+        date: Timestamp,
+    ) -> Self {
+        Self { part_number, serial_number, column, date, exchanged: exchanged(date) }
+    }
 }
 
 /// Part, serial number, column and date, and what may be wrong with it.
@@ -73,22 +84,20 @@ impl std::fmt::Display for DateAhead {
     }
 }
 
-/// The dates of the installations table that are more than a day ahead of `now`.
-pub fn dates_ahead(installations: &Installations, now: Timestamp) -> Vec<DateAhead> {
+/// The dates of the installations table, and of the `others`, that are more than a day ahead of `now`.
+pub fn dates_ahead(
+    installations: &Installations,
+    others: impl IntoIterator<Item = DateAhead>,
+    now: Timestamp,
+) -> Vec<DateAhead> {
     let dates = |i: &Installation| {
         let columns = [("installed_utc", Some(i.installed_utc)), ("removed_utc", i.removed_utc)];
-        let ahead = columns.into_iter().filter_map(|(column, date)| Some((column, date?)));
-        let ahead = ahead.filter(|(_, date)| days_between(now, *date) > 1.0);
-        let row = |(column, date)| DateAhead {
-            part_number: i.part_number.to_string(),
-            serial_number: i.serial_number.to_string(),
-            column,
-            date,
-            exchanged: exchanged(date).filter(|other| *other <= now),
-        };
-        ahead.map(row).collect::<Vec<_>>()
+        let (part, serial) = (i.part_number.to_string(), i.serial_number.to_string());
+        columns.map(|(column, date)| Some(DateAhead::new(part.clone(), serial.clone(), column, date?)))
     };
-    installations.iter().flat_map(dates).collect()
+    let all = installations.iter().flat_map(dates).flatten().chain(others);
+    let ahead = all.filter(|row| days_between(now, row.date) > 1.0);
+    ahead.map(|row| DateAhead { exchanged: row.exchanged.filter(|other| *other <= now), ..row }).collect()
 }
 
 /// A date with day and month exchanged, if there is one.

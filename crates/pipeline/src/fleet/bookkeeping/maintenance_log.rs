@@ -3,12 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ingest::tables::{TableBatch, name, utc};
+use jiff::Timestamp;
 use job::Config;
 use records::{Installations, PartNumber, SerialNumber};
 use serde::Serialize;
 use trend::MaintenanceEvent;
 
 use crate::error::Error;
+use crate::fleet::bookkeeping::installation_index::DateAhead;
 
 /// Entries by part and serial number.
 pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
@@ -35,6 +37,16 @@ pub fn read(config: &Config) -> Result<MaintenanceLog, Error> {
         maintenance.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
     }
     Ok(maintenance)
+}
+
+/// The dates of all entries.
+pub(crate) fn dates(log: &MaintenanceLog) -> impl Iterator<Item = DateAhead> {
+    log.iter().flat_map(|((part, serial), events)| {
+        events.iter().filter_map(|event| {
+            let done = Timestamp::from_microsecond(event.utc_us).ok()?;
+            Some(DateAhead::new(part.clone(), serial.clone(), "utc", done))
+        })
+    })
 }
 
 /// A row of the maintenance or the inspections table about a unit that was never installed.

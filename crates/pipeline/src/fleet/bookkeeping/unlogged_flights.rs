@@ -1,7 +1,7 @@
 //! Flights of the flights table that left no record: an actuator wears in them all the same.
 
 use ingest::tables::flights::Flights;
-use jiff::SignedDuration;
+use jiff::{SignedDuration, Timestamp};
 use records::{Flight, Installation};
 
 use crate::fleet::flight_row::FlightRow;
@@ -9,6 +9,14 @@ use crate::fleet::histories::History;
 
 /// Longest distance between the departures of a flight and a record of the same name: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
+
+/// Microseconds of a day.
+pub(super) const DAY_US: i64 = 86_400_000_000;
+
+/// Whether a time is that of a day alone.
+pub(super) fn is_day(utc_us: i64) -> bool {
+    utc_us % DAY_US == 0
+}
 
 /// Flights of a unit's installations for which it has no row, each with the index of its installation. None if none of
 /// the unit's rows lies in an installation: the table does not describe such a history.
@@ -22,11 +30,32 @@ pub(crate) fn unlogged_flights<'a>(
         return Vec::new();
     }
     let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
-        let flights = table.of_tail(installation.tail_number.as_str());
-        let missing = flights.filter(|f| installation.covers(f.departure_utc) && !is_logged(f, history));
-        missing.map(move |flight| (index, flight))
+        let tail = installation.tail_number.as_str();
+        let flights = table.of_tail(tail).filter(|f| installation.covers(f.departure_utc));
+        let (logged, mut missing): (Vec<_>, Vec<_>) = flights.partition(|flight| is_logged(flight, history));
+        let records = history.flights().iter().filter(|flown| {
+            let place = history.place(flown).tail_number.as_deref();
+            place == Some(tail) && installation.covers(flown.departure_utc())
+        });
+        let records: Vec<Timestamp> = records.map(FlightRow::departure_utc).collect();
+        // By other names, or in another time zone, a table would count most flights twice.
+        if 2 * logged.len() < records.len() {
+            leave_out_nearest(&mut missing, records);
+        }
+        missing.into_iter().map(move |flight| (index, flight)).collect::<Vec<_>>()
     });
     missing.collect()
+}
+
+/// Leaves out one flight within 12 hours of each record, as far as there is one.
+fn leave_out_nearest(flights: &mut Vec<&Flight>, records: Vec<Timestamp>) {
+    for departure_utc in records {
+        let apart = |flight: &Flight| flight.departure_utc.duration_since(departure_utc).abs();
+        let near = flights.iter().enumerate().min_by_key(|(_, flight)| apart(flight));
+        if let Some(at) = near.filter(|(_, flight)| apart(flight) <= SAME_FLIGHT).map(|(at, _)| at) {
+            flights.remove(at);
+        }
+    }
 }
 
 /// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure within

@@ -10,7 +10,8 @@ use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log;
-use crate::fleet::bookkeeping::unlogged_flights::unlogged_flights;
+use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day, unlogged_flights};
+use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{History, UnitKey};
 
 /// The operator's tables about units and flights.
@@ -69,8 +70,13 @@ impl<'a> OperatorTables<'a> {
         series.faults.meter_readings = dropped;
         // None is recorded of a unit without a part number.
         let unit = name.0.clone().map(|part| (part, name.1.clone()));
-        let events = unit.and_then(|unit| self.maintenance.get(&unit).cloned());
-        Ok(series.with_maintenance(events.unwrap_or_default()))
+        let mut events = unit.and_then(|unit| self.maintenance.get(&unit).cloned()).unwrap_or_default();
+        // Work without a time was done after the last flight of its day.
+        for event in events.iter_mut().filter(|event| is_day(event.utc_us)) {
+            let of_day = series.flights_until(event.utc_us + DAY_US - 1);
+            event.utc_us = of_day.last().map_or(event.utc_us, |last| event.utc_us.max(last.departure_us + 1));
+        }
+        Ok(series.with_maintenance(events))
     }
 }
 
@@ -81,16 +87,28 @@ fn observations(
     unlogged: &[(usize, &records::Flight)],
 ) -> Vec<Observation> {
     let outside = history.place_ranks();
+    let mut before: Option<(&FlightRow, u32)> = None;
     let seen = history.flights().iter().map(|f| {
+        // Records of one day without a time are different flights if their names differ.
+        let flight = match before.filter(|(last, _)| last.departure_us() == f.departure_us()) {
+            Some((last, number)) if is_day(f.departure_us()) => {
+                number + u32::from(history.flight_id(last) != history.flight_id(f))
+            }
+            _ => 0,
+        };
+        before = Some((f, flight));
         // Numbers beyond the installations are those of places without one.
         let installation = history.installation(f, installations);
         let installation = installation.unwrap_or_else(|| installations.len() + outside[f.place as usize]);
-        history.extras(f).observation(f, installation as u32)
+        history.extras(f).observation(f, installation as u32, flight)
     });
     let mut observations: Vec<Observation> = seen.collect();
-    observations.extend(unlogged.iter().map(|(installation, flight)| Observation {
+    let numbers = observations.len() as u32..;
+    observations.extend(unlogged.iter().zip(numbers).map(|((installation, flight), number)| Observation {
         departure_us: flight.departure_utc.as_microsecond(),
         installation: *installation as u32,
+        // A day alone is read as its noon.
+        flight: if is_day(flight.departure_utc.as_microsecond() - DAY_US / 2) { number } else { 0 },
         flight_hours: flight.flight_hours,
         tail_hours_end: flight.tail_hours_end,
         ..Observation::default()
