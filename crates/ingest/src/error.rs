@@ -1,20 +1,25 @@
 //! Why a log or a table cannot be used: a stable code, the place, what was found and what to do.
+//!
+//! A cause that one place finds is described there; causes that several places find are described here.
 
+use std::fmt::{self, Display};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use records::Diagnostic;
-use strum::EnumMessage;
 
 use crate::bounds::Excess;
 use crate::io::transient;
-use crate::mapping::column_pattern::PLACEHOLDER;
+use crate::mapping::column_pattern::{PLACEHOLDER, nearest};
 
 /// Code of a read that failed for a cause which may pass by itself.
 const READ_FAILED: &str = "read_failed";
 
 /// Code of a file that the system does not open or read, because of permissions for one.
 const UNREADABLE: &str = "unreadable";
+
+/// Code of a column that holds more or fewer samples than its table.
+const ROW_COUNT_DIFFERS: &str = "row_count_differs";
 
 /// Whether an error of this code may pass within seconds, so that the log is worth another attempt at once.
 pub fn is_transient(code: &str) -> bool {
@@ -28,322 +33,235 @@ pub fn is_passing(code: &str) -> bool {
 }
 
 /// One file's trouble.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {kind}", file.display())]
-pub struct Error {
-    file: PathBuf,
-    #[source]
-    pub(crate) kind: Box<ErrorKind>,
-}
+#[derive(Debug)]
+pub struct Error(Box<Diagnostic>);
 
 impl Error {
-    /// A failed read in place of what a parser made of it.
-    pub(crate) fn new(file: &Path, kind: ErrorKind) -> Self {
-        let failed_read = match &kind {
-            ErrorKind::NotParquet { detail } | ErrorKind::Decode { detail, .. } => {
-                object_io::system_error(detail)
-            }
-            _ => None,
-        };
-        let kind = failed_read.map_or(kind, |source| ErrorKind::Unreadable { source });
-        Self { file: file.to_owned(), kind: Box::new(kind) }
-    }
-
     /// The form in which people and scripts see it.
     pub fn diagnostic(&self) -> Diagnostic {
-        self.kind.diagnostic().in_file(self.file.display())
+        self.0.as_ref().clone()
+    }
+
+    /// Whether a column holds more or fewer samples than its table.
+    pub(crate) fn is_row_count(&self) -> bool {
+        self.0.code == ROW_COUNT_DIFFERS
     }
 }
 
-/// Kind of an error: one variant for each different remedy.
-///
-/// The name of a variant is its code where no other is given; its message is the remedy. Rows count from 0.
-#[derive(Debug, thiserror::Error, strum::IntoStaticStr, strum::EnumMessage)]
-#[strum(serialize_all = "snake_case")]
-pub(crate) enum ErrorKind {
-    #[error("{}", unreadable(source).0)]
-    Unreadable {
-        #[from]
-        source: io::Error,
-    },
-    #[error(transparent)]
-    Object(#[from] object_io::Error),
-    #[error("the log has no rows")]
-    #[strum(
-        serialize = "empty_log",
-        message = "file is empty; delete it or ignore it. It is skipped until it changes"
-    )]
-    Empty,
-    #[error("cannot read as Parquet: {detail}")]
-    #[strum(message = "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`")]
-    NotParquet { detail: String },
-    #[error("this is {format}, not a Parquet file")]
-    #[strum(
-        serialize = "not_parquet",
-        message = "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
-    )]
-    ForeignFormat { format: &'static str },
-    #[error(transparent)]
-    #[strum(
-        message = "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
-    )]
-    BeyondLimit(#[from] Excess),
-    #[error("{}", match column { Some(column) => format!("column `{column}` is encrypted"), None => "the file is encrypted".into() })]
-    #[strum(
-        message = "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"
-    )]
-    Encrypted { column: Option<String> },
-    #[error("the file uses the encoding {encoding}, which is not supported")]
-    #[strum(
-        message = "have the recorder write PLAIN, BYTE_STREAM_SPLIT or dictionary encoding, or rewrite the file with the tool that wrote it"
-    )]
-    EncodingUnsupported { encoding: String },
-    #[error("the log has {count} columns called `{column}`")]
-    #[strum(message = "give each column a name of its own where the file is written, or map another column")]
-    DuplicateColumn { column: String, count: usize },
-    #[error("a column cannot be decoded: {detail}")]
-    #[strum(serialize = "decode_failed")]
-    Decode { column: String, row_group: Option<u64>, detail: String },
-    #[error("the column holds {found} rows where the footer declares {declared}")]
-    #[strum(serialize = "row_count_differs")]
-    RowCount { column: String, found: u64, declared: u64 },
-    #[error("the log has no column `{column}`")]
-    ColumnMissing { column: String, nearest: Option<String> },
-    #[error("no file of group `{group}` belongs to this flight")]
-    #[strum(
-        message = "check that the file has arrived and has the same tail and flight (see `freeplay check`)"
-    )]
-    GroupMissing { group: String },
-    #[error("the lists in `{column}` and `{other}` differ in length")]
-    #[strum(
-        message = "if the channel has timestamps of its own, name them in its `time_column`; else all lists of a row must hold as many samples"
-    )]
-    ListLengths { column: String, other: String },
-    #[error("the clocks `{column}` and `{other}` cannot be brought together")]
-    #[strum(
-        message = "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
-    )]
-    ClocksDiffer { column: String, other: String },
-    #[error("normalized log was written with other settings: {detail}")]
-    #[strum(
-        serialize = "normalized_otherwise",
-        message = "write it again from the recorded log: `freeplay normalize`"
-    )]
-    Normalized { detail: String },
-    #[error("the file notes {key} {noted} for column `{column}`, and the mapping has {known}")]
-    MetadataContradicts { column: String, key: &'static str, noted: String, known: String },
-    #[error("column `{column}` holds {found}, not {wanted}")]
-    #[strum(message = "map another column, or have the recorder write numbers")]
-    ColumnType { column: String, found: String, wanted: &'static str },
-    #[error("no column matches `{pattern}`")]
-    NoPosition { pattern: String, columns: Vec<String> },
-    #[error("the unit of the time column `{column}` is not known")]
-    #[strum(serialize = "time_unit_unknown", message = "set `clock.unit` to s, ms, us or ns")]
-    TimeUnit { column: String, found: String },
-    #[error("the log has no clock: neither `clock.column` nor `clock.rate_hz` is given")]
-    #[strum(message = "name the time column, or give the rate when rows are evenly spaced")]
-    NoClock,
-    #[error("time runs backwards")]
-    #[strum(
-        message = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
-    )]
-    TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
-    #[error("the log seems to hold two flights")]
-    #[strum(
-        message = "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`"
-    )]
-    SeveralFlights { column: String, row: u64, before_s: f64, after_s: f64, end_s: f64, max_gap_s: f64 },
-    #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
-    #[strum(message = "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps")]
-    RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
-    #[error("the clock is not plausible: {what} is {value_s:e} s")]
-    #[strum(message = "check `clock.column` and `clock.unit`, and that the file is intact")]
-    TimeImplausible { column: String, what: &'static str, value_s: f64, least_s: f64, most_s: f64 },
-    #[error("time does not advance")]
-    #[strum(message = "map the column with the time, or give only `clock.rate_hz`")]
-    TimeStandsStill { column: String, rows: u64 },
-    #[error("column `{column}` holds no value in {rows} rows")]
-    #[strum(serialize = "channel_empty", message = "check the sensor, or map the redundant channel")]
-    AllMissing { column: String, rows: u64 },
-    #[error(
-        "column `{column}` leaps to {raw} and back in {percent:.1} % of the samples: a code for missing values"
-    )]
-    #[strum(serialize = "missing_code")]
-    MissingCode { column: String, raw: f64, percent: f64 },
-    #[error("column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part")]
-    #[strum(message = "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`")]
-    UnitForPart { column: String, unit: &'static str, wanted: &'static str },
-    #[error("cannot determine {fact} for this log")]
-    #[strum(message = "set its source under `[identity]`: `metadata`, `columns` or `path`")]
-    IdentityMissing { fact: &'static str, looked: Vec<String> },
-    #[error("`{found}` is no {fact}: {detail}")]
-    #[strum(message = "see `identity.departure_format` and `identity.time_zone`")]
-    IdentityInvalid { fact: &'static str, found: String, detail: String },
-    #[error("column `{column}` should hold one {fact}, but changes")]
-    #[strum(
-        message = "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight"
-    )]
-    IdentityChanges { fact: &'static str, column: String, row: u64, found: String, before: String },
-    #[error("the table has no column `{column}`")]
-    #[strum(
-        serialize = "bad_table",
-        message = "map the column names under `[columns]` (docs/configuration.md)"
-    )]
-    TableColumn { column: String, nearest: Option<String>, is_mapped: bool },
-    #[error("the table cannot be used: {detail}")]
-    #[strum(serialize = "bad_table", message = "columns and formats are in docs/configuration.md")]
-    Table { row: Option<u64>, column: Option<String>, detail: String },
+impl Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.0.file.as_deref().unwrap_or_default(), self.0.message)
+    }
 }
 
-impl ErrorKind {
-    /// What is wrong with a table as a whole.
-    #[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error")]
-    pub(crate) fn table(detail: impl ToString) -> Self {
-        Self::Table { row: None, column: None, detail: detail.to_string() }
+impl std::error::Error for Error {}
+
+/// A cause of an [`Error`], where the file is not known. Rows count from 0.
+#[derive(Debug)]
+pub(crate) struct Fault(pub(crate) Box<Diagnostic>);
+
+impl Fault {
+    pub(crate) fn new(code: &str, message: impl Display, hint: impl Display) -> Self {
+        Self(Box::new(Diagnostic::new(code, message).hint(hint)))
     }
 
-    /// The stable code; `docs/errors.md` has a paragraph for each.
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Unreadable { source } if transient::is_transient(source) => READ_FAILED,
-            Self::Object(source) => source.code(),
-            other => other.into(),
-        }
+    pub(crate) fn column(mut self, column: &str) -> Self {
+        self.0.column = Some(column.to_owned());
+        self
     }
 
-    fn diagnostic(&self) -> Diagnostic {
-        let remedy = self.named_remedy().or_else(|| self.get_message().map(str::to_owned));
-        let mut c = Diagnostic::new(self.code(), self).hint(remedy.unwrap_or_default());
-        c.column = self.column().cloned();
-        match self {
-            Self::Decode { row_group, .. } => c.row_group = *row_group,
-            Self::Table { row, .. } => c.row = *row,
-            Self::NoPosition { columns, .. } => c.found = Some(format!("columns {}", shortened(columns))),
-            Self::IdentityMissing { looked, .. } => {
-                c.found = Some(format!("looked in {}", join_places(looked)));
-            }
-            Self::IdentityChanges { row, found, before, .. } => {
-                (c.row, c.found) = (Some(*row), Some(format!("`{found}` after `{before}`")));
-            }
-            Self::TimeUnit { found, .. } => {
-                c.found = Some(found.clone());
-                c.expected = Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"".into());
-            }
-            Self::TimeGoesBack { row, before_s, after_s, max_back_s, times, .. } => {
-                c.row = Some(*row);
-                c.found = Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"));
-                let most = format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)");
-                c.expected = Some(most);
-            }
-            Self::SeveralFlights { row, before_s, after_s, end_s, max_gap_s, .. } => {
-                c.row = Some(*row);
-                c.found = Some(format!(
-                    "samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"
-                ));
-                c.expected = Some(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)"));
-            }
-            Self::TimeStandsStill { rows, .. } => c.found = Some(format!("{rows} rows with one stamp")),
-            Self::TimeImplausible { least_s, most_s, .. } => {
-                c.expected = Some(format!("{least_s:e} to {most_s:e} s"));
-            }
-            Self::RateContradicts { declared_hz, seen_hz, .. } => {
-                c.found = Some(format!("{seen_hz:.6} Hz by the median step"));
-                c.expected = Some(format!("{declared_hz} Hz (`clock.rate_hz`)"));
-            }
-            Self::MetadataContradicts { key, noted, known, .. } => {
-                c.found = Some(format!("`{key}` = {noted} in the Arrow metadata"));
-                c.expected = Some(format!("`{key}` = {known}"));
-            }
-            Self::UnitForPart { wanted, .. } => c.expected = Some((*wanted).into()),
-            _ => {}
-        }
-        c
+    pub(crate) fn row(mut self, row: u64) -> Self {
+        self.0.row = Some(row);
+        self
     }
 
-    fn column(&self) -> Option<&String> {
-        match self {
-            Self::Decode { column, .. }
-            | Self::RowCount { column, .. }
-            | Self::DuplicateColumn { column, .. }
-            | Self::ColumnMissing { column, .. }
-            | Self::TableColumn { column, .. }
-            | Self::ColumnType { column, .. }
-            | Self::MetadataContradicts { column, .. }
-            | Self::TimeUnit { column, .. }
-            | Self::TimeGoesBack { column, .. }
-            | Self::SeveralFlights { column, .. }
-            | Self::RateContradicts { column, .. }
-            | Self::TimeImplausible { column, .. }
-            | Self::TimeStandsStill { column, .. }
-            | Self::AllMissing { column, .. }
-            | Self::MissingCode { column, .. }
-            | Self::ListLengths { column, .. }
-            | Self::ClocksDiffer { column, .. }
-            | Self::UnitForPart { column, .. }
-            | Self::IdentityChanges { column, .. } => Some(column),
-            Self::Table { column, .. } => column.as_ref(),
-            _ => None,
-        }
+    pub(crate) fn found(mut self, found: impl Display) -> Self {
+        self.0.found = Some(found.to_string());
+        self
     }
 
-    /// A remedy that depends on what was found, or that several errors share.
-    fn named_remedy(&self) -> Option<String> {
-        Some(match self {
-            Self::Unreadable { source } => unreadable(source).1.into(),
-            Self::Object(source) => source.remedy().into(),
-            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
-                format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits")
+    pub(crate) fn expected(mut self, expected: impl Display) -> Self {
+        self.0.expected = Some(expected.to_string());
+        self
+    }
+
+    pub(crate) fn in_file(self, file: &Path) -> Error {
+        Error(Box::new(self.0.in_file(file.display())))
+    }
+}
+
+/// Reworded for the usual errors of the system.
+impl From<io::Error> for Fault {
+    fn from(source: io::Error) -> Self {
+        let other = || format!("the file cannot be read: {source}");
+        let (message, hint) = match source.kind() {
+            io::ErrorKind::NotFound => {
+                ("no such file".into(), "check the name, and that the disk or share is mounted")
             }
-            Self::ColumnMissing { column, nearest: Some(near) } => match hidden_difference(column, near) {
-                Some(characters) => format!("`{near}`? {characters}"),
-                None => format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`"),
-            },
-            Self::TableColumn { nearest: Some(near), is_mapped: true, .. } => {
-                format!("`{near}`? A table may call its columns otherwise: see `[columns]`")
-            }
-            Self::TableColumn { nearest, is_mapped: false, .. } => {
-                let near = nearest.as_ref().map(|near| format!("`{near}`? ")).unwrap_or_default();
-                format!("{near}docs/configuration.md has the names of this table's columns")
-            }
-            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
-                format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
-            }
-            Self::IdentityInvalid { fact, .. } if !fact.ends_with("_utc") => {
-                format!("check this value, and where `[identity]` takes the {fact} from")
-            }
-            Self::MissingCode { raw, .. } => {
-                format!("list it: `missing = [{raw}]` in the channel's table of the configuration")
-            }
-            Self::MetadataContradicts { key, noted, .. } => format!(
-                "set `{key}` of the channel to {noted}; if the file is wrong, set its `ignore_metadata = true`"
+            io::ErrorKind::PermissionDenied => (
+                "permission denied".into(),
+                "run as a user with read access, or change the file mode; the next run tries again",
             ),
-            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
-                format!("the placeholder of the position is {PLACEHOLDER}")
+            io::ErrorKind::IsADirectory => (
+                "this is a folder, not a file".into(),
+                "name the file, or the files in it: `FOLDER/*.parquet`",
+            ),
+            _ if transient::is_file_limit(&source) => {
+                (other(), "allow more open files (`ulimit -n 4096`); the next run tries again")
             }
-            Self::NoPosition { pattern, columns }
-                if let Some(near) = closest_to_pattern(pattern, columns) =>
-            {
-                let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
-                let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
-                format!(
-                    "closest column: `{near}`.{hidden} Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
-                )
-            }
-            Self::Decode { .. } | Self::RowCount { .. } => {
-                "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`".into()
-            }
-            Self::ColumnMissing { .. } | Self::NoPosition { .. } => {
-                "names are mapped under `[channel]`, `[clock]` and `[identity]`".into()
-            }
-            Self::Table { detail, .. } if detail.contains("is not a UTC date") => {
-                "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z".into()
-            }
-            Self::Table { detail, .. } if detail.contains(',') && detail.ends_with("is not a number") => {
-                "write decimals with a point, such as 1168.5".into()
-            }
-            _ => return None,
-        })
+            _ => (other(), "check the disk or share; the next run tries again"),
+        };
+        Self::new(if transient::is_transient(&source) { READ_FAILED } else { UNREADABLE }, message, hint)
     }
+}
+
+impl From<object_io::Error> for Fault {
+    fn from(source: object_io::Error) -> Self {
+        Self::new(source.code(), &source, source.remedy())
+    }
+}
+
+impl From<Excess> for Fault {
+    fn from(excess: Excess) -> Self {
+        let hint = match excess.key {
+            Some(key) => format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits"),
+            None => "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)".into(),
+        };
+        Self::new("beyond_limit", excess, hint)
+    }
+}
+
+/// What a parser of Parquet says of a file, or the failed read that it says it of.
+pub(crate) fn not_parquet(detail: impl Into<String>) -> Fault {
+    let detail = detail.into();
+    let hint = "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`";
+    let of_parser = || Fault::new("not_parquet", format!("cannot read as Parquet: {detail}"), hint);
+    object_io::system_error(&detail).map_or_else(of_parser, Fault::from)
+}
+
+const CORRUPT: &str = "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`";
+
+/// A column chunk that cannot be decoded, or the failed read because of which it cannot.
+pub(crate) fn decode_failed(column: &str, row_group: usize, detail: &str) -> Fault {
+    if let Some(failed_read) = object_io::system_error(detail) {
+        return failed_read.into();
+    }
+    let message = format!("a column cannot be decoded: {detail}");
+    let mut fault = Fault::new("decode_failed", message, CORRUPT).column(column);
+    fault.0.row_group = Some(row_group as u64);
+    fault
+}
+
+pub(crate) fn row_count(column: &str, found: usize, declared: usize) -> Fault {
+    let message = format!("the column holds {found} rows where the footer declares {declared}");
+    Fault::new(ROW_COUNT_DIFFERS, message, CORRUPT).column(column)
+}
+
+/// A file, or a column of it, that is encrypted.
+pub(crate) fn encrypted(column: Option<&str>) -> Fault {
+    let hint = "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported";
+    match column {
+        Some(column) => Fault::new("encrypted", format!("column `{column}` is encrypted"), hint),
+        None => Fault::new("encrypted", "the file is encrypted", hint),
+    }
+}
+
+/// A column that a log lacks, with the nearest of the known names.
+pub(crate) fn column_missing<'n>(column: &str, known: impl IntoIterator<Item = &'n str>) -> Fault {
+    let hint = match nearest(column, known) {
+        None => MAPPED_UNDER.to_owned(),
+        Some(near) => match hidden_difference(column, near) {
+            Some(characters) => format!("`{near}`? {characters}"),
+            None => format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`"),
+        },
+    };
+    Fault::new("column_missing", format!("the log has no column `{column}`"), hint).column(column)
+}
+
+const MAPPED_UNDER: &str = "names are mapped under `[channel]`, `[clock]` and `[identity]`";
+
+/// How the type of a column of structs begins.
+pub(crate) const STRUCT: &str = "a struct of ";
+
+pub(crate) fn column_type(column: &str, found: &str, wanted: &str) -> Fault {
+    let hint = if found.starts_with(STRUCT) {
+        format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)")
+    } else {
+        "map another column, or have the recorder write numbers".to_owned()
+    };
+    Fault::new("column_type", format!("column `{column}` holds {found}, not {wanted}"), hint).column(column)
+}
+
+pub(crate) fn list_lengths(column: &str, other: &str) -> Fault {
+    let hint = "if the channel has timestamps of its own, name them in its `time_column`; else all lists of a row must hold as many samples";
+    Fault::new("list_lengths", format!("the lists in `{column}` and `{other}` differ in length"), hint)
+        .column(column)
+}
+
+pub(crate) fn channel_empty(column: &str, rows: usize) -> Fault {
+    let hint = "check the sensor, or map the redundant channel";
+    Fault::new("channel_empty", format!("column `{column}` holds no value in {rows} rows"), hint)
+        .column(column)
+}
+
+pub(crate) fn time_unit_unknown(column: &str, found: &str) -> Fault {
+    let message = format!("the unit of the time column `{column}` is not known");
+    Fault::new("time_unit_unknown", message, "set `clock.unit` to s, ms, us or ns")
+        .column(column)
+        .found(found)
+        .expected("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"")
+}
+
+/// A fact for which no source was found in the `looked` places.
+pub(crate) fn identity_missing(fact: &str, looked: &[String]) -> Fault {
+    let looked = if looked.is_empty() {
+        "nowhere: `[identity]` has no source for it".into()
+    } else {
+        looked.join(", ")
+    };
+    let hint = "set its source under `[identity]`: `metadata`, `columns` or `path`";
+    Fault::new("identity_missing", format!("cannot determine {fact} for this log"), hint)
+        .found(format!("looked in {looked}"))
+}
+
+pub(crate) fn identity_invalid(fact: &str, found: &dyn Display, detail: &dyn Display) -> Fault {
+    let hint = if fact.ends_with("_utc") {
+        "see `identity.departure_format` and `identity.time_zone`".to_owned()
+    } else {
+        format!("check this value, and where `[identity]` takes the {fact} from")
+    };
+    Fault::new("identity_invalid", format!("`{found}` is no {fact}: {detail}"), hint)
+}
+
+/// What is wrong with a table, or with a cell of it.
+#[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error")]
+pub(crate) fn bad_table(detail: impl ToString) -> Fault {
+    let detail = detail.to_string();
+    let hint = if detail.contains("is not a UTC date") {
+        "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z"
+    } else if detail.contains(',') && detail.ends_with("is not a number") {
+        "write decimals with a point, such as 1168.5"
+    } else {
+        "columns and formats are in docs/configuration.md"
+    };
+    Fault::new("bad_table", format!("the table cannot be used: {detail}"), hint)
+}
+
+/// A column pattern that fits none of the columns.
+pub(crate) fn no_position(pattern: &str, columns: &[String]) -> Fault {
+    let hint = if pattern.contains('{') && !pattern.contains(PLACEHOLDER) {
+        format!("the placeholder of the position is {PLACEHOLDER}")
+    } else if let Some(near) = closest_to_pattern(pattern, columns) {
+        let hidden = hidden_difference(&pattern.replace(PLACEHOLDER, ""), near);
+        let hidden = hidden.map(|hidden| format!(" {hidden}.")).unwrap_or_default();
+        format!(
+            "closest column: `{near}`.{hidden} Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
+        )
+    } else {
+        MAPPED_UNDER.to_owned()
+    };
+    Fault::new("no_position", format!("no column matches `{pattern}`"), hint)
+        .found(format!("columns {}", shortened(columns)))
 }
 
 /// The column that shares the longest beginning and end with a pattern, and of those the most similar one.
@@ -358,30 +276,6 @@ fn closest_to_pattern<'c>(pattern: &str, columns: &'c [String]) -> Option<&'c St
     let best = scored.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     best.map(|(_, _, name)| name)
 }
-
-/// Message of the operating system, reworded for the usual cases, and the remedy.
-fn unreadable(source: &io::Error) -> (String, &'static str) {
-    let other = || format!("the file cannot be read: {source}");
-    match source.kind() {
-        io::ErrorKind::NotFound => {
-            ("no such file".into(), "check the name, and that the disk or share is mounted")
-        }
-        io::ErrorKind::PermissionDenied => (
-            "permission denied".into(),
-            "run as a user with read access, or change the file mode; the next run tries again",
-        ),
-        io::ErrorKind::IsADirectory => {
-            ("this is a folder, not a file".into(), "name the file, or the files in it: `FOLDER/*.parquet`")
-        }
-        _ if transient::is_file_limit(source) => {
-            (other(), "allow more open files (`ulimit -n 4096`); the next run tries again")
-        }
-        _ => (other(), "check the disk or share; the next run tries again"),
-    }
-}
-
-/// How the type of a column of structs begins.
-pub(crate) const STRUCT: &str = "a struct of ";
 
 /// How two names differ that look equal: by the code points of their characters beyond ASCII.
 fn hidden_difference(wanted: &str, found: &str) -> Option<String> {
@@ -403,11 +297,6 @@ fn hidden_difference(wanted: &str, found: &str) -> Option<String> {
             points(wanted)
         )
     })
-}
-
-/// The places where an identity field was searched.
-fn join_places(places: &[String]) -> String {
-    if places.is_empty() { "nowhere: `[identity]` has no source for it".into() } else { places.join(", ") }
 }
 
 /// A list a person can take in: the first eight, and how many more there are.

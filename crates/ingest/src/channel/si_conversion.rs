@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use crate::error::ErrorKind;
+use crate::error::Fault;
 use crate::mapping::ChannelMapping;
 use crate::mapping::units::{Dimension, Unit};
 
@@ -77,16 +77,15 @@ pub(crate) fn apply_to_all(line: SiConversion, values: &mut [f64]) {
 }
 
 /// The line of a channel on a part.
-pub(crate) fn to_si(
-    column: &str,
-    map: &ChannelMapping,
-    geometry: Geometry,
-) -> Result<SiConversion, ErrorKind> {
+pub(crate) fn to_si(column: &str, map: &ChannelMapping, geometry: Geometry) -> Result<SiConversion, Fault> {
     let (unit_factor, shift) = map.unit.to_si();
-    let lever = lever(map.unit, geometry).map_err(|wanted| ErrorKind::UnitForPart {
-        column: column.to_owned(),
-        unit: map.unit.as_str(),
-        wanted,
+    let lever = lever(map.unit, geometry).map_err(|wanted| {
+        let unit = map.unit.as_str();
+        let message = format!(
+            "column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part"
+        );
+        let hint = "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`";
+        Fault::new("unit_for_part", message, hint).column(column).expected(wanted)
     })?;
     let gear = match map.unit.dimension() {
         Dimension::Torque => map.gear_ratio,
@@ -126,6 +125,6 @@ mod tests {
         let metres = of(Geometry::Linear { lead_m_per_rev: None }).unwrap();
         assert!([f64::INFINITY, 9.969_21e36, -1e30].iter().all(|fill| metres.apply(*fill).is_nan()));
         let fault = of(Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
-        assert!(matches!(fault, ErrorKind::UnitForPart { unit: "m", .. }));
+        assert!(fault.0.code == "unit_for_part" && fault.0.message.contains("logged in m,"), "{fault:?}");
     }
 }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use object_io::{Address, ObjectFile};
 
-use crate::error::ErrorKind;
+use crate::error::Fault;
 use crate::io::transient;
 
 /// An open file or object.
@@ -24,7 +24,7 @@ pub(crate) struct ByteSource {
 }
 
 impl ByteSource {
-    pub(crate) fn open(path: &Path) -> Result<Self, ErrorKind> {
+    pub(crate) fn open(path: &Path) -> Result<Self, Fault> {
         let address = Address::parse(path)?;
         let object = address.map(|address| ObjectFile::open(&address)).transpose()?;
         let file = match &object {
@@ -35,20 +35,20 @@ impl ByteSource {
     }
 
     /// Fetches these bytes: a local file has them all.
-    pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), ErrorKind> {
+    pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Fault> {
         Ok(self.object.as_ref().map_or(Ok(()), |object| object.ensure_range(ranges))?)
     }
 }
 
 /// A whole file: for tables, all of which is read.
-pub(crate) fn whole(path: &Path) -> Result<Arc<File>, ErrorKind> {
+pub(crate) fn whole(path: &Path) -> Result<Arc<File>, Fault> {
     let source = ByteSource::open(path)?;
     source.want(once(0..u64::MAX))?;
     Ok(source.file)
 }
 
 /// Opens a regular file; opening a named pipe would wait for its writer for ever.
-fn open_local(path: &Path) -> Result<File, ErrorKind> {
+fn open_local(path: &Path) -> Result<File, Fault> {
     Ok(transient::with_retry(|| match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
         kind if kind.is_dir() => Err(io::ErrorKind::IsADirectory.into()),

@@ -11,7 +11,7 @@ use crate::channel::missing_code::missing_code;
 use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
 use crate::channel::stats::ChannelStats;
 use crate::channel::turns::unwrap_turns;
-use crate::error::{Error, ErrorKind};
+use crate::error::{self, Error, Fault};
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::ColumnPattern;
 use crate::mapping::{ChannelMapping, ClockMapping, RawValue, Role};
@@ -122,15 +122,14 @@ impl<'s> ChannelSampling<'s> {
     /// instants of their own, which begin with the stamp of the row.
     fn has_own_list(&self, other: &Self, error: &Error) -> Result<bool, Error> {
         let own = &self.samples.leaf;
-        let is_other = matches!(*error.kind, ErrorKind::RowCount { .. }) && *own != other.samples.leaf;
+        let is_other = error.is_row_count() && *own != other.samples.leaf;
         if !is_other || !self.table.is_listed(own) {
             return Ok(false);
         }
         if self.time_column.is_some() || self.table.clock.column.is_some() {
             return Ok(true);
         }
-        let (column, other) = (own.clone(), other.samples.leaf.clone());
-        Err(self.table.error(ErrorKind::ListLengths { column, other }))
+        Err(self.table.error(error::list_lengths(own, &other.samples.leaf)))
     }
 
     fn is_apart(&self) -> bool {
@@ -215,8 +214,12 @@ impl<'s> ChannelSampling<'s> {
         let read = self.converted(geometry, wanted)?;
         let Some((at, share)) = missing_code(&read.values) else { return Ok(read) };
         let raw = self.base.keep(self.table.numbers(&self.samples, None, None)?.0)[at];
-        let column = self.column().to_owned();
-        Err(self.table.error(ErrorKind::MissingCode { column, raw, percent: 100.0 * share }))
+        let (column, percent) = (self.column(), 100.0 * share);
+        let message = format!(
+            "column `{column}` leaps to {raw} and back in {percent:.1} % of the samples: a code for missing values"
+        );
+        let hint = format!("list it: `missing = [{raw}]` in the channel's table of the configuration");
+        Err(self.table.error(Fault::new("missing_code", message, hint).column(column)))
     }
 
     fn converted(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
@@ -262,8 +265,7 @@ impl<'s> ChannelSampling<'s> {
         if found == self.base.rows {
             return Ok(());
         }
-        let (column, found, declared) = (column.to_owned(), found as u64, self.base.rows as u64);
-        Err(self.table.error(ErrorKind::RowCount { column, found, declared }))
+        Err(self.table.error(error::row_count(column, found, self.base.rows)))
     }
 
     /// Reads the channel in SI at the instants of the motor position `master`, which may be the channel itself; those that
@@ -297,8 +299,10 @@ impl<'s> ChannelSampling<'s> {
         let lead = master.stamps()?;
         let stamps = if shared { lead } else { self.stamps()? };
         let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
-            let (column, other) = (stamps.column.clone(), lead.column.clone());
-            self.table.error(ErrorKind::ClocksDiffer { column, other })
+            let (column, other) = (&stamps.column, &lead.column);
+            let message = format!("the clocks `{column}` and `{other}` cannot be brought together");
+            let hint = "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`";
+            self.table.error(Fault::new("clocks_differ", message, hint).column(column))
         })?;
         let at_s: Vec<f64> = lead.seconds.iter().map(|t| t + master.map.shift_s() + apart_s).collect();
         // Where it is slower than its rows, its own samples count.

@@ -1,6 +1,7 @@
 //! One flight log: its identity, its actuators, and their channels in SI on one clock.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,7 +11,7 @@ use records::Position;
 
 use crate::channel::si_conversion::Geometry;
 use crate::channel::stats::span;
-use crate::error::{Error, ErrorKind};
+use crate::error::{self, Error, Fault};
 use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{Channel, ChannelSampling};
@@ -60,7 +61,7 @@ impl Log {
             tables.insert(group, RowTable::new(files, clock.clone(), layout.clone()));
         }
         let Some(main) = tables.get(&None) else {
-            return Err(Error::new(Path::new(""), std::io::Error::from(std::io::ErrorKind::NotFound).into()));
+            return Err(Fault::from(io::Error::from(io::ErrorKind::NotFound)).in_file(Path::new("")));
         };
         let normalized = normalized::facts(&main.files[0])?;
         let mut log = Self { tables, mapping: Arc::clone(mapping), normalized, selected: Mutex::new(None) };
@@ -142,7 +143,7 @@ impl Log {
         &self,
         known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
     ) -> Result<Identity, Error> {
-        let fail = |fault| self.main().error(fault);
+        let fail = |fault: Fault| self.main().error(fault);
         if let Some(facts) = &self.normalized {
             let departure = facts.get(&IdentityField::DepartureUtc).and_then(|text| text.parse().ok());
             return identity::read(facts, &IdentityMapping::default(), departure).map_err(fail);
@@ -215,8 +216,7 @@ impl Log {
     /// `own` is the position of a log that holds one actuator and does not name it in its columns.
     ///
     /// # Errors
-    /// `ErrorKind::NoPosition` when no column fits; `ErrorKind::ColumnMissing` or
-    /// `ErrorKind::IdentityMissing` in a log of one actuator.
+    /// `no_position` when no column fits; `column_missing` or `identity_missing` in a log of one actuator.
     pub fn actuators(
         &self,
         channels: &Channels,
@@ -248,8 +248,8 @@ impl Log {
         };
         let needed = Role::NEEDED.iter().filter_map(|role| channels.of(*role));
         let fewest = needed.min_by_key(fitting).unwrap_or(&channels.motor_position);
-        let (pattern, columns) = (fewest.column.clone(), self.names_for(fewest)?.iter().cloned().collect());
-        Ok(self.main().error(ErrorKind::NoPosition { pattern, columns }))
+        let columns: Vec<String> = self.names_for(fewest)?.iter().cloned().collect();
+        Ok(self.main().error(error::no_position(&fewest.column, &columns)))
     }
 
     /// The positions that rows or names speak of; none when neither can.
@@ -276,8 +276,8 @@ impl Log {
         own: Option<&Position>,
     ) -> Result<Vec<ActuatorColumns>, Error> {
         let Some(position) = own else {
-            let looked = vec!["the names of columns (no `{position}` in them)".into()];
-            return Err(self.main().error(ErrorKind::IdentityMissing { fact: "position", looked }));
+            let looked = ["the names of columns (no `{position}` in them)".to_owned()];
+            return Err(self.main().error(error::identity_missing("position", &looked)));
         };
         let only = self.columns_of(channels, position.clone())?;
         match only.lacking.first() {
@@ -406,7 +406,11 @@ impl Log {
 
     fn table_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
         self.table(map).ok_or_else(|| {
-            self.main().error(ErrorKind::GroupMissing { group: map.group.clone().unwrap_or_default() })
+            let group = map.group.as_deref().unwrap_or_default();
+            let message = format!("no file of group `{group}` belongs to this flight");
+            let hint =
+                "check that the file has arrived and has the same tail and flight (see `freeplay check`)";
+            self.main().error(Fault::new("group_missing", message, hint))
         })
     }
 }
@@ -483,8 +487,8 @@ impl<'c> ActuatorReader<'c> {
         };
         let counted = channel.values.len() - channel.excluded;
         if (counted > 0 || channel.excluded == 0) && !channel.values.iter().any(|v| v.is_finite()) {
-            let (column, rows) = (channel.column.unwrap_or_default(), counted as u64);
-            return Err(self.log.main().error(ErrorKind::AllMissing { column, rows }));
+            let column = channel.column.unwrap_or_default();
+            return Err(self.log.main().error(error::channel_empty(&column, counted)));
         }
         Ok((channel, rest))
     }

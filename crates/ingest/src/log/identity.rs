@@ -9,7 +9,7 @@ use jiff::{SignedDuration, Timestamp, civil};
 use percent_encoding::percent_decode_str;
 use records::{Flight, FlightId, Position, TailNumber};
 
-use crate::error::ErrorKind;
+use crate::error::{Fault, identity_invalid, identity_missing};
 use crate::mapping::{IdentityField, IdentityMapping};
 use crate::time::clock::{DAY_S, TimeOrigin};
 
@@ -34,7 +34,7 @@ pub(crate) struct ClockSpan {
 
 impl ClockSpan {
     /// The earliest instant; `None` where the clock has none, or a local one without a mapped zone.
-    pub(crate) fn start(&self, mapping: &IdentityMapping) -> Result<Option<Timestamp>, ErrorKind> {
+    pub(crate) fn start(&self, mapping: &IdentityMapping) -> Result<Option<Timestamp>, Fault> {
         let earliest = |first: Timestamp| first.checked_add(duration(self.earliest_s)).ok();
         match self.origin {
             TimeOrigin::Utc(first) => Ok(earliest(first)),
@@ -76,7 +76,7 @@ pub(crate) fn departure_on(
     absolute: Option<Timestamp>,
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
-) -> Result<Timestamp, ErrorKind> {
+) -> Result<Timestamp, Fault> {
     let invalid = |detail: String| invalid(IdentityField::DepartureUtc, &date, &detail);
     if let Some(start) = absolute {
         // The zone of the date may not be known: 14 h to either side of UTC at most.
@@ -108,7 +108,7 @@ pub(crate) fn departure_before(
     facts: &IdentityFields,
     clock: Option<ClockSpan>,
     mapping: &IdentityMapping,
-) -> Result<Timestamp, ErrorKind> {
+) -> Result<Timestamp, Fault> {
     let invalid = |detail: &str| invalid(IdentityField::LandingUtc, &landing, &detail);
     if date_alone(landing, mapping).is_some() {
         return Err(invalid("a date without a time of the day"));
@@ -121,21 +121,17 @@ pub(crate) fn departure_before(
     landed.checked_sub(duration(length_s)).map_err(|e| invalid(&e.to_string()))
 }
 
-fn invalid(fact: IdentityField, found: &dyn Display, detail: &dyn Display) -> ErrorKind {
-    let (found, detail) = (found.to_string(), detail.to_string());
-    ErrorKind::IdentityInvalid { fact: fact.as_str(), found, detail }
+fn invalid(fact: IdentityField, found: &dyn Display, detail: &dyn Display) -> Fault {
+    identity_invalid(fact.as_str(), found, detail)
 }
 
 /// Facts as text, before they are read.
 pub type IdentityFields = BTreeMap<IdentityField, String>;
 
 /// The facts that the path's named groups hold.
-pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields, ErrorKind> {
-    let regex = regex::Regex::new(expression).map_err(|e| ErrorKind::IdentityInvalid {
-        fact: "path expression",
-        found: expression.to_owned(),
-        detail: e.to_string(),
-    })?;
+pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields, Fault> {
+    let regex = regex::Regex::new(expression);
+    let regex = regex.map_err(|e| identity_invalid("path expression", &expression, &e))?;
     // The same log must be the same flight wherever the command was typed, and on whichever system.
     let whole = absolute(path);
     let text = whole.to_string_lossy().replace('\\', "/");
@@ -195,7 +191,7 @@ pub(crate) fn read(
     facts: &IdentityFields,
     mapping: &IdentityMapping,
     departure: Option<Timestamp>,
-) -> Result<Identity, ErrorKind> {
+) -> Result<Identity, Fault> {
     let facts = registered(facts, mapping, departure);
     let text = |fact: IdentityField| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
     let tail = text(IdentityField::TailNumber).ok_or_else(|| missing(IdentityField::TailNumber, mapping))?;
@@ -214,8 +210,8 @@ pub(crate) fn read(
     Ok(Identity { flight, position: position.map_err(of(IdentityField::Position))? })
 }
 
-fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
-    let looked = [
+fn missing(fact: IdentityField, mapping: &IdentityMapping) -> Fault {
+    let looked: [Option<String>; 4] = [
         mapping.metadata.get(&fact).map(|key| format!("metadata `{key}`")),
         mapping.columns.get(&fact).map(|column| format!("column `{column}`")),
         mapping.path.as_ref().map(|expression| {
@@ -227,13 +223,13 @@ fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
         }),
         mapping.folders.get(&fact).map(|name| format!("folder `{name}=…`")),
     ];
-    ErrorKind::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
+    identity_missing(fact.as_str(), &looked.into_iter().flatten().collect::<Vec<_>>())
 }
 
 /// Longest flight that a log may state, h: almost twice the longest scheduled one.
 const LONGEST_FLIGHT_H: f64 = 36.0;
 
-fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKind> {
+fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, Fault> {
     let Some(text) = text else { return Ok(None) };
     match text.parse::<f64>() {
         Ok(h) if fact == IdentityField::FlightHours && h > LONGEST_FLIGHT_H => {
@@ -247,7 +243,7 @@ fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKi
 }
 
 /// Reads a departure. A zone or offset in the text wins; else the mapped zone; else it is refused.
-pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, ErrorKind> {
+pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, Fault> {
     let invalid = |detail: String| invalid(IdentityField::DepartureUtc, &text, &detail);
     let local = match &mapping.departure_format {
         Some(format) => {
@@ -361,7 +357,7 @@ mod tests {
             [("2026-03-29T02:30:00", "does not exist"), ("2026-10-25T02:30:00", "exists twice")]
         {
             let fault = instant(local, &there).unwrap_err();
-            assert!(fault.to_string().contains(is), "{fault}");
+            assert!(fault.0.message.contains(is), "{fault:?}");
             let origin = TimeOrigin::Local(format!("{local}Z").parse().unwrap());
             assert!(ClockSpan { origin, earliest_s: 0.0, latest_s: 1.0 }.start(&there).is_err());
         }
@@ -395,8 +391,9 @@ mod tests {
         m.metadata.insert(IdentityField::TailNumber, "ac_reg".into());
         m.path = Some("(?<flight_id>x)".into());
         let fault = read(&IdentityFields::new(), &m, None).unwrap_err();
-        let ErrorKind::IdentityMissing { fact: "tail_number", looked } = fault else { panic!("{fault}") };
-        let path = "path by `(?<flight_id>x)`, which has no group `tail_number`";
-        assert_eq!(looked, ["metadata `ac_reg`", path]);
+        assert!(fault.0.code == "identity_missing" && fault.0.message.contains("tail_number"), "{fault:?}");
+        let looked =
+            "looked in metadata `ac_reg`, path by `(?<flight_id>x)`, which has no group `tail_number`";
+        assert_eq!(fault.0.found.as_deref(), Some(looked));
     }
 }

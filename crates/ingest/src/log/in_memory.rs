@@ -5,7 +5,7 @@ use std::path::Path;
 use records::Position;
 
 use crate::channel::si_conversion::reading;
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault, bad_table, channel_empty};
 use crate::log::assemble::{RawChannels, assemble};
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
@@ -31,16 +31,16 @@ impl ChannelArrays<'_> {
     /// # Errors
     /// When the arrays differ in length, the stamps are no clock, or a channel holds no number.
     pub fn to_channels(&self, position: Position) -> Result<ActuatorChannels, Error> {
-        let fail = |fault| Error::new(Path::new("arrays"), fault);
+        let fail = |fault: Fault| fault.in_file(Path::new("arrays"));
         let named = [("motor_m", self.motor_m), ("screw_m", self.screw_m), ("load_n", self.load_n)];
         for (column, values) in named {
             let (rows, wanted) = (values.len(), self.time_s.len());
             if rows != wanted {
                 let detail = format!("{rows} values for {wanted} timestamps");
-                return Err(fail(ErrorKind::Table { row: None, column: Some(column.into()), detail }));
+                return Err(fail(bad_table(detail).column(column)));
             }
             if !values.iter().any(|value| value.is_finite()) {
-                return Err(fail(ErrorKind::AllMissing { column: column.into(), rows: rows as u64 }));
+                return Err(fail(channel_empty(column, rows)));
             }
         }
         let first_s = self.time_s.iter().copied().find(|s| s.is_finite()).unwrap_or(0.0);

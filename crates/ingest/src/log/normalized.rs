@@ -14,7 +14,7 @@ use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::quality::Quality;
 use crate::channel::si_conversion::Geometry;
 use crate::channel::stats::ChannelStats;
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault};
 use crate::log::identity::{Identity, IdentityFields};
 use crate::log::types::ActuatorChannels;
 use crate::mapping::IdentityField;
@@ -33,10 +33,16 @@ pub(crate) fn facts(file: &LogFile) -> Result<Option<IdentityFields>, Error> {
     let Some(version) = file.metadata(KEY) else { return Ok(None) };
     if version != VERSION {
         let detail = format!("it is of form {version}, and this program knows {VERSION}");
-        return Err(file.error(ErrorKind::Normalized { detail }));
+        return Err(file.error(other_settings(&detail)));
     }
     let fact = |fact: &IdentityField| Some((*fact, noted(file, fact.as_str())?.to_owned()));
     Ok(Some(IdentityField::ALL.iter().filter_map(fact).collect()))
+}
+
+fn other_settings(detail: &str) -> Fault {
+    let message = format!("normalized log was written with other settings: {detail}");
+    let hint = "write it again from the recorded log: `freeplay normalize`";
+    Fault::new("normalized_otherwise", message, hint)
 }
 
 /// A text of the footer that is not empty.
@@ -50,7 +56,7 @@ pub(crate) fn read_actuator(
     position: Position,
     geometry: Geometry,
 ) -> Result<ActuatorChannels, Error> {
-    let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
+    let fail = |detail: String| file.error(other_settings(&detail));
     let number = |key: &str| noted(file, key).and_then(|text| text.parse::<f64>().ok());
     let (now, then) = (geometry.metres_per_radian(), number("metres_per_radian"));
     if now != then {

@@ -11,7 +11,7 @@ use arrow::compute::{cast, take};
 use arrow::datatypes::{DataType, Int32Type};
 
 use crate::bounds;
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault};
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::wrong_type;
 
@@ -202,7 +202,7 @@ impl DistinctTexts {
     }
 
     /// Looks at a batch of at most four columns.
-    pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), ErrorKind> {
+    pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), Fault> {
         let columns = codes(names, arrays)?;
         // Most rows repeat the latest combination with their text of the first column.
         let mut latest = vec![None; columns[0].values().len()];
@@ -235,7 +235,7 @@ impl DistinctTexts {
 type Codes = DictionaryArray<Int32Type>;
 
 /// Columns as texts with codes.
-fn codes(names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Codes>, ErrorKind> {
+fn codes(names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Codes>, Fault> {
     let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
     let coded = |(name, array): (&&str, &ArrayRef)| {
         let coded = cast(array, &kind).map_err(|_| wrong_type(name, array, "text or numbers"))?;
@@ -254,7 +254,7 @@ struct NumberedKeys<'k> {
 }
 
 impl<'k> NumberedKeys<'k> {
-    fn of(keys: &'k [Rows]) -> Result<Self, ErrorKind> {
+    fn of(keys: &'k [Rows]) -> Result<Self, Fault> {
         let in_order = |column: usize| {
             let texts: BTreeSet<&str> = keys.iter().map(|rows| rows[column].1.as_str()).collect();
             texts.into_iter().collect()
@@ -273,7 +273,7 @@ impl<'k> NumberedKeys<'k> {
     }
 
     /// The rows of a batch that belong to each key, by the columns that name rows.
-    fn rows_by_key(&self, names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Vec<u32>>, ErrorKind> {
+    fn rows_by_key(&self, names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Vec<u32>>, Fault> {
         let Some(first) = arrays.first() else { return Ok(vec![Vec::new(); self.keys]) };
         let mut places = vec![0; first.len()];
         for (column, texts) in codes(names, arrays)?.iter().zip(&self.texts) {

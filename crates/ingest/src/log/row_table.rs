@@ -15,10 +15,9 @@ use arrow::datatypes::{DataType, UInt64Type};
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
-use crate::error::{Error, ErrorKind, STRUCT};
+use crate::error::{self, Error, Fault, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
-use crate::mapping::column_pattern::nearest;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::{ChannelMapping, ClockMapping, Layout, RawValue};
 use crate::parquet::log_file::{LogFile, Scan};
@@ -61,7 +60,7 @@ impl RowTable {
     }
 
     /// An error of the whole table names its first file.
-    pub(crate) fn error(&self, fault: ErrorKind) -> Error {
+    pub(crate) fn error(&self, fault: Fault) -> Error {
         self.files[0].error(fault)
     }
 
@@ -202,7 +201,7 @@ impl RowTable {
         &self,
         samples: &SampleSelector,
         leaf: &str,
-        mut take: impl FnMut(&ArrayRef) -> Result<(), ErrorKind>,
+        mut take: impl FnMut(&ArrayRef) -> Result<(), Fault>,
     ) -> Result<(), Error> {
         if !self.holds_all(samples) {
             let gathered = self.partition.samples(&self.files, samples, leaf)?;
@@ -236,7 +235,7 @@ impl RowTable {
     }
 
     /// One column as text that must not change; `None` when it is null throughout, or not there.
-    pub(crate) fn constant(&self, column: &str, fact: &'static str) -> Result<Option<String>, Error> {
+    pub(crate) fn constant(&self, column: &str, fact: &str) -> Result<Option<String>, Error> {
         if let Some((_, text)) = self.files[0].flight_rows.iter().find(|(own, _)| own == column) {
             return Ok(Some(text.clone()));
         }
@@ -249,8 +248,10 @@ impl RowTable {
                 let Some(value) = value else { continue };
                 let before = first.get_or_insert_with(|| value.to_owned());
                 if value != before {
-                    let (column, found, before) = (column.to_owned(), value.to_owned(), before.clone());
-                    return Err(ErrorKind::IdentityChanges { fact, column, row, found, before });
+                    let message = format!("column `{column}` should hold one {fact}, but changes");
+                    let hint = "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight";
+                    let fault = Fault::new("identity_changes", message, hint).column(column).row(row);
+                    return Err(fault.found(format!("`{value}` after `{before}`")));
                 }
             }
             row += array.len() as u64;
@@ -272,7 +273,12 @@ impl RowTable {
     /// The stamps of those samples, from the table's time column or the channel's own.
     pub(crate) fn stamps(&self, samples: &SampleSelector, own: Option<&str>) -> Result<Timestamps, Error> {
         let Some(column) = own.or(self.clock.column.as_deref()) else {
-            let rate_hz = self.clock.rate_hz.ok_or_else(|| self.error(ErrorKind::NoClock))?;
+            let no_clock = || {
+                let message = "the log has no clock: neither `clock.column` nor `clock.rate_hz` is given";
+                let hint = "name the time column, or give the rate when rows are evenly spaced";
+                self.error(Fault::new("no_clock", message, hint))
+            };
+            let rate_hz = self.clock.rate_hz.ok_or_else(no_clock)?;
             return Ok(Timestamps::uniform(self.count(samples)?, rate_hz));
         };
         let ticks = self.ticks(column)?;
@@ -340,7 +346,7 @@ impl RowTable {
         let is_text = *kind == DataType::Utf8 && (clock.unit.is_none() || !file.holds_numbers(column));
         let duration = if *kind == DataType::Int64 { file.duration_unit(column) } else { None };
         TickFormat::of(kind, is_text, duration, clock)
-            .map_err(|found| self.error(ErrorKind::TimeUnit { column: column.to_owned(), found }))
+            .map_err(|found| self.error(error::time_unit_unknown(column, &found)))
     }
 
     /// The known name nearest to a channel that is not here.
@@ -349,8 +355,7 @@ impl RowTable {
         if let Err(error) = self.check_no_struct(name, &names) {
             return error;
         }
-        let nearest = nearest(name, names.iter().map(String::as_str)).map(str::to_owned);
-        self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
+        self.error(error::column_missing(name, names.iter().map(String::as_str)))
     }
 
     /// Whether this is the name of a column of structs, whose fields alone can be mapped.
@@ -362,7 +367,7 @@ impl RowTable {
             return Ok(());
         }
         let found = format!("{STRUCT}{}", shown.join(", "));
-        Err(self.error(ErrorKind::ColumnType { column: name.to_owned(), found, wanted: "numbers" }))
+        Err(self.error(error::column_type(name, &found, "numbers")))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use arrow::datatypes::Field;
 
-use crate::error::ErrorKind;
+use crate::error::Fault;
 use crate::mapping::ChannelMapping;
 use crate::mapping::units::{Unit, from_symbol};
 
@@ -34,7 +34,7 @@ impl FieldMetadata {
     }
 
     /// Scale and offset of the channel: those of the mapping, or those that are noted where it leaves both open.
-    pub(crate) fn line(&self, column: &str, map: &ChannelMapping) -> Result<(f64, f64), ErrorKind> {
+    pub(crate) fn line(&self, column: &str, map: &ChannelMapping) -> Result<(f64, f64), Fault> {
         let mapped = Self { scale: map.scale, offset: map.offset, unit: Some(map.unit) };
         let is_open = |line: &Self| Self { unit: None, ..*line } == Self::NONE;
         let known =
@@ -45,7 +45,7 @@ impl FieldMetadata {
     }
 
     /// Checks that scale, offset and unit in the metadata agree with those of the mapping.
-    pub(crate) fn check(&self, column: &str, known: &Self) -> Result<(), ErrorKind> {
+    pub(crate) fn check(&self, column: &str, known: &Self) -> Result<(), Fault> {
         let differs = |noted: f64, known: f64| {
             ((noted - known).abs() > 1e-9 * known.abs()).then(|| (noted.to_string(), known.to_string()))
         };
@@ -58,7 +58,16 @@ impl FieldMetadata {
         match found.into_iter().find_map(|(key, differs)| Some((key, differs?))) {
             None => Ok(()),
             Some((key, (noted, known))) => {
-                Err(ErrorKind::MetadataContradicts { column: column.to_owned(), key, noted, known })
+                let message = format!(
+                    "the file notes {key} {noted} for column `{column}`, and the mapping has {known}"
+                );
+                let hint = format!(
+                    "set `{key}` of the channel to {noted}; if the file is wrong, set its `ignore_metadata = true`"
+                );
+                let fault = Fault::new("metadata_contradicts", message, hint).column(column);
+                Err(fault
+                    .found(format!("`{key}` = {noted} in the Arrow metadata"))
+                    .expected(format!("`{key}` = {known}")))
             }
         }
     }

@@ -10,8 +10,9 @@ use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, UInt64Array};
 use arrow::compute::{nullif, take};
 use arrow::datatypes::{DataType, Field, Fields};
 
-use crate::error::ErrorKind;
+use crate::error::{Fault, list_lengths};
 use crate::mapping::column_pattern::composed;
+use crate::parquet::numeric::wrong_type;
 
 /// One leaf of the schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -110,27 +111,21 @@ fn lengths_per_outer_row(outer: Option<Vec<usize>>, inner: &[usize]) -> Vec<usiz
 
 /// Brings leaves of one batch to the same number of samples: where one of them is a list, a value that
 /// stands once for its row is repeated for every sample in it.
-pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<ArrayRef>, ErrorKind> {
+pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<ArrayRef>, Fault> {
     let Some(listed) = flats.iter().position(|flat| flat.lengths.is_some()) else {
         return Ok(flats.into_iter().map(|flat| flat.values).collect());
     };
     let lengths = flats[listed].lengths.clone().unwrap_or_default();
     let differs = |flat: &FlatLeaf| flat.lengths.as_ref().is_some_and(|l| *l != lengths);
     if let Some(other) = flats.iter().position(differs) {
-        return Err(ErrorKind::ListLengths {
-            column: names[other].to_owned(),
-            other: names[listed].to_owned(),
-        });
+        return Err(list_lengths(names[other], names[listed]));
     }
     let rows: UInt64Array =
         lengths.iter().enumerate().flat_map(|(row, &n)| std::iter::repeat_n(row as u64, n)).collect();
     let spread = |(name, flat): (&&str, FlatLeaf)| match flat.lengths {
         Some(_) => Ok(flat.values),
-        None => take(&flat.values, &rows, None).map_err(|_| ErrorKind::ColumnType {
-            column: (*name).to_owned(),
-            found: flat.values.data_type().to_string(),
-            wanted: "no plain values next to lists",
-        }),
+        None => take(&flat.values, &rows, None)
+            .map_err(|_| wrong_type(name, &flat.values, "no plain values next to lists")),
     };
     names.iter().zip(flats).map(spread).collect()
 }

@@ -16,27 +16,29 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 
 use crate::channel::column_builder::ColumnBuilder;
-use crate::error::{Error, ErrorKind};
+use crate::error::{self, Error, Fault, encrypted, not_parquet};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
 use crate::io::foreign_format;
 use crate::io::read_at;
-use crate::mapping::column_pattern::{composed, nearest};
+use crate::mapping::column_pattern::composed;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
-use crate::parquet::raw_footer::{self, Claims, Footer, caught, not_parquet};
+use crate::parquet::raw_footer::{self, Claims, Footer, caught};
 use crate::parquet::row_selection::{RowSelection, intersects};
 
 /// Rows decoded at a time: few enough for the cache, many enough that the cost of a batch is small.
 const BATCH_ROWS: usize = 8192;
 
 /// Why a footer could not be read, from the first bytes of the file where those identify another format.
-fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
-    let ErrorKind::NotParquet { detail } = error else { return error };
+fn footer_error(source: &ByteSource, error: Fault) -> Fault {
+    if error.0.code != "not_parquet" {
+        return error;
+    }
     let mut head = [0; foreign_format::HEAD_BYTES];
     let fetched = source.want(once(0..head.len() as u64));
     let length = match fetched.and_then(|()| Ok(read_at::read_at(&source.file, &mut head, 0)?)) {
@@ -44,12 +46,17 @@ fn footer_error(source: &ByteSource, error: ErrorKind) -> ErrorKind {
         Err(error) => return error,
     };
     match &head[..length] {
-        [b'P', b'A', b'R', b'E', ..] => ErrorKind::Encrypted { column: None },
+        [b'P', b'A', b'R', b'E', ..] => encrypted(None),
         [b'P', b'A', b'R', b'1', ..] => {
+            let detail = error.0.message.trim_start_matches("cannot read as Parquet: ");
             not_parquet(format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: ")))
         }
         head => match foreign_format::of(head) {
-            Some(format) => ErrorKind::ForeignFormat { format },
+            Some(format) => Fault::new(
+                "not_parquet",
+                format!("this is {format}, not a Parquet file"),
+                "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`",
+            ),
             None => not_parquet("not a Parquet file"),
         },
     }
@@ -92,13 +99,17 @@ impl Scan<'_> {
 
 impl LogFile {
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        Self::read_footer(path).map_err(|fault| Error::new(path, fault))
+        Self::read_footer(path).map_err(|fault| fault.in_file(path))
     }
 
-    fn read_footer(path: &Path) -> Result<Self, ErrorKind> {
+    fn read_footer(path: &Path) -> Result<Self, Fault> {
         let source = ByteSource::open(path)?;
+        let empty = || {
+            let hint = "file is empty; delete it or ignore it. It is skipped until it changes";
+            Fault::new("empty_log", "the log has no rows", hint)
+        };
         if read_at::file_length(&source.file)? == 0 {
-            return Err(ErrorKind::Empty);
+            return Err(empty());
         }
         let read = raw_footer::read(&source.file, |range| source.want(once(range)));
         let Footer { metadata, start: footer_start, claims } =
@@ -115,7 +126,7 @@ impl LogFile {
         let (path, flight_rows) = (path.to_owned(), Vec::new());
         let opened =
             Self { path, flight_rows, source, footer, footer_start, claims, coded, noted, leaves, by_name };
-        if opened.rows() == 0 { Err(ErrorKind::Empty) } else { Ok(opened) }
+        if opened.rows() == 0 { Err(empty()) } else { Ok(opened) }
     }
 
     /// The same file, restricted to the rows of one flight.
@@ -127,8 +138,8 @@ impl LogFile {
         &self.path
     }
 
-    pub(crate) fn error(&self, fault: ErrorKind) -> Error {
-        Error::new(&self.path, fault)
+    pub(crate) fn error(&self, fault: Fault) -> Error {
+        fault.in_file(&self.path)
     }
 
     /// Rows the footer declares.
@@ -160,14 +171,16 @@ impl LogFile {
 
     /// A leaf by its name.
     pub(crate) fn leaf(&self, name: &str) -> Result<&LeafColumn, Error> {
-        let (found, column) = (self.named(name), name.to_owned());
+        let found = self.named(name);
         Err(self.error(match found[..] {
             [leaf] => return Ok(leaf),
-            [] => {
-                let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
-                ErrorKind::ColumnMissing { column, nearest }
+            [] => error::column_missing(name, self.leaves.iter().map(|leaf| leaf.name.as_str())),
+            _ => {
+                let message = format!("the log has {} columns called `{name}`", found.len());
+                let hint =
+                    "give each column a name of its own where the file is written, or map another column";
+                Fault::new("duplicate_column", message, hint).column(name)
             }
-            _ => ErrorKind::DuplicateColumn { column, count: found.len() },
         }))
     }
 
@@ -232,7 +245,7 @@ impl LogFile {
         &self,
         names: &[&str],
         scan: Scan<'_>,
-        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
     ) -> Result<(), Error> {
         self.scan_flat(names, scan, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
     }
@@ -242,7 +255,7 @@ impl LogFile {
         &self,
         names: &[&str],
         scan: Scan<'_>,
-        mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
+        mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), Fault>,
     ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         let wanted: Vec<usize> = self.groups().filter(|group| (scan.wants_group)(*group)).collect();
@@ -302,7 +315,7 @@ impl LogFile {
                 let pages = self.pages(group, leaf)?;
                 let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
                 column_numbers::append(pages, chunk, wanted, into)
-                    .map_err(|detail| self.decode(leaf, group, detail))?;
+                    .map_err(|detail| self.decode(leaf, group, &detail))?;
                 self.all_rows(group, into.len() - before, leaf)?;
             } else {
                 self.each_batch(group, &[leaf], Scan::PLAIN, |columns| {
@@ -320,8 +333,7 @@ impl LogFile {
         if found == declared {
             return Ok(());
         }
-        let (found, declared, column) = (found as u64, declared as u64, leaf.name.clone());
-        Err(self.error(ErrorKind::RowCount { column, found, declared }))
+        Err(self.error(error::row_count(&leaf.name, found, declared)))
     }
 
     /// Steps through one row group's leaves, each by its own reader: two fields of one struct would
@@ -331,7 +343,7 @@ impl LogFile {
         group: usize,
         leaves: &[&LeafColumn],
         scan: Scan<'_>,
-        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
     ) -> Result<(), Error> {
         let mut columns =
             leaves.iter().map(|leaf| self.column(group, leaf, scan)).collect::<Result<Vec<_>, _>>()?;
@@ -340,13 +352,12 @@ impl LogFile {
             let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
             for (reader, leaf) in columns.iter_mut().zip(leaves) {
                 let next = caught(|| reader.next().transpose());
-                let next = next.map_err(|detail| self.decode(leaf, group, detail))?;
+                let next = next.map_err(|detail| self.decode(leaf, group, &detail))?;
                 batch.extend(next.map(|found| Arc::clone(found.column(0))));
             }
             let Some(first) = batch.first() else { return self.all_rows(group, rows, leaves[0]) };
             if batch.len() < leaves.len() || batch.iter().any(|a| a.len() != first.len()) {
-                let detail = "its leaves hold different numbers of rows".to_owned();
-                return Err(self.decode(leaves[0], group, detail));
+                return Err(self.decode(leaves[0], group, "its leaves hold different numbers of rows"));
             }
             rows += first.len();
             take(&batch).map_err(|fault| self.error(fault))?;
@@ -366,7 +377,7 @@ impl LogFile {
         let kinds = is_coded.then(|| footer.schema().fields());
         let (file, groups) = (Arc::clone(&self.source.file), vec![group]);
         let groups = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: scan.batch_rows };
-        groups.reader(mask, kinds).map_err(|e| self.decode(leaf, group, e.to_string()))
+        groups.reader(mask, kinds).map_err(|e| self.decode(leaf, group, &e.to_string()))
     }
 
     /// Whether a chunk is a text column outside of structs, with dictionary codes as values.
@@ -414,7 +425,7 @@ impl LogFile {
     fn pages(&self, group: usize, leaf: &LeafColumn) -> Result<Vec<Page>, Error> {
         let rows = self.footer.metadata().row_group(group).num_rows();
         page_header::bounded(&self.source.file, self.chunk(group, leaf), rows)
-            .map_err(|detail| self.decode(leaf, group, detail))
+            .map_err(|detail| self.decode(leaf, group, &detail))
     }
 
     fn chunk(&self, group: usize, leaf: &LeafColumn) -> &ColumnChunkMetaData {
@@ -427,15 +438,14 @@ impl LogFile {
         self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
     }
 
-    fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
-        let (column, row_group) = (leaf.name.clone(), Some(group as u64));
+    fn decode(&self, leaf: &LeafColumn, group: usize, detail: &str) -> Error {
         let is_own = |chunk: &u64| chunk % self.leaves.len() as u64 == leaf.index as u64;
         self.error(if self.claims.encrypted_chunks.iter().any(is_own) {
-            ErrorKind::Encrypted { column: Some(column) }
+            encrypted(Some(&leaf.name))
         } else if self.claims.is_encrypted {
-            ErrorKind::Encrypted { column: None }
+            encrypted(None)
         } else {
-            ErrorKind::Decode { column, row_group, detail }
+            error::decode_failed(&leaf.name, group, detail)
         })
     }
 

@@ -11,7 +11,7 @@ use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use polars_parquet_format::thrift::varint::VarInt;
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
-use crate::error::ErrorKind;
+use crate::error::{Fault, not_parquet};
 use crate::io::read_at;
 
 /// The highest encoding that is read: byte stream split.
@@ -33,10 +33,7 @@ pub(crate) struct Footer {
 
 /// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
 /// `want` fetches bytes before they are read.
-pub(crate) fn read(
-    file: &File,
-    want: impl Fn(Range<u64>) -> Result<(), ErrorKind>,
-) -> Result<Footer, ErrorKind> {
+pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Footer, Fault> {
     let corrupt = || not_parquet("Invalid Parquet file. Corrupt footer");
     let length = read_at::file_length(file)?;
     want(length.saturating_sub(USUAL_FOOTER)..length)?;
@@ -64,7 +61,9 @@ pub(crate) fn read(
     if claims.encoding > HIGHEST_ENCODING {
         let number = claims.encoding;
         let encoding = if number == ALP { "ALP".to_owned() } else { format!("number {number}") };
-        return Err(ErrorKind::EncodingUnsupported { encoding });
+        let message = format!("the file uses the encoding {encoding}, which is not supported");
+        let hint = "have the recorder write PLAIN, BYTE_STREAM_SPLIT or dictionary encoding, or rewrite the file with the tool that wrote it";
+        return Err(Fault::new("encoding_unsupported", message, hint));
     }
     let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&footer)).map_err(not_parquet)?;
     Ok(Footer { metadata: Arc::new(metadata), start, claims })
@@ -76,11 +75,6 @@ pub(crate) fn caught<T, E: Display>(read: impl FnOnce() -> Result<T, E>) -> Resu
         Ok(result) => result.map_err(|e| e.to_string()),
         Err(_) => Err("its pages are inconsistent".into()),
     }
-}
-
-/// The fault of a file that cannot be read as Parquet.
-pub(crate) fn not_parquet(detail: impl Into<String>) -> ErrorKind {
-    ErrorKind::NotParquet { detail: detail.into() }
 }
 
 /// What a footer claims.

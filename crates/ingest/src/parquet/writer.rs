@@ -14,11 +14,12 @@ use arrow::error::ArrowError;
 use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{self, Compression, ZstdLevel};
+use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault, bad_table};
 use crate::parquet::page_crc;
 
 /// Files that this process began.
@@ -88,10 +89,9 @@ pub(crate) fn write_encoded(
     metadata: &[(String, String)],
     encoding: Encoding,
 ) -> Result<(), Error> {
-    let fail = |fault| Error::new(file, fault);
-    let io = |source: std::io::Error| fail(source.into());
-    let bad = |e: String| fail(ErrorKind::Table { row: None, column: None, detail: e });
-    let batch = batch(columns).map_err(|e| bad(e.to_string()))?;
+    let io = |source: std::io::Error| Fault::from(source).in_file(file);
+    let bad = |e: ParquetError| bad_table(e).in_file(file);
+    let batch = batch(columns).map_err(|e| bad(e.into()))?;
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder).map_err(io)?;
     }
@@ -99,10 +99,10 @@ pub(crate) fn write_encoded(
     let own = format!("{}-{}", std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
     let [bare, beside] = ["bare", "part"].map(|end| file.with_extension(format!("{own}.{end}")));
     let sink = object_io::create_fresh(&bare).map_err(io)?;
-    write_batch(sink, &batch, properties(&batch, metadata, encoding)).map_err(|e| bad(e.to_string()))?;
+    write_batch(sink, &batch, properties(&batch, metadata, encoding)).map_err(bad)?;
     let from = File::open(&bare).map_err(io)?;
     let mut to = object_io::create_fresh(&beside).map_err(io)?;
-    page_crc::copy(&from, &mut to).map_err(|e| bad(e.to_string()))?;
+    page_crc::copy(&from, &mut to).map_err(bad)?;
     to.sync_all().map_err(io)?;
     fs::remove_file(&bare).map_err(io)?;
     fs::rename(&beside, file).map_err(io)

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use jiff::{Timestamp, civil, tz::TimeZone};
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault};
 use crate::mapping::column_pattern::nearest;
 
 /// Names that tables use for what they mean: none of them is another one misspelled.
@@ -28,8 +28,16 @@ const KNOWN: [&str; 12] = [
 pub(super) fn missing(file: &Path, wanted: &str, header: &[String], is_mapped: bool) -> Error {
     // A column with a name of ours keeps its meaning.
     let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
-    let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
-    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest, is_mapped })
+    let nearest = nearest(wanted, others.map(String::as_str));
+    let hint = match (nearest, is_mapped) {
+        (Some(near), true) => format!("`{near}`? A table may call its columns otherwise: see `[columns]`"),
+        (None, true) => "map the column names under `[columns]` (docs/configuration.md)".to_owned(),
+        (near, false) => {
+            let near = near.map(|near| format!("`{near}`? ")).unwrap_or_default();
+            format!("{near}docs/configuration.md has the names of this table's columns")
+        }
+    };
+    Fault::new("bad_table", format!("the table has no column `{wanted}`"), hint).column(wanted).in_file(file)
 }
 
 /// Reads a name.

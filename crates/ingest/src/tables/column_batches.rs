@@ -22,12 +22,12 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
 use crate::bounds::{self, TABLE_COLUMNS};
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, Fault, bad_table, column_type, not_parquet};
 use crate::io::byte_source::whole;
 use crate::io::transient;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
-use crate::parquet::raw_footer::{self, caught, not_parquet};
+use crate::parquet::raw_footer::{self, caught};
 use crate::tables::cell::{missing, number, utc};
 
 /// Rows of a batch; of a CSV table of more than [`USUAL_COLUMNS`] columns, in proportion fewer.
@@ -164,9 +164,9 @@ impl TableBatch {
 
     /// A diagnostic about a row's cell; rows count from 0 here and from 1 for people.
     pub fn error(&self, row: usize, column: Option<usize>, detail: String) -> Error {
-        let (row, column) =
-            ((self.before + row) as u64 + 1, column.and_then(|c| self.header.get(c).cloned()));
-        Error::new(&self.file, ErrorKind::Table { row: Some(row), column, detail })
+        let mut fault = bad_table(detail).row((self.before + row) as u64 + 1);
+        fault.0.column = column.and_then(|column| self.header.get(column)).cloned();
+        fault.in_file(&self.file)
     }
 
     fn parsed<T: arrow::datatypes::ArrowPrimitiveType>(
@@ -186,8 +186,8 @@ impl TableBatch {
         let Some(column) = column else { return Ok(new_null_array(wanted, self.rows().len())) };
         let array = self.batch.column(column);
         cast(array, wanted).map_err(|_| {
-            let (column, found) = (self.header[column].clone(), array.data_type().to_string());
-            Error::new(&self.file, ErrorKind::ColumnType { column, found, wanted: "text, numbers or times" })
+            let found = array.data_type().to_string();
+            column_type(&self.header[column], &found, "text, numbers or times").in_file(&self.file)
         })
     }
 }
@@ -209,7 +209,7 @@ impl TableSplits {
     pub fn open(file: &Path, wanted: Option<&[&str]>, coded: &[&str]) -> Result<Self, Error> {
         let is_parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let parquet = is_parquet.then(|| parquet(file, wanted, coded)).transpose();
-        Ok(Self { file: file.to_owned(), parquet: parquet.map_err(|fault| Error::new(file, fault))? })
+        Ok(Self { file: file.to_owned(), parquet: parquet.map_err(|fault| fault.in_file(file))? })
     }
 
     /// How many parts there are: one at least.
@@ -232,13 +232,12 @@ impl TableSplits {
             Some((file, footer, mask)) => groups(file, footer, mask.clone(), parts),
             None => csv(&self.file),
         };
-        let Rows { schema, mut batches, mut before } =
-            opened.map_err(|fault| Error::new(&self.file, fault))?;
+        let Rows { schema, mut batches, mut before } = opened.map_err(|fault| fault.in_file(&self.file))?;
         let (file, mut if_none) = (self.file.clone(), Some(RecordBatch::new_empty(schema)));
         Ok(std::iter::from_fn(move || {
             let empty = if_none.take();
             let batch = batches.next().or_else(|| empty.map(Ok))?;
-            Some(batch.map_err(|fault| Error::new(&file, fault)).map(|batch| {
+            Some(batch.map_err(|fault| fault.in_file(&file)).map(|batch| {
                 let rows = batch.num_rows();
                 before += rows;
                 TableBatch::new(&file, batch, before - rows)
@@ -251,7 +250,7 @@ fn parquet(
     file: &Path,
     wanted: Option<&[&str]>,
     coded: &[&str],
-) -> Result<(Arc<File>, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
+) -> Result<(Arc<File>, ArrowReaderMetadata, ProjectionMask), Fault> {
     let opened = whole(file)?;
     let metadata = raw_footer::read(&opened, |_| Ok(()))?.metadata;
     let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()));
@@ -268,7 +267,7 @@ fn parquet(
 /// Rows of an open table, in batches.
 struct Rows {
     schema: Arc<Schema>,
-    batches: Box<dyn Iterator<Item = Result<RecordBatch, ErrorKind>> + Send>,
+    batches: Box<dyn Iterator<Item = Result<RecordBatch, Fault>> + Send>,
     /// Rows of the table before these.
     before: usize,
 }
@@ -279,7 +278,7 @@ fn groups(
     footer: &ArrowReaderMetadata,
     mask: ProjectionMask,
     groups: Range<usize>,
-) -> Result<Rows, ErrorKind> {
+) -> Result<Rows, Fault> {
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
@@ -293,7 +292,7 @@ fn groups(
 }
 
 /// The rows of a CSV file, all of whose cells are text.
-fn csv(file: &Path) -> Result<Rows, ErrorKind> {
+fn csv(file: &Path) -> Result<Rows, Fault> {
     let mut text = Vec::new();
     let opened = whole(file)?;
     let mut opened = opened.as_ref();
@@ -303,18 +302,18 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
         opened.read_to_end(&mut text)
     })?;
     if let Some(format) = foreign(&text) {
-        return Err(ErrorKind::table(format!("this is {format}: save it as CSV in UTF-8")));
+        return Err(bad_table(format!("this is {format}: save it as CSV in UTF-8")));
     }
     // Spreadsheets open their UTF-8 with a byte order mark.
     let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
     let format = Format::default().with_header(true).with_comment(b'#');
-    let (header, _) = format.infer_schema(&text[mark..], Some(0)).map_err(ErrorKind::table)?;
+    let (header, _) = format.infer_schema(&text[mark..], Some(0)).map_err(bad_table)?;
     let names: Vec<&str> = header.fields().iter().map(|field| field.name().trim()).collect();
     if let Some(separator) =
         [';', '\t'].into_iter().find(|c| names.first().is_some_and(|first| first.contains(*c)))
     {
         let separator = separator.escape_default();
-        return Err(ErrorKind::table(format!(
+        return Err(bad_table(format!(
             "its fields are separated by `{separator}`: save it with commas, and numbers with a point"
         )));
     }
@@ -326,7 +325,7 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
     }
     let mut known = BTreeSet::new();
     if let Some(twice) = names.iter().find(|name| !name.is_empty() && !known.insert(**name)) {
-        return Err(ErrorKind::table(format!("the header has column `{twice}` twice: rename or remove one")));
+        return Err(bad_table(format!("the header has column `{twice}` twice: rename or remove one")));
     }
     let fields: Vec<Field> = names.iter().map(|name| Field::new(*name, DataType::Utf8, true)).collect();
     let schema = Arc::new(Schema::new(fields));
@@ -335,9 +334,8 @@ fn csv(file: &Path) -> Result<Rows, ErrorKind> {
     // The reader takes the memory of a batch before it knows how many rows there are.
     let rows = ROWS / names.len().div_ceil(USUAL_COLUMNS).max(1);
     let reader = ReaderBuilder::new(Arc::clone(&schema)).with_format(format).with_batch_size(rows);
-    let reader = reader.build_buffered(text).map_err(ErrorKind::table)?;
-    let unread =
-        |error| ErrorKind::table(format!("{error} (lines that are blank or comments are not counted)"));
+    let reader = reader.build_buffered(text).map_err(bad_table)?;
+    let unread = |error| bad_table(format!("{error} (lines that are blank or comments are not counted)"));
     let batches = Box::new(reader.map(move |batch| batch.map_err(unread)));
     Ok(Rows { schema, batches, before: 0 })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use jiff::Timestamp;
 use records::{Alias, Installation, Installations};
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, bad_table};
 use crate::tables::cell::{name, number, utc};
 use crate::tables::column_batches::{ColumnAliases, TableBatch};
 
@@ -35,7 +35,7 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
     })?;
     // The text of a million rows is not kept next to their values.
     drop(table);
-    let contradiction = |fault| Error::new(file, ErrorKind::table(fault));
+    let contradiction = |fault| bad_table(fault).in_file(file);
     Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
 }
 

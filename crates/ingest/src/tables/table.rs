@@ -6,8 +6,9 @@ use std::sync::Arc;
 use arrow::array::{AsArray, RecordBatch, RecordBatchOptions};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
 
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, bad_table};
 use crate::tables::column_batches::{ColumnAliases, TableBatch, TableSplits, text_at};
 
 impl TableBatch {
@@ -26,7 +27,7 @@ impl TableBatch {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn as_text(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let fail = |error| Error::new(name, ErrorKind::table(error));
+        let fail = |error: ArrowError| bad_table(error).in_file(name);
         let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
         let mut whole = Self::new(name, concat_batches(&schema, batches).map_err(fail)?, 0);
         let texts = (0..whole.header.len()).map(|column| whole.cast(Some(column), &DataType::Utf8));

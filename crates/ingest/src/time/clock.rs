@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use jiff::Timestamp;
 
-use crate::error::ErrorKind;
+use crate::error::{Fault, time_unit_unknown};
 use crate::mapping::ClockMapping;
 
 /// Seconds of a day.
@@ -109,7 +109,7 @@ impl TimeBase {
     }
 
     /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
-    pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), ErrorKind> {
+    pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), Fault> {
         let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
         let rows = self.segments.last().map_or(0, |last| last.end);
         let length_s = |rows: usize| rows as f64 * self.step_s;
@@ -119,8 +119,13 @@ impl TimeBase {
             let shortest_s = length_s(row.min(rows - row));
             if after_s - before_s > max_gap_s && shortest_s >= SHORTEST_FLIGHT_S {
                 let end_s = self.breaks.last().map_or(0.0, |last| last.1 + length_s(rows - last.0));
-                let (column, row) = (column.to_owned(), row as u64);
-                return Err(ErrorKind::SeveralFlights { column, row, before_s, after_s, end_s, max_gap_s });
+                let hint = "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`";
+                let fault = Fault::new("several_flights", "the log seems to hold two flights", hint);
+                return Err(fault
+                    .column(column)
+                    .row(row as u64)
+                    .found(format!("samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"))
+                    .expected(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)")));
             }
             start = (row, after_s);
         }
@@ -191,7 +196,7 @@ pub(crate) fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
 }
 
 /// Puts timestamped rows on one clock, and repairs the timestamps where the mapping defines how.
-pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, Fault> {
     if let TimeOrigin::Counted(first_s) = stamps.origin {
         plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
     }
@@ -222,7 +227,9 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let count = kept.as_ref().map_or(t.len(), Vec::len);
     let step = |i: usize| at(i) - at(i - 1);
     if count < 2 {
-        return Err(ErrorKind::TimeStandsStill { column: stamps.column.clone(), rows: t.len() as u64 });
+        let hint = "map the column with the time, or give only `clock.rate_hz`";
+        let fault = Fault::new("time_stands_still", "time does not advance", hint).column(&stamps.column);
+        return Err(fault.found(format!("{} rows with one stamp", t.len())));
     }
     let seen_s = usual_step((1..count).map(step).filter(|s| *s > 0.0).collect());
     let step_s = checked_step(seen_s, clock, &stamps.column)?;
@@ -238,8 +245,8 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
             && (first_s + at(i) + 0.5 * step_s).rem_euclid(100.0) < step_s
     };
     if breaks.len() > 1 && breaks.iter().all(is_packed) {
-        let found = "a clock that reads as HHMMSS: it leaps by 40 after each minute".to_owned();
-        return Err(ErrorKind::TimeUnit { column: stamps.column.clone(), found });
+        let found = "a clock that reads as HHMMSS: it leaps by 40 after each minute";
+        return Err(time_unit_unknown(&stamps.column, found));
     }
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
     let jittered = jittered_s.map_or(0, |_| count);
@@ -286,26 +293,29 @@ fn is_in_no_order(seconds: &[f64]) -> bool {
 }
 
 /// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
-fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, ErrorKind> {
+fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, Fault> {
     let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
     if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
-        let (column, declared_hz) = (column.to_owned(), step_s.recip());
-        return Err(ErrorKind::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
+        let (declared_hz, seen_hz) = (step_s.recip(), seen_s.recip());
+        let message = format!("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}");
+        let hint = "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps";
+        let fault = Fault::new("rate_contradicts", message, hint).column(column);
+        return Err(fault
+            .found(format!("{seen_hz:.6} Hz by the median step"))
+            .expected(format!("{declared_hz} Hz (`clock.rate_hz`)")));
     }
     plausible(step_s, "the step", PLAUSIBLE_STEP_S, column)
 }
 
 /// A time within a range.
-fn plausible(
-    value_s: f64,
-    what: &'static str,
-    (least_s, most_s): (f64, f64),
-    column: &str,
-) -> Result<f64, ErrorKind> {
+fn plausible(value_s: f64, what: &str, (least_s, most_s): (f64, f64), column: &str) -> Result<f64, Fault> {
     if (least_s..=most_s).contains(&value_s) {
         return Ok(value_s);
     }
-    Err(ErrorKind::TimeImplausible { column: column.to_owned(), what, value_s, least_s, most_s })
+    let message = format!("the clock is not plausible: {what} is {value_s:e} s");
+    let hint = "check `clock.column` and `clock.unit`, and that the file is intact";
+    let fault = Fault::new("time_implausible", message, hint).column(column);
+    Err(fault.expected(format!("{least_s:e} to {most_s:e} s")))
 }
 
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
@@ -328,11 +338,7 @@ fn fill_missing(seconds: &mut [f64], rate_hz: f64) -> usize {
 }
 
 /// Cuts the rows where the clock falls too deep, or refuses to.
-fn split_at_resets(
-    stamps: &Timestamps,
-    max_back_s: f64,
-    split: bool,
-) -> Result<Vec<Range<usize>>, ErrorKind> {
+fn split_at_resets(stamps: &Timestamps, max_back_s: f64, split: bool) -> Result<Vec<Range<usize>>, Fault> {
     let (mut newest, mut deep, mut cuts) = (f64::NEG_INFINITY, None, Vec::new());
     for (row, &s) in stamps.seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
         if newest - s > max_back_s {
@@ -344,8 +350,11 @@ fn split_at_resets(
     }
     match deep {
         Some((row, before_s, after_s)) if !split => {
-            let (column, times) = (stamps.column.clone(), cuts.len() as u64);
-            Err(ErrorKind::TimeGoesBack { column, row, before_s, after_s, max_back_s, times })
+            let hint = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does";
+            let fault = Fault::new("time_goes_back", "time runs backwards", hint).column(&stamps.column);
+            let found = format!("{after_s} s after {before_s} s; {} rows lie so far back", cuts.len());
+            let most = format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)");
+            Err(fault.row(row).found(found).expected(most))
         }
         _ => Ok(split_at(stamps.seconds.len(), &cuts)),
     }
@@ -465,8 +474,13 @@ mod tests {
         Timestamps { column: "t".into(), seconds: seconds.to_vec(), origin: TimeOrigin::Counted(0.0) }
     }
 
-    fn base(seconds: &[f64], clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+    fn base(seconds: &[f64], clock: &ClockMapping) -> Result<TimeBase, Fault> {
         build_time_base(&mut stamps(seconds), clock)
+    }
+
+    /// The code of the error that these stamps give.
+    fn refusal(seconds: &[f64]) -> String {
+        base(seconds, &usual()).unwrap_err().0.code
     }
 
     fn usual() -> ClockMapping {
@@ -510,7 +524,9 @@ mod tests {
     #[test]
     fn a_deep_fall_is_refused_with_its_row_or_splits_the_log() {
         let t = [0.0, 0.1, 5.0, 5.1, 1.0, 1.1, 1.2];
-        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeGoesBack { row: 4, times: 3, .. })));
+        let refused = base(&t, &usual()).unwrap_err().0;
+        assert_eq!((refused.code.as_str(), refused.row), ("time_goes_back", Some(4)));
+        assert!(refused.found.unwrap().ends_with("3 rows lie so far back"));
         let split = base(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
         assert_eq!(split.segments, [0..2, 2..4, 4..7]);
         assert_eq!(split.repairs.out_of_order, 0);
@@ -521,12 +537,12 @@ mod tests {
     fn a_clock_that_no_recorder_has_is_refused() {
         for step_s in [1e50, 1e-300, 1e6] {
             let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * step_s).collect();
-            assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeImplausible { .. })), "{step_s}");
+            assert_eq!(refusal(&t), "time_implausible", "{step_s}");
         }
         let mut early = stamps(&[0.0, 0.01, 0.02]);
         early.origin = TimeOrigin::Counted(-1e50);
-        let refused = build_time_base(&mut early, &usual());
-        assert!(matches!(refused, Err(ErrorKind::TimeImplausible { what: "the first stamp", .. })));
+        let refused = build_time_base(&mut early, &usual()).unwrap_err();
+        assert!(refused.0.message.contains("the first stamp is -1e50 s"), "{refused:?}");
     }
 
     /// 263 · 327 = 172 · 500 + 1: row k of the second log is sample 263k modulo 500.
@@ -546,7 +562,7 @@ mod tests {
     #[test]
     fn two_recordings_whose_rows_alternate_are_not_sorted_into_each_other() {
         let t: Vec<f64> = (0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect();
-        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeGoesBack { .. })));
+        assert_eq!(refusal(&t), "time_goes_back");
     }
 
     /// From 04:58:00 on, past a full hour.
@@ -557,7 +573,7 @@ mod tests {
             (s / 3600.0).floor() * 1e4 + (s % 3600.0 / 60.0).floor() * 100.0 + s % 60.0
         };
         let t: Vec<f64> = (0..4800).map(packed).collect();
-        assert!(matches!(base(&t, &usual()), Err(ErrorKind::TimeUnit { .. })));
+        assert_eq!(refusal(&t), "time_unit_unknown");
     }
 
     /// A recorder that rests for 40 s of each minute.
@@ -569,7 +585,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_stands_still_is_refused() {
-        assert!(matches!(base(&[1.0, 1.0], &usual()), Err(ErrorKind::TimeStandsStill { rows: 2, .. })));
+        assert_eq!(refusal(&[1.0, 1.0]), "time_stands_still");
     }
 
     /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.

@@ -5,7 +5,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::{Timestamp, civil};
 
-use crate::error::ErrorKind;
+use crate::error::{Fault, time_unit_unknown};
 use crate::mapping::units::TimeUnit;
 use crate::mapping::{ClockMapping, Epoch};
 use crate::parquet::numeric::{append, as_text, wrong_type};
@@ -101,7 +101,7 @@ impl<'a> TimestampParser<'a> {
         Self { column, ticks, first_whole: None, turns: 0.0, before: f64::NAN, seconds }
     }
 
-    pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), ErrorKind> {
+    pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), Fault> {
         if self.ticks.is_text {
             let text = as_text(self.column, array)?;
             for (row, value) in text.as_string::<i32>().iter().enumerate() {
@@ -118,7 +118,7 @@ impl<'a> TimestampParser<'a> {
         Ok(())
     }
 
-    fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
+    fn parsed(&mut self, value: &str, row: usize) -> Result<i64, Fault> {
         let value = value.trim();
         let zoned = value.parse::<Timestamp>().ok();
         if zoned.is_some() && self.ticks.origin == TickEpoch::Local {
@@ -137,8 +137,7 @@ impl<'a> TimestampParser<'a> {
             self.ticks.origin = TickEpoch::Midnight;
             tick = i64::try_from(time.duration_since(civil::Time::midnight()).as_nanos()).ok();
         }
-        let found = || format!("`{value}` in row {row}");
-        tick.ok_or_else(|| ErrorKind::TimeUnit { column: self.column.to_owned(), found: found() })
+        tick.ok_or_else(|| time_unit_unknown(self.column, &format!("`{value}` in row {row}")))
     }
 
     fn push_whole(&mut self, tick: Option<i64>) {
