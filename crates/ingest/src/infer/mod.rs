@@ -398,23 +398,6 @@ mod tests {
     use super::*;
     use crate::parquet::writer::{Column, write_parquet};
 
-    #[test]
-    fn a_log_with_names_and_units_is_understood_whole() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../tests/data/three-aircraft/sample-data/logs/N412FP");
-        let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
-        let found = propose(&log).unwrap();
-        assert_eq!(found.clock, Some(("time_s".to_owned(), Some("s"))));
-        assert_eq!(
-            found.channels[&Role::Screw],
-            [("{position}_screw_mm".to_owned(), Some(Unit::Millimetre))]
-        );
-        let positions: Vec<&str> = found.positions.iter().map(String::as_str).collect();
-        assert_eq!(positions, ["aileron_left", "aileron_right", "elevator_left", "elevator_right"]);
-        assert_eq!((found.metadata.len(), found.others.len()), (5, 0));
-        assert!(found.tails.iter().eq(["N412FP"]));
-    }
-
     fn of(names: &[&str]) -> InferredMapping {
         channels(names, "").0
     }

@@ -203,11 +203,7 @@ impl<'s> ChannelSampling<'s> {
     /// The channel in SI at its own rows; those that are not wanted may be missing.
     fn readings(&self, geometry: Geometry, wanted: RowSelection<'_>) -> Result<Channel, Error> {
         if let Some(values) = &self.map.condition {
-            let read = if RawValue::has_text(values) {
-                self.table.matches(&self.samples, values)?
-            } else {
-                self.table.numbers(&self.samples, None, None)?.0
-            };
+            let read = self.table.raw_values(&self.samples, values)?;
             self.same_count(read.len(), self.column())?;
             return Ok(self.base.keep(read).into());
         }
@@ -245,14 +241,16 @@ impl<'s> ChannelSampling<'s> {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let marks = match map.status_bits() {
-                Some((set, clear)) => self.table.bit_marks(valid, set, clear)?,
-                None => self.table.matches(valid, &map.valid_values)?,
+            let (marks, wanted) = match map.status_bits() {
+                Some((set, clear)) => {
+                    (self.table.bit_marks(valid, set, clear)?, &[RawValue::Truth(true)][..])
+                }
+                None => (self.table.raw_values(valid, &map.valid_values)?, &*map.valid_values),
             };
             self.same_count(marks.len(), &valid.leaf)?;
-            let is_bad = |mark: f64| !RawValue::Truth(true).is(mark);
             let marked = values.iter_mut().zip(self.base.keep(marks));
-            marked.filter(|(_, mark)| is_bad(*mark)).for_each(|(value, _)| *value = f64::NAN);
+            let bad = marked.filter(|(_, mark)| !RawValue::is_one_of(wanted, *mark));
+            bad.for_each(|(value, _)| *value = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);

@@ -80,20 +80,3 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
     };
     Ok(found.iter().map(path_of).collect())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::parquet::writer::{Column, write_parquet};
-
-    /// Its row group is not read, as the statistics hold the one text.
-    #[test]
-    fn a_file_of_one_flight_holds_that_flight_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("day.parquet");
-        write_parquet(&file, &[("leg".to_owned(), Column::Text(vec!["7".into(); 9]))], &[]).unwrap();
-        let columns = [(IdentityField::FlightId, "leg".to_owned())].into();
-        let mapping = IdentityMapping { columns, by_row: true, ..IdentityMapping::default() };
-        assert_eq!(flights_in(&file, &mapping).unwrap(), [PathBuf::from(format!("{}#7", file.display()))]);
-    }
-}

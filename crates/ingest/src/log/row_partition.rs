@@ -21,8 +21,10 @@ pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 /// Memory limit of gathered samples, bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
-/// No key: the row belongs to a channel that is not requested.
+/// No combination: the row lacks a text.
 const NONE: u32 = u32::MAX;
+/// Most combinations of a batch that are numbered by a table.
+const MAX_TABLE: usize = 1 << 18;
 
 /// The most combinations of texts of the columns that name rows: more are the numbers or times of a wrong column.
 const MAX_COMBINATIONS: u64 = 1 << 22;
@@ -153,7 +155,8 @@ fn gather(
         let keys: Vec<Rows> = keys[..gathered.len()].iter().map(of_flight).collect();
         let columns: Vec<&str> = keys[0].iter().map(|(column, _)| column.as_str()).collect();
         let names: Vec<&str> = leaves.iter().chain(&columns).copied().chain(aligned).collect();
-        let numbered = NumberedKeys::of(&keys).map_err(|fault| file.error(fault))?;
+        let texts = keys.iter().map(|rows| rows.iter().map(|(_, text)| text.as_str()).collect());
+        let by_texts: HashMap<Vec<&str>, usize> = texts.zip(0..).collect();
         let may_hold = |group: usize| {
             keys.iter().any(|rows| {
                 rows.iter().all(|(column, text)| {
@@ -164,8 +167,15 @@ fn gather(
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group: &may_hold };
         file.scan(&names, scan, |arrays| {
             let (values, rest) = arrays.split_at(leaves.len());
-            let by_key = numbered.rows_by_key(&columns, rest)?;
-            for (key, rows) in by_key.into_iter().take(gathered.len()).enumerate() {
+            let found = Combinations::of(&columns, rest)?;
+            let keys: Vec<Option<usize>> = found.texts().map(|texts| by_texts.get(&texts).copied()).collect();
+            let mut by_key = vec![Vec::new(); by_texts.len()];
+            for (row, number) in (0_u32..).zip(&found.of_rows) {
+                if let Some(key) = keys.get(*number as usize).copied().flatten() {
+                    by_key[key].push(row);
+                }
+            }
+            for (key, rows) in by_key.into_iter().enumerate().take(gathered.len()) {
                 if rows.is_empty() {
                     continue;
                 }
@@ -201,27 +211,10 @@ impl DistinctTexts {
         file.scan(names, scan, |arrays| self.take(names, arrays))
     }
 
-    /// Looks at a batch of at most four columns.
+    /// Looks at a batch.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), Fault> {
-        let columns = codes(names, arrays)?;
-        // Most rows repeat the latest combination with their text of the first column.
-        let mut latest = vec![None; columns[0].values().len()];
-        let mut distinct: HashMap<u128, usize> = HashMap::new();
-        for row in 0..arrays[0].len() {
-            let mut codes = columns.iter().map(|column| column.key(row));
-            // The codes of a row, side by side in one number.
-            let packed = codes.try_fold(0_u128, |before, code| Some(before << 32 | code? as u128));
-            let (Some(packed), Some(first)) = (packed, columns[0].key(row)) else { continue };
-            if latest[first].replace(packed) != Some(packed) {
-                distinct.insert(packed, row);
-            }
-        }
-        let text = |column: &Codes, row: usize| {
-            let code = column.key(row).unwrap_or_default();
-            column.values().as_string::<i32>().value(code).to_owned()
-        };
-        let texts = |row: usize| columns.iter().map(|column| text(column, row)).collect();
-        self.0.extend(distinct.into_values().map(texts));
+        let owned = |texts: Vec<&str>| texts.into_iter().map(str::to_owned).collect();
+        self.0.extend(Combinations::of(names, arrays)?.texts().map(owned));
         Ok(bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)?)
     }
 
@@ -231,65 +224,61 @@ impl DistinctTexts {
     }
 }
 
-/// A column of texts, each row as a code.
-type Codes = DictionaryArray<Int32Type>;
-
-/// Columns as texts with codes.
-fn codes(names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Codes>, Fault> {
-    let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-    let coded = |(name, array): (&&str, &ArrayRef)| {
-        let coded = cast(array, &kind).map_err(|_| wrong_type(name, array, "text or numbers"))?;
-        Ok(coded.as_dictionary().clone())
-    };
-    names.iter().zip(arrays).map(coded).collect()
+/// The combinations of texts that the rows of a batch hold.
+struct Combinations {
+    columns: Vec<DictionaryArray<Int32Type>>,
+    /// The number of each row's combination; [`NONE`] where a row lacks one of the texts.
+    of_rows: Vec<u32>,
+    /// The first row of each combination.
+    first_rows: Vec<usize>,
 }
 
-/// Keys, found by the numbers that their texts have in each column.
-struct NumberedKeys<'k> {
-    keys: usize,
-    /// The texts of each column in order: the place of a text is its number.
-    texts: Vec<Vec<&'k str>>,
-    /// The key of each combination of numbers, counted by the last column first; [`NONE`] where it is of no key.
-    by_numbers: Vec<u32>,
-}
-
-impl<'k> NumberedKeys<'k> {
-    fn of(keys: &'k [Rows]) -> Result<Self, Fault> {
-        let in_order = |column: usize| {
-            let texts: BTreeSet<&str> = keys.iter().map(|rows| rows[column].1.as_str()).collect();
-            texts.into_iter().collect()
+impl Combinations {
+    fn of(names: &[&str], arrays: &[ArrayRef]) -> Result<Self, Fault> {
+        let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let coded = |(name, array): (&&str, &ArrayRef)| {
+            let coded = cast(array, &kind).map_err(|_| wrong_type(name, array, "text or numbers"))?;
+            Ok(coded.as_dictionary().clone())
         };
-        let texts: Vec<Vec<&str>> = (0..keys[0].len()).map(in_order).collect();
-        let all = texts.iter().fold(1_u64, |all, texts| all.saturating_mul(texts.len() as u64));
-        bounds::check("texts of columns that name rows", all, MAX_COMBINATIONS)?;
-        let mut by_numbers = vec![NONE; all as usize];
-        for (key, rows) in (0..).zip(keys) {
-            let next = |place: usize, (texts, (_, text)): (&Vec<&str>, &(String, String))| {
-                place * texts.len() + texts.partition_point(|other| *other < text.as_str())
-            };
-            by_numbers[texts.iter().zip(rows).fold(0, next)] = key;
-        }
-        Ok(Self { keys: keys.len(), texts, by_numbers })
-    }
-
-    /// The rows of a batch that belong to each key, by the columns that name rows.
-    fn rows_by_key(&self, names: &[&str], arrays: &[ArrayRef]) -> Result<Vec<Vec<u32>>, Fault> {
-        let Some(first) = arrays.first() else { return Ok(vec![Vec::new(); self.keys]) };
-        let mut places = vec![0; first.len()];
-        for (column, texts) in codes(names, arrays)?.iter().zip(&self.texts) {
-            let number = |text: Option<&str>| Some(texts.binary_search(&text?).ok()? as u32);
-            let numbers: Vec<Option<u32>> = column.values().as_string::<i32>().iter().map(number).collect();
-            for (place, code) in places.iter_mut().zip(column.keys()) {
-                let number = code.and_then(|code| numbers[code as usize]).filter(|_| *place != NONE);
-                *place = number.map_or(NONE, |number| *place * texts.len() as u32 + number);
+        let columns = names
+            .iter()
+            .zip(arrays)
+            .map(coded)
+            .collect::<Result<Vec<DictionaryArray<Int32Type>>, Fault>>()?;
+        let (mut of_rows, mut first_rows) = (vec![0; arrays.first().map_or(0, Array::len)], vec![0]);
+        for column in &columns {
+            let texts = column.values().len();
+            // Numbers of the combinations with this column, in a table unless it would be large.
+            let mut table =
+                vec![NONE; Some(first_rows.len() * texts).filter(|all| *all <= MAX_TABLE).unwrap_or(0)];
+            let mut others = HashMap::new();
+            first_rows.clear();
+            for (row, (number, code)) in of_rows.iter_mut().zip(column.keys()).enumerate() {
+                let Some(code) = code.filter(|_| *number != NONE) else {
+                    *number = NONE;
+                    continue;
+                };
+                let place = *number as usize * texts + code as usize;
+                let known =
+                    if table.is_empty() { others.entry(place).or_insert(NONE) } else { &mut table[place] };
+                if *known == NONE {
+                    *known = first_rows.len() as u32;
+                    first_rows.push(row);
+                }
+                *number = *known;
             }
         }
-        let mut by_key = vec![Vec::new(); self.keys];
-        for (row, place) in (0..).zip(places) {
-            let key = self.by_numbers.get(place as usize).copied().unwrap_or(NONE);
-            by_key.get_mut(key as usize).into_iter().for_each(|rows: &mut Vec<u32>| rows.push(row));
-        }
-        Ok(by_key)
+        Ok(Self { columns, of_rows, first_rows })
+    }
+
+    /// The texts of each combination, by number.
+    fn texts(&self) -> impl Iterator<Item = Vec<&str>> {
+        let texts = |row: &usize| {
+            let columns = self.columns.iter();
+            let texts = columns.map(|c| c.values().as_string::<i32>().value(c.key(*row).unwrap_or_default()));
+            texts.collect()
+        };
+        self.first_rows.iter().map(texts)
     }
 }
 

@@ -120,22 +120,22 @@ impl RowTable {
         Ok(values.finish())
     }
 
-    /// 1 where a sample is one of these values, 0 where it is another; NaN or 0 where it is missing.
-    pub(crate) fn matches(&self, samples: &SampleSelector, values: &[RawValue]) -> Result<Vec<f64>, Error> {
-        let mark = |is_one: bool| f64::from(u8::from(is_one));
+    /// Raw numbers for [`RawValue::is_one_of`]: where `values` are texts, 1 where a sample is one of them and 0 where it is
+    /// another. NaN where a sample is missing.
+    pub(crate) fn raw_values(
+        &self,
+        samples: &SampleSelector,
+        values: &[RawValue],
+    ) -> Result<Vec<f64>, Error> {
         let texts = RawValue::texts(values);
         if texts.is_empty() {
-            let mut marks = self.numbers(samples, None, None)?.0;
-            marks.iter_mut().for_each(|number| *number = mark(values.iter().any(|one| one.is(*number))));
-            return Ok(marks);
+            return Ok(self.numbers(samples, None, None)?.0);
         }
         let mut marks = Vec::new();
         self.each(samples, &samples.leaf, |array| {
             let text = as_text(&samples.leaf, array)?;
-            let is_one = |text: &str| texts.iter().any(|wanted| wanted == text.trim());
-            marks.extend(
-                text.as_string::<i32>().iter().map(|text| text.map_or(f64::NAN, |text| mark(is_one(text)))),
-            );
+            let mark = |text: &str| f64::from(u8::from(texts.iter().any(|wanted| wanted == text.trim())));
+            marks.extend(text.as_string::<i32>().iter().map(|text| text.map_or(f64::NAN, mark)));
             Ok(())
         })?;
         Ok(marks)

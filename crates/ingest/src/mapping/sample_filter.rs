@@ -21,7 +21,7 @@ pub enum RawValue {
 impl RawValue {
     /// Whether a number is this value.
     #[expect(clippy::float_cmp, reason = "a raw value is compared as it was written")]
-    pub(crate) fn is(&self, number: f64) -> bool {
+    fn is(&self, number: f64) -> bool {
         match self {
             Self::Number(own) => *own == number,
             Self::Truth(own) => f64::from(u8::from(*own)) == number,
@@ -39,13 +39,18 @@ impl RawValue {
     }
 
     /// Whether any of these values is a text: the column is then read as text.
-    pub(crate) fn has_text(values: &[Self]) -> bool {
+    fn has_text(values: &[Self]) -> bool {
         values.iter().any(|value| matches!(value, Self::Text(_)))
     }
 
     /// The texts that these values are, where the column is read as text.
     pub(crate) fn texts(values: &[Self]) -> Vec<String> {
         if Self::has_text(values) { values.iter().map(Self::as_text).collect() } else { Vec::new() }
+    }
+
+    /// Whether a number is one of these values; a column of texts is read as 1 where it holds one of them.
+    pub(crate) fn is_one_of(values: &[Self], number: f64) -> bool {
+        if Self::has_text(values) { number > 0.5 } else { values.iter().any(|value| value.is(number)) }
     }
 }
 
@@ -81,13 +86,7 @@ impl SampleFilter {
 
     /// Whether a raw value will do. A missing one does not.
     fn holds(&self, value: f64) -> bool {
-        // A column of texts is read as 1 where it holds one of them.
-        let one_of = self.equals.is_empty()
-            || if RawValue::has_text(&self.equals) {
-                value > 0.5
-            } else {
-                self.equals.iter().any(|wanted| wanted.is(value))
-            };
+        let one_of = self.equals.is_empty() || RawValue::is_one_of(&self.equals, value);
         let reaches = self.at_least.is_none_or(|least| value >= least);
         let stays = self.at_most.is_none_or(|most| value <= most);
         !value.is_nan() && one_of && reaches && stays

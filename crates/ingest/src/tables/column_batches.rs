@@ -76,14 +76,8 @@ impl StringColumn {
 
 /// The text of a row, trimmed; an empty one is none.
 pub(super) fn text_at(texts: &StringArray, row: usize) -> Option<&str> {
-    let text = texts.is_valid(row).then(|| trim_ascii_fast(texts.value(row)))?;
+    let text = texts.is_valid(row).then(|| texts.value(row).trim())?;
     (!text.is_empty()).then_some(text)
-}
-
-/// A text without the blanks around it, of which most have none.
-fn trim_ascii_fast(text: &str) -> &str {
-    let is_bare = |end: Option<&u8>| end.is_some_and(u8::is_ascii_graphic);
-    if is_bare(text.as_bytes().first()) && is_bare(text.as_bytes().last()) { text } else { text.trim() }
 }
 
 impl TableBatch {
@@ -449,13 +443,6 @@ mod tests {
             assert_eq!(last.numbers(Some(1)).unwrap(), Float64Array::from(vec![6.0]));
             let bad = rows(1..2).next().unwrap().numbers(Some(1)).unwrap_err();
             assert_eq!(bad.diagnostic().location().unwrap(), "column `gap_m`, row 6", "{kind}");
-        }
-    }
-
-    #[test]
-    fn a_text_is_trimmed_as_the_standard_library_does() {
-        for text in ["", " ", "a", " a", "a\u{a0}", "\u{2003}é \n", "ab c", "\u{85}"] {
-            assert_eq!(trim_ascii_fast(text), text.trim());
         }
     }
 

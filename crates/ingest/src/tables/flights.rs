@@ -267,25 +267,30 @@ mod tests {
         assert!(flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), None).is_empty());
     }
 
+    /// The hours of the row that is found for a log of this id and departure.
+    fn hours(flights: &Flights, id: Option<&str>, departure: Option<&str>) -> Option<String> {
+        let id = id.map(|id| (IdentityField::FlightId, id.to_owned()));
+        let said = [(IdentityField::TailNumber, "N1".to_owned())].into_iter().chain(id).collect();
+        let departure = departure.map(|text| text.parse().unwrap());
+        flights.facts(Path::new("/x"), &said, departure).remove(&IdentityField::FlightHours)
+    }
+
     /// A flight number that flies every day: only the departure tells which row is meant.
     #[test]
     fn an_id_that_recurs_is_found_by_departure() {
         let row = |day: u32| format!("N1,FP100,2026-03-{day:02}T06:10:00Z,{day}.5\n");
         let rows: String = (1..=9).map(row).collect();
         let flights = read(&format!("{HEADER}{rows}"), &ColumnAliases::new()).unwrap();
-        let said = IdentityFields::from([
-            (IdentityField::TailNumber, "N1".into()),
-            (IdentityField::FlightId, "FP100".into()),
-        ]);
-        let at = |text: &str| text.parse::<Timestamp>().unwrap();
-        let hours = |start: Option<Timestamp>| {
-            flights.facts(Path::new("/x"), &said, start).get(&IdentityField::FlightHours).cloned()
-        };
-        assert_eq!(hours(None), None, "nine flights have this id");
-        assert_eq!(hours(Some(at("2026-03-04T06:25:00Z"))).as_deref(), Some("4.5"));
-        assert_eq!(hours(Some(at("2026-03-20T06:10:00Z"))), None);
-        let of = |text: &str| flights.of("N1", "FP100", at(text)).and_then(|flight| flight.flight_hours);
-        assert_eq!((of("2026-03-07T06:10:00Z"), of("2026-03-07T07:00:00Z")), (Some(7.5), Some(7.5)));
+        for (departure, wanted) in [
+            (None, None),
+            (Some("2026-03-04T06:25:00Z"), Some("4.5")),
+            (Some("2026-03-07T06:10:00Z"), Some("7.5")),
+            (Some("2026-03-20T06:10:00Z"), None),
+        ] {
+            assert_eq!(hours(&flights, Some("FP100"), departure).as_deref(), wanted);
+            let of = departure.and_then(|at| flights.of("N1", "FP100", at.parse().unwrap()));
+            assert_eq!(of.and_then(|flight| flight.flight_hours).map(|h| h.to_string()).as_deref(), wanted);
+        }
     }
 
     /// Two legs of one day and one of the next, each with its date alone: the log's clock has the time.
@@ -293,16 +298,16 @@ mod tests {
     fn a_date_alone_is_joined_to_the_log_of_its_id_or_to_the_only_one_of_its_day() {
         let read = |rows: &str| read(&format!("{HEADER}{rows}"), &ColumnAliases::new());
         let flights = read("N1,A,2026-03-04,2\nN1,B,2026-03-04,3\nN1,C,2026-03-05,4\n").unwrap();
-        let hours = |id: Option<&str>, at: &str| {
-            let id = id.map(|id| (IdentityField::FlightId, id.to_owned()));
-            let said = [(IdentityField::TailNumber, "N1".to_owned())].into_iter().chain(id).collect();
-            flights.facts(Path::new("/x"), &said, at.parse().ok()).get(&IdentityField::FlightHours).cloned()
-        };
-        assert_eq!(hours(Some("A"), "2026-03-04T23:10:00Z").as_deref(), Some("2"));
-        assert_eq!(hours(Some("B"), "2026-03-04T00:10:00Z").as_deref(), Some("3"));
-        assert_eq!(hours(None, "2026-03-05T00:10:00Z").as_deref(), Some("4"));
-        assert_eq!(hours(None, "2026-03-04T12:00:00Z"), None, "two flights depart on this day");
-        assert_eq!(hours(Some("A"), "2026-03-05T12:10:00Z"), None, "another day");
+        for (id, departure, wanted) in [
+            (Some("A"), "2026-03-04T23:10:00Z", Some("2")),
+            (Some("B"), "2026-03-04T00:10:00Z", Some("3")),
+            (None, "2026-03-05T00:10:00Z", Some("4")),
+            // Two flights depart on this day, and flight A on another one.
+            (None, "2026-03-04T12:00:00Z", None),
+            (Some("A"), "2026-03-05T12:10:00Z", None),
+        ] {
+            assert_eq!(hours(&flights, id, Some(departure)).as_deref(), wanted);
+        }
         let error = read("N1,A,2026-03-04,2\nN1,A,2026-03-04,3\n").unwrap_err()[0].diagnostic().to_string();
         assert!(error.contains("row 2") && error.contains("give both departures with their time"), "{error}");
     }

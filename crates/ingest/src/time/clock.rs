@@ -478,11 +478,6 @@ mod tests {
         build_time_base(&mut stamps(seconds), clock)
     }
 
-    /// The code of the error that these stamps give.
-    fn refusal(seconds: &[f64]) -> String {
-        base(seconds, &usual()).unwrap_err().0.code
-    }
-
     fn usual() -> ClockMapping {
         ClockMapping::default()
     }
@@ -532,19 +527,6 @@ mod tests {
         assert_eq!(split.repairs.out_of_order, 0);
     }
 
-    /// A first stamp of −1e50, and steps of 1e50 s and 1e−300 s: no recorder has them, and no filter survives them.
-    #[test]
-    fn a_clock_that_no_recorder_has_is_refused() {
-        for step_s in [1e50, 1e-300, 1e6] {
-            let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * step_s).collect();
-            assert_eq!(refusal(&t), "time_implausible", "{step_s}");
-        }
-        let mut early = stamps(&[0.0, 0.01, 0.02]);
-        early.origin = TimeOrigin::Counted(-1e50);
-        let refused = build_time_base(&mut early, &usual()).unwrap_err();
-        assert!(refused.0.message.contains("the first stamp is -1e50 s"), "{refused:?}");
-    }
-
     /// 263 · 327 = 172 · 500 + 1: row k of the second log is sample 263k modulo 500.
     #[test]
     fn a_log_that_was_written_backwards_or_in_no_order_is_sorted() {
@@ -558,22 +540,28 @@ mod tests {
         }
     }
 
-    /// Rows of two recorders in turn, one of whose clocks is 5 s ahead.
+    /// A clock that stands still; steps of 1e50 s and 1e−300 s, which no recorder has and no filter survives; rows of two
+    /// recorders in turn, one of whose clocks is 5 s ahead; and hours, minutes and seconds in one number, from 04:58:00 on.
     #[test]
-    fn two_recordings_whose_rows_alternate_are_not_sorted_into_each_other() {
-        let t: Vec<f64> = (0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect();
-        assert_eq!(refusal(&t), "time_goes_back");
-    }
-
-    /// From 04:58:00 on, past a full hour.
-    #[test]
-    fn a_clock_that_reads_as_hours_minutes_and_seconds_is_refused() {
+    fn a_clock_that_cannot_be_used_is_refused() {
+        let even = |step_s: f64| -> Vec<f64> { (0..1000).map(|k| f64::from(k) * step_s).collect() };
         let packed = |k: u32| {
             let s = 17_880.0 + 0.05 * f64::from(k);
             (s / 3600.0).floor() * 1e4 + (s % 3600.0 / 60.0).floor() * 100.0 + s % 60.0
         };
-        let t: Vec<f64> = (0..4800).map(packed).collect();
-        assert_eq!(refusal(&t), "time_unit_unknown");
+        for (seconds, code) in [
+            (vec![1.0, 1.0], "time_stands_still"),
+            (even(1e50), "time_implausible"),
+            (even(1e-300), "time_implausible"),
+            (even(1e6), "time_implausible"),
+            ((0..2000).map(|k| f64::from(k / 2) * 0.01 + 5.0 * f64::from(k % 2)).collect(), "time_goes_back"),
+            ((0..4800).map(packed).collect(), "time_unit_unknown"),
+        ] {
+            assert_eq!(base(&seconds, &usual()).unwrap_err().0.code, code);
+        }
+        let early = Timestamps { origin: TimeOrigin::Counted(-1e50), ..stamps(&[0.0, 0.01, 0.02]) };
+        let refused = build_time_base(&mut early.clone(), &usual()).unwrap_err();
+        assert!(refused.0.message.contains("the first stamp is -1e50 s"), "{refused:?}");
     }
 
     /// A recorder that rests for 40 s of each minute.
@@ -581,11 +569,6 @@ mod tests {
     fn pauses_of_forty_seconds_are_breaks() {
         let t: Vec<f64> = (0..4000).map(|k| 60.0 * f64::from(k / 400) + 0.05 * f64::from(k % 400)).collect();
         assert_eq!(base(&t, &usual()).unwrap().segments.len(), 10);
-    }
-
-    #[test]
-    fn a_clock_that_stands_still_is_refused() {
-        assert_eq!(refusal(&[1.0, 1.0]), "time_stands_still");
     }
 
     /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.

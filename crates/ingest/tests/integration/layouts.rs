@@ -19,7 +19,8 @@ use ingest::{
     Mapping,
 };
 use parquet::arrow::ArrowWriter;
-use records::Position;
+use parquet::file::properties::WriterProperties;
+use records::{Diagnostic, Position};
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
@@ -31,8 +32,13 @@ pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
 /// The same with fields that may have metadata.
 fn write_fields(file: &Path, fields: Vec<Field>, arrays: Vec<ArrayRef>) {
     let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
-    let mut writer = ArrowWriter::try_new(File::create(file).unwrap(), batch.schema(), None).unwrap();
-    writer.write(&batch).unwrap();
+    write_batch(file, &batch, WriterProperties::default());
+}
+
+pub(crate) fn write_batch(file: &Path, batch: &RecordBatch, properties: WriterProperties) {
+    let file = File::create(file).unwrap();
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+    writer.write(batch).unwrap();
     writer.close().unwrap();
 }
 
@@ -116,12 +122,17 @@ pub(crate) fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<Ac
     read(&file, mapping)
 }
 
+/// Why a log of these columns is refused.
+pub(crate) fn refusal(mapping: &Mapping, columns: &[(&str, ArrayRef)]) -> Diagnostic {
+    only(mapping, columns).unwrap_err().diagnostic()
+}
+
 pub(crate) fn reals(values: impl IntoIterator<Item = f64>) -> ArrayRef {
     Arc::new(values.into_iter().map(Some).collect::<Float64Array>())
 }
 
 /// What the log itself says of its flight.
-pub(crate) fn own_identity(log: &Log) -> Result<Identity, records::Diagnostic> {
+pub(crate) fn own_identity(log: &Log) -> Result<Identity, Diagnostic> {
     log.identity(|_, _| IdentityFields::new()).map_err(|e| e.diagnostic())
 }
 
@@ -322,11 +333,7 @@ fn units_of_the_arrow_fields_are_proposed() {
 }
 
 /// The departure of a log of this name, from what the log itself says.
-pub(crate) fn identity(
-    name: &str,
-    m: &Mapping,
-    columns: &[(&str, ArrayRef)],
-) -> Result<String, records::Diagnostic> {
+pub(crate) fn identity(name: &str, m: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<String, Diagnostic> {
     let (_dir, file) = place(name);
     write(&file, columns);
     own_identity(&opened(&file, m)).map(|identity| identity.flight.departure_utc.to_string())
@@ -443,7 +450,7 @@ fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
     let worst = (0..500).map(|k| (a.load_n[k] - held(k)).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst} N");
     (m.clock.column, m.clock.rate_hz) = (None, Some(100.0));
-    let refused = only(&m, &columns).unwrap_err().diagnostic();
+    let refused = refusal(&m, &columns);
     assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
 }
 
@@ -483,7 +490,9 @@ fn each_flight_of_a_file_is_a_log_of_its_own() {
             ("value", reals(rows.iter().map(value))),
         ];
         let (_dir, file) = place("day.parquet");
-        write(&file, &columns);
+        // Of sorted rows, statistics tell the flight of each row group.
+        let groups = WriterProperties::builder().set_max_row_group_row_count(Some(600)).build();
+        write_batch(&file, &RecordBatch::try_from_iter(columns).unwrap(), groups);
         let paths = ingest::log::flight_rows::flights_in(&file, &mapping.identity).unwrap();
         let texts: Vec<&str> = paths.iter().map(|p| p.to_str().unwrap().split_once('#').unwrap().1).collect();
         assert_eq!(texts, ["N1/7", "N1/A%2F8%23", "N2/7"]);

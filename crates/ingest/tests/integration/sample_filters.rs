@@ -7,13 +7,12 @@ use std::sync::Arc;
 
 use arrow::array::{Int64Array, RecordBatch, StringArray, UInt8Array};
 use ingest::{ActuatorChannels, Mapping, RawValue, SampleFilter};
-use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
 
-use crate::layouts::{self, LINEAR, opened, plain, prefixed, read, reals};
+use crate::layouts::{self, LINEAR, opened, plain, prefixed, read, reals, write_batch};
 
 const ROWS: usize = 3000;
 /// Where the state is 1.
@@ -52,10 +51,7 @@ fn written(folder: &Path, laid: Laid) -> PathBuf {
         .set_write_batch_size(50)
         .build();
     let file = folder.join("N1_20261119T041300Z.parquet");
-    let mut writer =
-        ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), Some(properties)).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    write_batch(&file, &batch, properties);
     file
 }
 
