@@ -25,7 +25,7 @@ use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
 use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
 use crate::time::clock::DAY_S;
-use crate::time::timestamps::EXCEL_ZERO_S;
+use crate::time::timestamps::EXCEL_ZERO;
 
 pub use identity_sources::{folder_value, path_identity, path_position, path_tail};
 
@@ -270,7 +270,7 @@ fn epoch_of(times: &[f64], unit: &str, is_of_day: bool) -> Epoch {
     let per_second = from_symbol(unit).and_then(TimeUnit::per_second).unwrap_or(f64::NAN);
     let is_of_now = |since_1970_s: f64| (631_152_000.0..4_102_444_800.0).contains(&since_1970_s);
     match times.iter().find(|time| !time.is_nan()).map(|first| first / per_second) {
-        Some(first_s) if unit == "d" && is_of_now(first_s + EXCEL_ZERO_S as f64) => Epoch::Excel,
+        Some(first_s) if unit == "d" && is_of_now(first_s + EXCEL_ZERO.as_second() as f64) => Epoch::Excel,
         Some(first_s) if is_of_now(first_s) => Epoch::Unix,
         Some(first_s) if is_of_day && (0.0..DAY_S).contains(&first_s) => Epoch::Midnight,
         _ => Epoch::None,

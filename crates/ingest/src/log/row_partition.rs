@@ -224,9 +224,12 @@ impl DistinctTexts {
     }
 }
 
+/// A column of texts, each row as a code.
+type Codes = DictionaryArray<Int32Type>;
+
 /// The combinations of texts that the rows of a batch hold.
 struct Combinations {
-    columns: Vec<DictionaryArray<Int32Type>>,
+    columns: Vec<Codes>,
     /// The number of each row's combination; [`NONE`] where a row lacks one of the texts.
     of_rows: Vec<u32>,
     /// The first row of each combination.
@@ -240,17 +243,13 @@ impl Combinations {
             let coded = cast(array, &kind).map_err(|_| wrong_type(name, array, "text or numbers"))?;
             Ok(coded.as_dictionary().clone())
         };
-        let columns = names
-            .iter()
-            .zip(arrays)
-            .map(coded)
-            .collect::<Result<Vec<DictionaryArray<Int32Type>>, Fault>>()?;
+        let columns = names.iter().zip(arrays).map(coded).collect::<Result<Vec<Codes>, Fault>>()?;
         let (mut of_rows, mut first_rows) = (vec![0; arrays.first().map_or(0, Array::len)], vec![0]);
         for column in &columns {
             let texts = column.values().len();
             // Numbers of the combinations with this column, in a table unless it would be large.
-            let mut table =
-                vec![NONE; Some(first_rows.len() * texts).filter(|all| *all <= MAX_TABLE).unwrap_or(0)];
+            let places = first_rows.len() * texts;
+            let mut table = vec![NONE; if places <= MAX_TABLE { places } else { 0 }];
             let mut others = HashMap::new();
             first_rows.clear();
             for (row, (number, code)) in of_rows.iter_mut().zip(column.keys()).enumerate() {

@@ -559,8 +559,9 @@ mod tests {
         ] {
             assert_eq!(base(&seconds, &usual()).unwrap_err().0.code, code);
         }
-        let early = Timestamps { origin: TimeOrigin::Counted(-1e50), ..stamps(&[0.0, 0.01, 0.02]) };
-        let refused = build_time_base(&mut early.clone(), &usual()).unwrap_err();
+        let mut early = stamps(&[0.0, 0.01, 0.02]);
+        early.origin = TimeOrigin::Counted(-1e50);
+        let refused = build_time_base(&mut early, &usual()).unwrap_err();
         assert!(refused.0.message.contains("the first stamp is -1e50 s"), "{refused:?}");
     }
 

@@ -11,17 +11,8 @@ use crate::mapping::{ClockMapping, Epoch};
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::time::clock::{DAY_S, TimeOrigin, Timestamps};
 
-/// Zero of spreadsheet dates, 1899-12-30T00:00:00, s since 1970.
-pub(crate) const EXCEL_ZERO_S: i64 = -25_569 * 86_400;
-
-/// What zero means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TickEpoch {
-    Own,
-    Midnight,
-    Utc,
-    Local,
-}
+/// Zero of spreadsheet dates, 1899-12-30T00:00:00.
+pub(crate) const EXCEL_ZERO: Timestamp = Timestamp::constant(-25_569 * 86_400, 0);
 
 /// What the numbers of a time column are.
 #[derive(Debug, Clone, Copy)]
@@ -30,9 +21,8 @@ pub(crate) struct TickFormat {
     /// Whether they have no fraction; texts are read as whole nanoseconds.
     pub(crate) is_whole: bool,
     pub(crate) is_text: bool,
-    pub(crate) origin: TickEpoch,
-    /// Zero of an instant, s since 1970.
-    pub(crate) zero_s: i64,
+    /// What zero means.
+    pub(crate) zero: TimeOrigin,
     pub(crate) wraps_at: Option<f64>,
 }
 
@@ -53,16 +43,16 @@ impl TickFormat {
             _ if is_text => Some(ArrowTimeUnit::Nanosecond),
             _ => duration,
         };
-        let (origin, zero_s) = match (kind, clock.epoch) {
-            (DataType::Timestamp(_, Some(_)), _) => (TickEpoch::Utc, 0),
-            (DataType::Timestamp(..), _) => (TickEpoch::Local, 0),
-            (DataType::Time32(_) | DataType::Time64(_), _) => (TickEpoch::Midnight, 0),
-            _ if is_text => (TickEpoch::Local, 0),
-            (_, Epoch::None) => (TickEpoch::Own, 0),
-            _ if unit.is_some() => (TickEpoch::Own, 0),
-            (_, Epoch::Unix) => (TickEpoch::Utc, 0),
-            (_, Epoch::Midnight) => (TickEpoch::Midnight, 0),
-            (_, Epoch::Excel) => (TickEpoch::Local, EXCEL_ZERO_S),
+        let zero = match (kind, clock.epoch) {
+            (DataType::Timestamp(_, Some(_)), _) => TimeOrigin::Utc(Timestamp::UNIX_EPOCH),
+            (DataType::Timestamp(..), _) => TimeOrigin::Local(Timestamp::UNIX_EPOCH),
+            (DataType::Time32(_) | DataType::Time64(_), _) => TimeOrigin::OfDay(0.0),
+            _ if is_text => TimeOrigin::Local(Timestamp::UNIX_EPOCH),
+            (_, Epoch::None) => TimeOrigin::Counted(0.0),
+            _ if unit.is_some() => TimeOrigin::Counted(0.0),
+            (_, Epoch::Unix) => TimeOrigin::Utc(Timestamp::UNIX_EPOCH),
+            (_, Epoch::Midnight) => TimeOrigin::OfDay(0.0),
+            (_, Epoch::Excel) => TimeOrigin::Local(EXCEL_ZERO),
         };
         let per_second = match (unit, clock.unit) {
             (Some(ArrowTimeUnit::Second), _) => 1.0,
@@ -74,11 +64,11 @@ impl TickFormat {
             (None, None) => return Err(kind.to_string()),
         };
         // With `clock.epoch` = "midnight", a text may be a time of the day alone.
-        let is_of_day = origin == TickEpoch::Midnight || (is_text && clock.epoch == Epoch::Midnight);
+        let is_of_day = matches!(zero, TimeOrigin::OfDay(_)) || (is_text && clock.epoch == Epoch::Midnight);
         let day = is_of_day.then_some(DAY_S * per_second);
         let wraps_at = if unit.is_none() { clock.wraps_at.or(day) } else { day };
         let is_whole = unit.is_some() || kind.is_integer();
-        Ok(Self { per_second, is_whole, is_text, origin, zero_s, wraps_at })
+        Ok(Self { per_second, is_whole, is_text, zero, wraps_at })
     }
 }
 
@@ -121,8 +111,8 @@ impl<'a> TimestampParser<'a> {
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, Fault> {
         let value = value.trim();
         let zoned = value.parse::<Timestamp>().ok();
-        if zoned.is_some() && self.ticks.origin == TickEpoch::Local {
-            self.ticks.origin = TickEpoch::Utc;
+        if let (Some(_), TimeOrigin::Local(zero)) = (zoned, self.ticks.zero) {
+            self.ticks.zero = TimeOrigin::Utc(zero);
         }
         let local = || {
             let local = value.parse::<civil::DateTime>().ok()?;
@@ -134,7 +124,7 @@ impl<'a> TimestampParser<'a> {
             && self.ticks.wraps_at.is_some()
             && let Ok(time) = value.parse::<civil::Time>()
         {
-            self.ticks.origin = TickEpoch::Midnight;
+            self.ticks.zero = TimeOrigin::OfDay(0.0);
             tick = i64::try_from(time.duration_since(civil::Time::midnight()).as_nanos()).ok();
         }
         tick.ok_or_else(|| time_unit_unknown(self.column, &format!("`{value}` in row {row}")))
@@ -181,13 +171,12 @@ impl<'a> TimestampParser<'a> {
         let first =
             if self.ticks.is_whole { self.first_whole.map(whole) } else { self.convert_reals().map(real) };
         let first_s = first.map_or(0.0, |(first_s, _)| first_s);
-        let zero_ns = 1_000_000_000 * i128::from(self.ticks.zero_s);
-        let instant = || Timestamp::from_nanosecond(first?.1 + zero_ns).ok();
-        let origin = match self.ticks.origin {
-            TickEpoch::Utc => instant().map(TimeOrigin::Utc),
-            TickEpoch::Local => instant().map(TimeOrigin::Local),
-            TickEpoch::Midnight => Some(TimeOrigin::OfDay(first_s)),
-            TickEpoch::Own => None,
+        let instant = |zero: Timestamp| Timestamp::from_nanosecond(first?.1 + zero.as_nanosecond()).ok();
+        let origin = match self.ticks.zero {
+            TimeOrigin::Utc(zero) => instant(zero).map(TimeOrigin::Utc),
+            TimeOrigin::Local(zero) => instant(zero).map(TimeOrigin::Local),
+            TimeOrigin::OfDay(_) => Some(TimeOrigin::OfDay(first_s)),
+            TimeOrigin::Counted(_) | TimeOrigin::Start => None,
         };
         let origin = origin.unwrap_or(TimeOrigin::Counted(first_s));
         Timestamps { column: self.column.to_owned(), seconds: self.seconds, origin }

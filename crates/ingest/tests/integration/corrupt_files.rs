@@ -16,7 +16,7 @@ fn values() -> ArrayRef {
 }
 
 /// Columns of these names.
-fn named<'n, const N: usize>(names: [&'n str; N]) -> [(&'n str, ArrayRef); N] {
+fn named<const N: usize>(names: [&str; N]) -> [(&str, ArrayRef); N] {
     names.map(|name| (name, values()))
 }
 
