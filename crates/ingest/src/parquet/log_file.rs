@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
-use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
+use arrow::datatypes::{DataType, Field, Fields, Schema, TimeUnit};
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
-use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 
 use crate::channel::column_builder::ColumnBuilder;
@@ -72,8 +71,8 @@ pub(crate) struct LogFile {
     footer: ArrowReaderMetadata,
     footer_start: u64,
     claims: Claims,
-    /// The footer with which text columns are read as dictionary codes; `None` if the reader refuses it.
-    coded: OnceLock<Option<ArrowReaderMetadata>>,
+    /// The columns of the file, texts as dictionary codes.
+    coded: OnceLock<Fields>,
     /// The Arrow schema in the footer, decoded at its first use; `None` if it is missing or damaged.
     noted: OnceLock<Option<Schema>>,
     leaves: Vec<LeafColumn>,
@@ -371,12 +370,12 @@ impl LogFile {
         scan: Scan<'_>,
     ) -> Result<ParquetRecordBatchReader, Error> {
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
-        let coded = || self.coded.get_or_init(|| with_codes(&self.footer, |_| true).ok()).as_ref();
-        let footer = is_coded.then(coded).flatten().unwrap_or(&self.footer);
-        let mask = ProjectionMask::leaves(footer.parquet_schema(), [leaf.index]);
-        let kinds = is_coded.then(|| footer.schema().fields());
+        let coded = || self.coded.get_or_init(|| with_codes(self.footer.schema().fields(), |_| true));
+        let kinds = is_coded.then(coded);
+        let mask = ProjectionMask::leaves(self.footer.parquet_schema(), [leaf.index]);
         let (file, groups) = (Arc::clone(&self.source.file), vec![group]);
-        let groups = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: scan.batch_rows };
+        let metadata = self.footer.metadata();
+        let groups = BoundedGroups { file, metadata, groups, batch_rows: scan.batch_rows };
         groups.reader(mask, kinds).map_err(|e| self.decode(leaf, group, &e.to_string()))
     }
 
@@ -507,20 +506,15 @@ impl TextBounds<'_> {
     }
 }
 
-/// A footer with which the selected text columns are read as dictionary codes.
-pub(crate) fn with_codes(
-    footer: &ArrowReaderMetadata,
-    is_coded: impl Fn(&str) -> bool,
-) -> Result<ArrowReaderMetadata, ParquetError> {
+/// Columns, of which the selected ones that hold texts are read as dictionary codes.
+pub(crate) fn with_codes(fields: &Fields, is_coded: impl Fn(&str) -> bool) -> Fields {
     let codes = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
     let field = |field: &Arc<Field>| {
         let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
         let coded = || Arc::new(field.as_ref().clone().with_data_type(codes.clone()));
         if is_text && is_coded(field.name()) { coded() } else { Arc::clone(field) }
     };
-    let schema = Schema::new(footer.schema().fields().iter().map(field).collect::<Vec<_>>());
-    let options = ArrowReaderOptions::new().with_schema(Arc::new(schema));
-    ArrowReaderMetadata::try_new(Arc::clone(footer.metadata()), options)
+    fields.iter().map(field).collect()
 }
 
 /// Byte range of a chunk's pages, from the footer.

@@ -16,10 +16,13 @@ use arrow::array::{
 use arrow::compute::cast;
 use arrow::csv::ReaderBuilder;
 use arrow::csv::reader::Format;
-use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
+use arrow::datatypes::{
+    DataType, Field, Fields, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType,
+};
 use jiff::Timestamp;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::file::metadata::ParquetMetaData;
 
 use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, Fault, bad_table, column_type, not_parquet};
@@ -190,8 +193,15 @@ impl TableBatch {
 /// as CSV in one.
 pub struct TableSplits {
     file: PathBuf,
-    /// For Parquet: the file, its metadata with the requested schema, and the columns.
-    parquet: Option<(Arc<File>, ArrowReaderMetadata, ProjectionMask)>,
+    parquet: Option<ParquetTable>,
+}
+
+/// A Parquet file, its columns by the types in which they are read, and those that are.
+struct ParquetTable {
+    file: Arc<File>,
+    metadata: Arc<ParquetMetaData>,
+    fields: Fields,
+    mask: ProjectionMask,
 }
 
 impl TableSplits {
@@ -209,7 +219,7 @@ impl TableSplits {
     /// How many parts there are: one at least.
     #[expect(clippy::len_without_is_empty, reason = "there is no table without a part")]
     pub fn len(&self) -> usize {
-        self.parquet.as_ref().map_or(1, |(_, footer, _)| footer.metadata().num_row_groups().max(1))
+        self.parquet.as_ref().map_or(1, |table| table.metadata.num_row_groups().max(1))
     }
 
     /// The rows of some parts, in order.
@@ -223,7 +233,7 @@ impl TableSplits {
         parts: Range<usize>,
     ) -> Result<impl Iterator<Item = Result<TableBatch, Error>> + use<>, Error> {
         let opened = match &self.parquet {
-            Some((file, footer, mask)) => groups(file, footer, mask.clone(), parts),
+            Some(table) => groups(table, parts),
             None => csv(&self.file),
         };
         let Rows { schema, mut batches, mut before } = opened.map_err(|fault| fault.in_file(&self.file))?;
@@ -240,22 +250,16 @@ impl TableSplits {
     }
 }
 
-fn parquet(
-    file: &Path,
-    wanted: Option<&[&str]>,
-    coded: &[&str],
-) -> Result<(Arc<File>, ArrowReaderMetadata, ProjectionMask), Fault> {
-    let opened = whole(file)?;
-    let metadata = raw_footer::read(&opened, |_| Ok(()))?.metadata;
-    let found = caught(|| ArrowReaderMetadata::try_new(metadata, ArrowReaderOptions::new()));
-    let found = found.map_err(not_parquet)?;
-    let with_coded = || with_codes(&found, |name| coded.contains(&name.trim()));
-    let footer = if coded.is_empty() { found } else { with_coded().unwrap_or(found) };
-    let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
+fn parquet(file: &Path, wanted: Option<&[&str]>, coded: &[&str]) -> Result<ParquetTable, Fault> {
+    let file = whole(file)?;
+    let metadata = raw_footer::read(&file, |_| Ok(()))?.metadata;
+    let footer = caught(|| ArrowReaderMetadata::try_new(Arc::clone(&metadata), ArrowReaderOptions::new()));
+    let fields =
+        with_codes(footer.map_err(not_parquet)?.schema().fields(), |name| coded.contains(&name.trim()));
     let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
-    let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
-    let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
-    Ok((opened, footer, mask))
+    let roots = fields.iter().enumerate().filter(|(_, field)| is_wanted(field.name())).map(|(root, _)| root);
+    let mask = ProjectionMask::roots(metadata.file_metadata().schema_descr(), roots);
+    Ok(ParquetTable { file, metadata, fields, mask })
 }
 
 /// Rows of an open table, in batches.
@@ -267,18 +271,13 @@ struct Rows {
 }
 
 /// The rows of some row groups.
-fn groups(
-    file: &Arc<File>,
-    footer: &ArrowReaderMetadata,
-    mask: ProjectionMask,
-    groups: Range<usize>,
-) -> Result<Rows, Fault> {
-    let some = footer.metadata().row_groups();
+fn groups(table: &ParquetTable, groups: Range<usize>) -> Result<Rows, Fault> {
+    let some = table.metadata.row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
-    let (file, groups) = (Arc::clone(file), groups.collect());
-    let rows = BoundedGroups { file, metadata: footer.metadata(), groups, batch_rows: ROWS };
-    let mut reader = caught(|| rows.reader(mask, Some(footer.schema().fields()))).map_err(not_parquet)?;
+    let (file, groups) = (Arc::clone(&table.file), groups.collect());
+    let rows = BoundedGroups { file, metadata: &table.metadata, groups, batch_rows: ROWS };
+    let mut reader = caught(|| rows.reader(table.mask.clone(), Some(&table.fields))).map_err(not_parquet)?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);
     let batch = move || caught(|| reader.next().transpose()).map_err(not_parquet).transpose();
     let batches = Box::new(std::iter::from_fn(batch));
