@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
-use polars_parquet_format::thrift::varint::VarInt;
+use polars_parquet_format::thrift::protocol::{TCompactInputProtocol, TInputProtocol, TType};
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
 use crate::error::{Fault, not_parquet};
@@ -48,9 +48,9 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
     let mut footer = vec![0; bytes as usize];
     read_at::read_exact(file, &mut footer, start)?;
     let damaged = "its footer is damaged: it claims more than it holds, or an offset below zero";
-    let mut thrift = Thrift { rest: &footer, ..Thrift::default() };
-    thrift.fields().ok_or_else(|| not_parquet(damaged))?;
-    let claims = thrift.claims;
+    let mut walk = Walk::new(&footer);
+    walk.fields().ok_or_else(|| not_parquet(damaged))?;
+    let claims = walk.claims;
     bounds::check("groups inside each other in the schema", claims.depth as u64, SCHEMA_DEPTH as u64)?;
     bounds::check("columns in its row groups", claims.chunks, COLUMN_CHUNKS)?;
     bounds::check_rows("rows", claims.rows, length)?;
@@ -96,15 +96,15 @@ pub(crate) struct Claims {
 }
 
 /// The step into an element of a list.
-const ELEMENT: i64 = 0;
+const ELEMENT: i16 = 0;
 
-/// Walks through Thrift's compact protocol and takes no memory for what a list or a text claims to hold. Its functions
-/// return `None` where the bytes are not whole.
-#[derive(Default)]
-struct Thrift<'b> {
-    rest: &'b [u8],
+/// Walks through a footer, and takes no memory for what a list claims to hold. Its functions return `None` where the
+/// bytes are not whole.
+struct Walk<'b> {
+    footer: TCompactInputProtocol<&'b [u8]>,
+    bytes: usize,
     /// The way to the present value: numbers of fields, and [`ELEMENT`] for each list.
-    path: Vec<i64>,
+    path: Vec<i16>,
     /// Children of the present element of the schema.
     children: i64,
     /// Children of each open group of the schema that are still to come.
@@ -112,17 +112,26 @@ struct Thrift<'b> {
     claims: Claims,
 }
 
-impl Thrift<'_> {
-    fn value(&mut self, kind: u8) -> Option<()> {
+impl<'b> Walk<'b> {
+    fn new(footer: &'b [u8]) -> Self {
+        let bytes = footer.len();
+        // The protocol counts eight bytes for each element of a list, two for each struct, and those of texts.
+        let footer = TCompactInputProtocol::new(footer, 16 * bytes);
+        Self { footer, bytes, path: Vec::new(), children: 0, open: Vec::new(), claims: Claims::default() }
+    }
+
+    fn value(&mut self, kind: TType) -> Option<()> {
         match kind {
-            // A truth value takes a byte in a list, and none as a field.
-            1 | 2 => self.pass(u64::from(self.path.last() == Some(&ELEMENT))),
-            3 => self.pass(1),
-            4..=6 => self.varint().and_then(|number| self.number(number)),
-            7 => self.pass(8),
-            8 => self.varint().and_then(|bytes| self.pass(bytes)),
-            9 | 10 => self.list(),
-            12 => self.fields(),
+            TType::Bool => self.footer.read_bool().ok().map(drop),
+            TType::I08 => self.footer.read_i8().ok().map(drop),
+            TType::I16 | TType::I32 | TType::I64 => {
+                let number = self.footer.read_i64().ok()?;
+                self.number(number)
+            }
+            TType::Double => self.footer.read_double().ok().map(drop),
+            TType::String => self.footer.read_bytes().ok().map(drop),
+            TType::List | TType::Set => self.list(),
+            TType::Struct => self.fields(),
             // Maps, which the format does not use.
             _ => None,
         }
@@ -147,33 +156,29 @@ impl Thrift<'_> {
         Some(())
     }
 
-    /// A list, each element of which takes a byte at least.
     fn list(&mut self) -> Option<()> {
-        let head = self.byte()?;
-        let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
-        (count <= self.rest.len() as u64 && self.path.len() < THRIFT_DEPTH).then_some(())?;
+        (self.path.len() < THRIFT_DEPTH).then_some(())?;
+        let list = self.footer.read_list_begin().ok()?;
         self.path.push(ELEMENT);
-        (0..count).try_for_each(|_| self.value(head & 0x0f))?;
+        (0..list.size).try_for_each(|_| self.value(list.element_type))?;
         self.path.pop().map(drop)
     }
 
     /// A struct.
     fn fields(&mut self) -> Option<()> {
         (self.path.len() < THRIFT_DEPTH).then_some(())?;
-        self.path.push(0);
-        let mut number = 0_i64;
+        self.footer.read_struct_begin().ok()?;
         loop {
-            let head = self.byte()?;
-            if head == 0 {
+            let field = self.footer.read_field_begin().ok()?;
+            if field.field_type == TType::Stop {
                 break;
             }
-            let step = i64::from(head >> 4);
-            number = if step == 0 { self.varint()? } else { number.saturating_add(step) };
             // A field numbered as an element would mislead the walk; the format has none below one.
-            *self.path.last_mut()? = Some(number).filter(|number| *number > ELEMENT)?;
-            self.value(head & 0x0f)?;
+            self.path.push(field.id.filter(|number| *number > ELEMENT)?);
+            self.value(field.field_type)?;
+            self.path.pop();
         }
-        self.path.pop();
+        self.footer.read_struct_end().ok()?;
         match self.path[..] {
             [2, ELEMENT] => return self.schema_element(),
             [4, ELEMENT, 1, ELEMENT] => self.claims.chunks += 1,
@@ -195,23 +200,6 @@ impl Thrift<'_> {
         while self.open.last().is_some_and(|left| *left <= 0) {
             self.open.pop();
         }
-        (children <= self.rest.len() as i64).then_some(())
-    }
-
-    fn byte(&mut self) -> Option<u8> {
-        let (byte, rest) = self.rest.split_first()?;
-        self.rest = rest;
-        Some(*byte)
-    }
-
-    fn pass(&mut self, bytes: u64) -> Option<()> {
-        self.rest = self.rest.get(usize::try_from(bytes).ok()?..)?;
-        Some(())
-    }
-
-    fn varint<V: VarInt>(&mut self) -> Option<V> {
-        let (number, bytes) = V::decode_var(self.rest)?;
-        self.pass(bytes as u64)?;
-        Some(number)
+        (children <= self.bytes as i64).then_some(())
     }
 }
