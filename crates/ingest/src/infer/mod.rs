@@ -398,10 +398,6 @@ mod tests {
     use super::*;
     use crate::parquet::writer::{Column, write_parquet};
 
-    fn of(names: &[&str]) -> InferredMapping {
-        channels(names, "").0
-    }
-
     /// The mapping that a log with these columns seems to offer.
     fn proposed(columns: &[(&str, Column)]) -> InferredMapping {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -412,24 +408,15 @@ mod tests {
 
     #[test]
     fn redundant_sensors_are_alternatives_and_numbered_actuators_are_positions() {
-        let found = of(&["ail_l_motor_a_deg", "ail_l_motor_b_deg", "ail_l_screw_mm", "ail_l_load_n"]);
-        let motors: Vec<&str> = found.channels[&Role::Motor].iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(motors, ["{position}_motor_a_deg", "{position}_motor_b_deg"]);
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
-        let found = of(&["ail_l.motor_angle", "ail_l.screw_pos", "ail_l.hinge_load", "ail_lh.load"]);
-        assert_eq!(found.channels[&Role::Load][0].0, "{position}.hinge_load");
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
-        // The elevator's screw is measured otherwise, and nothing but a load is known of the spoiler.
-        let names =
-            ["ail_motor_deg", "ail_screw_mm", "ail_load_n", "elv_motor_deg", "elv_screw_um", "elv_load_n"];
-        let found = of(&[&names[..], &["spoiler_load_kn"]].concat());
-        let screws = [("{position}_screw_mm", Unit::Millimetre), ("{position}_screw_um", Unit::Micrometre)];
-        assert_eq!(found.channels[&Role::Screw], screws.map(|(name, unit)| (name.to_owned(), Some(unit))));
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail", "elv"]);
-        let numbers = ["motor_1_deg", "motor_2_deg", "screw_1_mm", "screw_2_mm", "load_1_n", "load_2_n"];
-        let found = of(&numbers);
-        assert_eq!(found.channels[&Role::Load][0].0, "load_{position}_n");
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["1", "2"]);
+        for line in include_str!("../../tests/data/column_sets.txt").lines().skip(1) {
+            let [names, positions, wanted] = line.split('|').collect::<Vec<_>>().try_into().unwrap();
+            let (found, _) = channels(&names.split(' ').collect::<Vec<_>>(), "");
+            assert!(found.positions.iter().eq(positions.split(' ')), "{names}: {:?}", found.positions);
+            let shown =
+                |(name, unit): &(String, Option<Unit>)| format!("{name}:{}", unit.map_or("-", Unit::as_str));
+            let mut columns = found.channels.values().map(|all| all.iter().map(shown).collect::<Vec<_>>());
+            assert!(columns.any(|all| all.join(" ") == wanted), "{names}: {:?}", found.channels);
+        }
     }
 
     /// 1,795,061,580 s after 1970 is 2026-11-19T04:13:00Z.

@@ -2,9 +2,9 @@
 //!
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
 //! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
-//! are left out, or spread evenly if `tick_s` is given, as are rows whose stamps jitter by a large part of the step. After a step of more than one and a half times the usual one,
-//! the filter starts again, unless single rows are lost so often that no stretch would last, up to a quarter of them: those
-//! count as missing samples.
+//! are left out, or spread evenly if `tick_s` is given, as are rows whose stamps jitter by a large part of the step. After
+//! a step of more than one and a half times the usual one, the filter starts again, unless single rows are lost so often
+//! that no stretch would last, up to a quarter of them: those count as missing samples.
 //! Rows that are in order stay as they are.
 
 use std::ops::Range;
