@@ -21,8 +21,8 @@ pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 /// Memory limit of gathered samples, bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
-/// No combination: the row lacks a text.
-const NONE: u32 = u32::MAX;
+/// A combination that has no number yet.
+const NEW: u32 = u32::MAX;
 /// Most combinations of a batch that are numbered by a table.
 const MAX_TABLE: usize = 1 << 18;
 
@@ -168,10 +168,11 @@ fn gather(
         file.scan(&names, scan, |arrays| {
             let (values, rest) = arrays.split_at(leaves.len());
             let found = Combinations::of(&columns, rest)?;
-            let keys: Vec<Option<usize>> = found.texts().map(|texts| by_texts.get(&texts).copied()).collect();
+            let keys: Vec<Option<usize>> =
+                found.texts().map(|texts| by_texts.get(&texts?).copied()).collect();
             let mut by_key = vec![Vec::new(); by_texts.len()];
             for (row, number) in (0_u32..).zip(&found.of_rows) {
-                if let Some(key) = keys.get(*number as usize).copied().flatten() {
+                if let Some(key) = keys[*number as usize] {
                     by_key[key].push(row);
                 }
             }
@@ -214,7 +215,7 @@ impl DistinctTexts {
     /// Looks at a batch.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), Fault> {
         let owned = |texts: Vec<&str>| texts.into_iter().map(str::to_owned).collect();
-        self.0.extend(Combinations::of(names, arrays)?.texts().map(owned));
+        self.0.extend(Combinations::of(names, arrays)?.texts().flatten().map(owned));
         Ok(bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)?)
     }
 
@@ -230,7 +231,7 @@ type Codes = DictionaryArray<Int32Type>;
 /// The combinations of texts that the rows of a batch hold.
 struct Combinations {
     columns: Vec<Codes>,
-    /// The number of each row's combination; [`NONE`] where a row lacks one of the texts.
+    /// The number of each row's combination.
     of_rows: Vec<u32>,
     /// The first row of each combination.
     first_rows: Vec<usize>,
@@ -246,21 +247,17 @@ impl Combinations {
         let columns = names.iter().zip(arrays).map(coded).collect::<Result<Vec<Codes>, Fault>>()?;
         let (mut of_rows, mut first_rows) = (vec![0; arrays.first().map_or(0, Array::len)], vec![0]);
         for column in &columns {
-            let texts = column.values().len();
+            // One more code stands for a missing text.
+            let codes = column.values().len() + 1;
             // Numbers of the combinations with this column, in a table unless it would be large.
-            let places = first_rows.len() * texts;
-            let mut table = vec![NONE; if places <= MAX_TABLE { places } else { 0 }];
-            let mut others = HashMap::new();
+            let places = first_rows.len() * codes;
+            let (is_small, mut others) = (places <= MAX_TABLE, HashMap::new());
+            let mut table = vec![NEW; if is_small { places } else { 0 }];
             first_rows.clear();
             for (row, (number, code)) in of_rows.iter_mut().zip(column.keys()).enumerate() {
-                let Some(code) = code.filter(|_| *number != NONE) else {
-                    *number = NONE;
-                    continue;
-                };
-                let place = *number as usize * texts + code as usize;
-                let known =
-                    if table.is_empty() { others.entry(place).or_insert(NONE) } else { &mut table[place] };
-                if *known == NONE {
+                let place = *number as usize * codes + code.map_or(codes - 1, |code| code as usize);
+                let known = if is_small { &mut table[place] } else { others.entry(place).or_insert(NEW) };
+                if *known == NEW {
                     *known = first_rows.len() as u32;
                     first_rows.push(row);
                 }
@@ -270,14 +267,12 @@ impl Combinations {
         Ok(Self { columns, of_rows, first_rows })
     }
 
-    /// The texts of each combination, by number.
-    fn texts(&self) -> impl Iterator<Item = Vec<&str>> {
-        let texts = |row: &usize| {
-            let columns = self.columns.iter();
-            let texts = columns.map(|c| c.values().as_string::<i32>().value(c.key(*row).unwrap_or_default()));
-            texts.collect()
-        };
-        self.first_rows.iter().map(texts)
+    /// The texts of each combination, by number; `None` where one of them is missing.
+    fn texts(&self) -> impl Iterator<Item = Option<Vec<&str>>> {
+        self.first_rows.iter().map(|row| {
+            let texts = self.columns.iter();
+            texts.map(|texts| Some(texts.values().as_string::<i32>().value(texts.key(*row)?))).collect()
+        })
     }
 }
 
