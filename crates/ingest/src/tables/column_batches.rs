@@ -312,7 +312,7 @@ fn csv(file: &Path) -> Result<Rows, Fault> {
     }
     bounds::check("columns", names.len() as u64, TABLE_COLUMNS as u64)?;
     if let Some(line) = commented_row(&text[mark..], names.len()) {
-        return Err(ErrorKind::table(format!(
+        return Err(bad_table(format!(
             "line {line} begins with `#` and has as many fields as the header: put its first field in quotes, or delete the line"
         )));
     }
@@ -337,9 +337,7 @@ fn csv(file: &Path) -> Result<Rows, Fault> {
 fn commented_row(text: &[u8], fields: usize) -> Option<usize> {
     let lines = text.split(|byte| *byte == b'\n').zip(1..);
     let mut rows = lines.skip_while(|(line, _)| line.is_empty() || line.starts_with(b"#"));
-    let is_row = |line: &[u8]| {
-        line.starts_with(b"#") && line.iter().filter(|byte| **byte == b',').count() + 1 == fields
-    };
+    let is_row = |line: &[u8]| line.starts_with(b"#") && line.split(|byte| *byte == b',').count() == fields;
     rows.find(|(line, _)| fields > 1 && is_row(line)).map(|(_, line)| line)
 }
 
