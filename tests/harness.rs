@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
@@ -24,6 +25,20 @@ pub(crate) fn print_line(line: &str) {
 pub(crate) fn spread<T: Copy>(cases: &[T], count: usize) -> Vec<T> {
     let step = if is_gate() { 1 } else { cases.len().div_ceil(count) };
     cases.iter().copied().step_by(step).collect()
+}
+
+/// Tries each case, on as many threads as there are processors.
+pub(crate) fn each<T: Sync>(cases: &[T], try_one: impl Fn(&T) + Sync) {
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, std::num::NonZero::get) {
+            scope.spawn(|| {
+                while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    try_one(case);
+                }
+            });
+        }
+    });
 }
 
 /// Waits until a condition holds; it is tested every millisecond.

@@ -5,11 +5,11 @@
 
 mod bookkeeping;
 mod docs;
-mod follow_up;
 mod fuzz;
 mod gate;
 mod harness;
 mod logs;
 mod markdown;
 mod runs;
+mod same_story;
 mod traces;

@@ -10,15 +10,8 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use crate::gate::is_gate;
-use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
+use crate::harness::{CommandResult, TestFleet, each, print_line, wait_until};
 use crate::runs::interruption::{small, whole_flights};
-
-/// Numbers of `errno(3)`.
-const EIO: &str = "5";
-const ESTALE: &str = "116";
-const ENOSPC: &str = "28";
-const EACCES: &str = "13";
-const EMFILE: &str = "24";
 
 /// Calls that are tried of each kind of fault, by the tests and by the gate.
 const SAMPLE: [usize; 2] = [1, 4];
@@ -35,6 +28,7 @@ struct Fault {
     /// Part of the paths whose calls count.
     under: &'static str,
     kind: &'static str,
+    /// A name of `errno(3)`, `kill` or `hang`.
     mode: &'static str,
     /// The first call that fails; nothing fails at 0.
     at: usize,
@@ -42,6 +36,18 @@ struct Fault {
     last: usize,
     /// One more call that fails, and how.
     also: Option<(usize, &'static str)>,
+}
+
+/// The number of a name of `errno(3)`.
+fn errno(mode: &str) -> &str {
+    match mode {
+        "EIO" => "5",
+        "EACCES" => "13",
+        "EMFILE" => "24",
+        "ENOSPC" => "28",
+        "ESTALE" => "116",
+        other => other,
+    }
 }
 
 impl Fault {
@@ -76,12 +82,12 @@ impl Injector {
     fn command(&self, fleet: &TestFleet, args: &[&str], fault: &Fault) -> Command {
         let mut command = fleet.command(args);
         command.env("LD_PRELOAD", &self.library).env("FAULT_UNDER", fault.under);
-        command.env("FAULT_KIND", fault.kind).env("FAULT_MODE", fault.mode);
+        command.env("FAULT_KIND", fault.kind).env("FAULT_MODE", errno(fault.mode));
         if fault.at > 0 {
             command.env("FAULT_AT", fault.at.to_string()).env("FAULT_LAST", fault.last.to_string());
         }
         if let Some((at, mode)) = fault.also {
-            command.env("FAULT_ALSO", format!("{at}:{mode}"));
+            command.env("FAULT_ALSO", format!("{at}:{}", errno(mode)));
         }
         command
     }
@@ -98,15 +104,7 @@ impl Injector {
 
     /// A run one of whose calls on the store fails.
     pub(crate) fn random_fault(&self, fleet: &TestFleet, at: usize) {
-        self.run(fleet, &["run", "--jobs", "1", "-q"], &Fault::at("results", "both", EIO, at.max(1)));
-    }
-
-    /// A run whose writes to the store fail with `ENOSPC` from one on.
-    pub(crate) fn full_disk(&self, fleet: &TestFleet) -> CommandResult {
-        let count = self.count(fleet, &["run", "--jobs", "1", "--limit", "1"], "results", "write");
-        std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        let fault = Fault { last: 0, ..Fault::at("results", "write", ENOSPC, count / 2) };
-        self.run(fleet, &["run", "--jobs", "1"], &fault)
+        self.run(fleet, &["run", "--jobs", "1", "-q"], &Fault::at("results", "both", "EIO", at.max(1)));
     }
 
     /// A hang in the middle of the reads of the small tail's second flight.
@@ -127,7 +125,7 @@ impl Injector {
     /// How many calls a command makes.
     fn count(&self, fleet: &TestFleet, args: &[&str], under: &'static str, kind: &'static str) -> usize {
         let file = fleet.path("calls.txt");
-        let fault = Fault::at(under, kind, EIO, 0);
+        let fault = Fault::at(under, kind, "EIO", 0);
         let mut command = self.command(fleet, args, &fault);
         let counted = command.env("FAULT_COUNT", &file).output().unwrap();
         assert!(counted.status.success(), "{args:?}: {}", String::from_utf8_lossy(&counted.stderr));
@@ -298,56 +296,70 @@ fn print_row(
     ));
 }
 
-/// The name of an error number.
-fn name(mode: &'static str) -> &'static str {
-    match mode {
-        EIO => "EIO",
-        ESTALE => "ESTALE",
-        EACCES => "EACCES",
-        EMFILE => "EMFILE",
-        other => other,
-    }
-}
-
 /// Tries a fault at calls of a command.
-fn strike(
-    args: &'static [&'static str],
-    (make, store): (fn() -> TestFleet, &str),
-    (under, kind, mode): (&'static str, &'static str, &'static str),
-    from: bool,
-) {
-    let Some(injector) = Injector::get() else { return };
+fn strike(injector: &Injector, &(args, (make, store), under, kind, mode, is_lasting): &Row) {
     let command = Struck::new(injector, make(), args, few_records());
     let count = command.count(under, kind);
-    let fault = |at| Fault { last: if from { 0 } else { at }, ..Fault::at(under, kind, mode, at) };
-    let place = match under {
-        "results" => "the store",
-        "sample-data/logs" => "logs",
-        "pages" => "a page",
-        table => table,
-    };
-    let all = if from { " and all that follow" } else { "" };
-    let (args, mode) = (args[..args.len().min(2)].join(" ").replace(" --jobs", ""), name(mode));
-    let what = format!("`{args}`, {store} | {mode} at a {kind} of {place}{all}");
-    print_row(&what, count, calls(count).into_iter().map(fault), |fault| command.tried(fault));
+    let last = |at| if is_lasting { 0 } else { at };
+    let faults =
+        calls(count).into_iter().map(|at| Fault { last: last(at), ..Fault::at(under, kind, mode, at) });
+    let (args, all) = (args[0], if is_lasting { " and all that follow" } else { "" });
+    let what = format!("`{args}`, {store} | {mode} at a {kind} of `{under}`{all}");
+    print_row(&what, count, faults, |fault| command.tried(fault));
 }
 
-const NEW: (fn() -> TestFleet, &str) = (few, "new store");
-const GROWN: (fn() -> TestFleet, &str) = (grown, "grown store");
-const STORED: (fn() -> TestFleet, &str) = (stored, "grown store");
+/// A fleet before the command, and what its store is.
+type Start = (fn() -> TestFleet, &'static str);
 
-#[test]
-fn a_log_read_that_fails_once_loses_no_flight() {
-    strike(RUN, NEW, ("sample-data/logs", "read", EIO), false);
-    strike(RUN, NEW, ("sample-data/logs", "read", ESTALE), false);
-}
+/// A command, what it starts from, the part of the paths whose calls count, their kind, the fault, and whether all calls that
+/// follow fail, too.
+type Row = (&'static [&'static str], Start, &'static str, &'static str, &'static str, bool);
 
-/// Permissions that are set right, and a process that may open more files, change nothing of a log: the next run tries
-/// it again by itself.
+const NEW: Start = (few, "new store");
+const GROWN: Start = (grown, "grown store");
+const STORED: Start = (stored, "grown store");
+
+const TABLES: Start = (with_tables, "new store");
+
+const COMPACT: &[&str] = &["store", "compact"];
+const REPORT: &[&str] = &["report", "--output", "pages"];
+const LOGS: &str = "sample-data/logs";
+
+/// Permissions that are set right (EACCES), and a process that may open more files (EMFILE), change nothing of a log: the next
+/// run tries it again by itself.
+const FAULTS: [Row; 24] = [
+    (RUN, NEW, LOGS, "read", "EIO", false),
+    (RUN, NEW, LOGS, "read", "EIO", true),
+    (RUN, NEW, LOGS, "read", "ESTALE", false),
+    (RUN, NEW, LOGS, "read", "EACCES", false),
+    (RUN, NEW, LOGS, "read", "EMFILE", false),
+    (RUN, NEW, "results", "write", "EIO", false),
+    (RUN, NEW, "results", "write", "kill", false),
+    (RUN, NEW, "results", "read", "EIO", false),
+    (RUN, GROWN, "results", "write", "EIO", false),
+    (RUN, GROWN, "results", "write", "EIO", true),
+    (RUN, GROWN, "results", "write", "kill", false),
+    (RUN, GROWN, "results", "read", "ESTALE", false),
+    (RUN, TABLES, "pipeline.toml", "read", "EIO", false),
+    (RUN, TABLES, "installations.csv", "read", "EIO", false),
+    (RUN, TABLES, "flights.csv", "read", "EIO", false),
+    (RUN, TABLES, "maintenance.csv", "read", "EIO", false),
+    (RUN, TABLES, "inspections.csv", "read", "EIO", false),
+    (COMPACT, STORED, "results", "write", "EIO", false),
+    (COMPACT, STORED, "results", "write", "kill", false),
+    (COMPACT, STORED, "results", "read", "EIO", false),
+    (COMPACT, STORED, "results", "read", "ESTALE", false),
+    (REPORT, STORED, "results", "read", "EIO", false),
+    (REPORT, STORED, "pages", "write", "EIO", false),
+    (REPORT, STORED, "pages", "write", "kill", false),
+];
+
+/// Whatever call fails, and wherever a run, a compaction or a report is killed: the command without a fault makes whole what is
+/// missing, and a missing row or page was reported.
 #[test]
-fn a_log_that_cannot_be_opened_is_tried_again() {
-    strike(RUN, NEW, ("sample-data/logs", "read", EACCES), false);
-    strike(RUN, NEW, ("sample-data/logs", "read", EMFILE), false);
+fn a_fault_at_any_call_loses_nothing_and_is_reported() {
+    let Some(injector) = Injector::get() else { return };
+    each(&FAULTS, |row| strike(injector, row));
 }
 
 /// The fleet with every table that a configuration names.
@@ -375,15 +387,6 @@ fn with_tables() -> TestFleet {
     fleet
 }
 
-#[test]
-fn a_table_that_cannot_be_read_is_reported_and_heals() {
-    const TABLES: [&str; 5] =
-        ["installations.csv", "flights.csv", "maintenance.csv", "inspections.csv", "pipeline.toml"];
-    for table in spread(&TABLES, 2) {
-        strike(RUN, (with_tables, "new store"), (table, "read", EIO), false);
-    }
-}
-
 /// What is printed at exit code 0 is what is printed without a fault: no unit, flight or alert is left out.
 #[test]
 fn a_read_that_fails_makes_no_command_print_less() {
@@ -400,10 +403,10 @@ fn a_read_that_fails_makes_no_command_print_less() {
     let Some(injector) = Injector::get() else { return };
     let fleet = stored();
     for command in COMMANDS {
-        let sound = injector.run(&fleet, command, &Fault::at("results", "read", EIO, 0));
+        let sound = injector.run(&fleet, command, &Fault::at("results", "read", "EIO", 0));
         assert_eq!(sound.code, Some(0), "{command:?}: {sound:?}");
         let count = injector.count(&fleet, command, "results", "read");
-        for mode in [EIO, ESTALE] {
+        for mode in ["EIO", "ESTALE"] {
             let tried = |fault: &Fault| {
                 let struck = injector.run(&fleet, command, fault);
                 assert!(matches!(struck.code, Some(0..=3 | 5)), "{fault:?}: {struck:?}");
@@ -415,16 +418,11 @@ fn a_read_that_fails_makes_no_command_print_less() {
                 struck.code
             };
             let shown = command[..2].join(" ").replace(" --format", "");
-            let what = format!("`{shown}` | {} at a read of the store", name(mode));
+            let what = format!("`{shown}` | {mode} at a read of the store");
             let faults = calls(count).into_iter().map(|at| Fault::at("results", "read", mode, at));
             print_row(&what, count, faults, tried);
         }
     }
-}
-
-#[test]
-fn a_log_folder_that_fails_from_some_call_on_is_reported_and_heals() {
-    strike(RUN, NEW, ("sample-data/logs", "read", EIO), true);
 }
 
 /// Three flights as a Delta table from which the second was withdrawn; its file is still in the folder.
@@ -446,7 +444,7 @@ fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
     let wanted = plain.exported();
     assert_eq!(wanted.lines().count() - 1, 8);
     let command = Struck::new(injector, table(), RUN, &wanted);
-    for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
+    for (under, mode) in [(UNDER, "EIO"), (UNDER, "ESTALE")] {
         for at in calls(command.count(under, "read")) {
             command.tried(&Fault::at(under, "read", mode, at));
         }
@@ -458,25 +456,6 @@ fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
         assert_eq!(always.code, Some(1), "{always:?}");
         assert!(always.err.contains("error[folder_unreadable]"), "{always:?}");
     }
-}
-
-#[test]
-fn a_store_call_that_fails_in_a_new_store_loses_nothing() {
-    strike(RUN, NEW, ("results", "write", EIO), false);
-    strike(RUN, NEW, ("results", "read", EIO), false);
-}
-
-#[test]
-fn a_store_call_that_fails_in_a_grown_store_loses_nothing() {
-    strike(RUN, GROWN, ("results", "write", EIO), false);
-    strike(RUN, GROWN, ("results", "read", ESTALE), false);
-    strike(RUN, GROWN, ("results", "write", EIO), true);
-}
-
-#[test]
-fn a_kill_at_any_call_loses_nothing() {
-    strike(RUN, NEW, ("results", "write", "kill"), false);
-    strike(RUN, GROWN, ("results", "write", "kill"), false);
 }
 
 /// Run after run on one store is killed at a call from a seed, until a run finishes, and then from nothing again.
@@ -509,26 +488,10 @@ fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     assert!(partly > 0 && finished > 0, "no kill came after a commit, or no run finished");
 }
 
-#[test]
-fn a_fault_in_a_compaction_loses_nothing() {
-    const COMPACT: &[&str] = &["store", "compact"];
-    for (kind, mode) in [("write", EIO), ("read", EIO), ("read", ESTALE), ("write", "kill")] {
-        strike(COMPACT, STORED, ("results", kind, mode), false);
-    }
-}
-
-#[test]
-fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
-    const REPORT: &[&str] = &["report", "--output", "pages"];
-    for fault in [("results", "read", EIO), ("pages", "write", EIO), ("pages", "write", "kill")] {
-        strike(REPORT, STORED, fault, false);
-    }
-}
-
 /// Two faults of one run, at calls and of kinds from a seed.
 #[test]
 fn two_faults_in_one_run_lose_nothing() {
-    const MODES: [&str; 4] = [EIO, ESTALE, ENOSPC, "kill"];
+    const MODES: [&str; 4] = ["EIO", "ESTALE", "ENOSPC", "kill"];
     let Some(injector) = Injector::get() else { return };
     let wanted = few_records();
     let mut chance = fastrand::Rng::with_seed(seed());

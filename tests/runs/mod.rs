@@ -5,9 +5,6 @@ mod disk_faults;
 #[cfg(target_os = "linux")]
 mod injected_faults;
 mod interruption;
-mod killed_run_recovery;
 mod large_inputs;
-#[cfg(target_os = "linux")]
-mod quiet_failures;
 #[cfg(target_os = "linux")]
 mod soak;
