@@ -346,13 +346,6 @@ pub(crate) fn facts(log: &Path) -> Facts {
         .collect()
 }
 
-/// The identity of a log with another value of a key.
-pub(crate) fn facts_with(log: &Path, key: &str, value: &str) -> Facts {
-    let mut facts = facts(log);
-    facts.iter_mut().filter(|(known, _)| known == key).for_each(|(_, old)| value.clone_into(old));
-    facts
-}
-
 /// Rewrites some columns and rows of a log as doubles, under an identity.
 pub(crate) fn rewrite(
     from: &Path,

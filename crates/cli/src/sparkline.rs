@@ -35,29 +35,22 @@ pub(crate) fn sparkline(values: &[f64], limit: Option<f64>) -> String {
 mod tests {
     use super::*;
 
+    /// The lowest value is an empty block and the limit a full one; wear shows, and noise near the limit does not.
     #[test]
-    fn growth_climbs_and_rest_lies_flat() {
-        assert_eq!(sparkline(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], None), "▁▂▃▄▅▆▇█");
-        assert_eq!(sparkline(&[100.0, 100.5, 99.8], None), "▁▁▁");
-        assert_eq!(sparkline(&[0.0; 3], None), "▁▁▁");
-    }
-
-    #[test]
-    fn the_lowest_value_is_an_empty_block_and_the_limit_a_full_one() {
-        assert_eq!(sparkline(&[0.0, 75e-6, 150e-6, 160e-6], Some(150e-6)), "▁▅██");
-        assert_eq!(sparkline(&[100e-6, 110e-6, 125e-6, 140e-6], Some(150e-6)), "▁▂▅▇", "wear shows");
-        assert_eq!(
-            sparkline(&[140e-6, 141e-6, 139e-6], Some(150e-6)),
-            "▆▆▅",
-            "noise near the limit does not"
-        );
-        assert_eq!(sparkline(&[20e-6, 21e-6, 20e-6], Some(150e-6)), "▁▁▁");
-    }
-
-    #[test]
-    fn many_values_are_twelve_characters() {
+    fn values_are_blocks_between_the_lowest_and_the_limit() {
+        for (values, limit, blocks) in [
+            (&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0][..], None, "▁▂▃▄▅▆▇█"),
+            (&[100.0, 100.5, 99.8], None, "▁▁▁"),
+            (&[0.0; 3], None, "▁▁▁"),
+            (&[1.0], None, ""),
+            (&[0.0, 75.0, 150.0, 160.0], Some(150.0), "▁▅██"),
+            (&[100.0, 110.0, 125.0, 140.0], Some(150.0), "▁▂▅▇"),
+            (&[140.0, 141.0, 139.0], Some(150.0), "▆▆▅"),
+            (&[20.0, 21.0, 20.0], Some(150.0), "▁▁▁"),
+        ] {
+            assert_eq!(sparkline(values, limit), blocks, "{values:?}");
+        }
         let values: Vec<f64> = (0..1000).map(f64::from).collect();
         assert_eq!(sparkline(&values, None).chars().count(), 12);
-        assert_eq!(sparkline(&[1.0], None), "");
     }
 }

@@ -169,20 +169,6 @@ impl fmt::Display for Diagnostic {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_diagnostic_is_displayed_from_message_to_remedy() {
-        let c = Diagnostic {
-            column: Some("t_ns".into()),
-            row: Some(9),
-            found: Some("12:04:07 after 12:04:09".into()),
-            ..Diagnostic::new("time_goes_back", "the clock runs backwards")
-                .in_file("a.parquet")
-                .hint("sort it")
-        };
-        let text = "error[time_goes_back]: the clock runs backwards\n  file    a.parquet\n  at      column `t_ns`, row 9\n  found   12:04:07 after 12:04:09\nhint: sort it";
-        assert_eq!(c.to_string(), text);
-    }
-
     /// A name may hold line feeds; what follows them must not look like a message of the program.
     #[test]
     fn a_name_with_line_feeds_cannot_forge_a_diagnostic() {

@@ -299,33 +299,6 @@ mod tests {
     }
 
     #[test]
-    fn two_units_in_one_position_are_named_by_row() {
-        let rows = vec![
-            installation("N1", "aileron", "A", JAN, None),
-            installation("N1", "aileron", "B", FEB, None),
-        ];
-        let errors = Installations::new(rows).unwrap_err();
-        assert!(matches!(errors[..], [Error::PositionTaken { row: 1, other: 2, .. }]), "{errors:?}");
-    }
-
-    #[test]
-    fn one_unit_in_two_places_is_refused_even_across_tails() {
-        let rows = vec![
-            installation("N1", "aileron", "A", JAN, Some(MAR)),
-            installation("N2", "aileron", "A", FEB, None),
-        ];
-        let errors = Installations::new(rows).unwrap_err();
-        assert!(matches!(errors[..], [Error::UnitTwice { row: 1, other: 2, .. }]), "{errors:?}");
-    }
-
-    #[test]
-    fn a_stay_that_ends_before_it_begins_is_refused() {
-        let errors =
-            Installations::new(vec![installation("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
-        assert!(matches!(errors[0], Error::Reversed { row: 1, .. }));
-    }
-
-    #[test]
     fn a_unit_keeps_its_history_through_a_modification_and_a_new_serial_number() {
         let part = |text: &str| PartNumber::new(text).unwrap();
         let serial = |text: &str| SerialNumber::new(text).unwrap();

@@ -616,18 +616,6 @@ mod tests {
     }
 
     #[test]
-    fn a_case_is_the_same_each_time_and_another_index_gives_another() {
-        let fly = |index| {
-            let mut case = case_of("everything, hard flanks", index);
-            case.profile.duration_s = 5.0;
-            case.fly().unwrap().flight
-        };
-        assert_eq!(fly(3).screw_m.len(), fly(3).screw_m.len());
-        assert_eq!(fly(3), fly(3));
-        assert_ne!(fly(3), fly(4));
-    }
-
-    #[test]
     fn a_toe_below_the_band_adds_to_the_gap_and_hard_flanks_do_not() {
         let mut case = case_of("soft flanks, 20 µm deep", 0);
         case.profile.duration_s = 60.0;

@@ -181,7 +181,7 @@ fn each_flight_of_the_table_is_estimated_or_refused_as_its_row_says() {
             match case.outcome(&flight) {
                 Ok(found) => squares.push(row.error_um(flight.gap_m, &found).powi(2)),
                 Err(why) => {
-                    assert!(row.refused.iter().any(|code| code == why.code()), "{}: {why:?}", row.name)
+                    assert!(row.refused.iter().any(|code| code == why.code()), "{}: {why:?}", row.name);
                 }
             }
         }

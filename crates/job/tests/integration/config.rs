@@ -51,14 +51,6 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
     }
 }
 
-/// The address of a channel may hold a secret.
-#[test]
-fn an_address_that_is_none_of_http_is_refused_and_not_shown() {
-    let text = format!("{GOOD}\n[alerts.a]\nurl = \"ftp://example.com/SECRET\"\n");
-    let found = parse(&text).unwrap_err();
-    assert!(found[0].code == "alert_channel" && !found[0].to_string().contains("SECRET"), "{found:?}");
-}
-
 /// The page lists the ranges that are checked.
 #[test]
 fn the_documentation_lists_every_range() {

@@ -10,7 +10,6 @@ use pipeline::findings::finding::{Finding, GAP};
 use pipeline::findings::summary::AlertSummary;
 use records::{AlertRecord, AlertStatus};
 use serde_json::Value;
-use store::{Holder, Store};
 
 const STATES: [Option<&str>; 5] = [None, Some("normal"), Some("watch"), Some("plan"), Some("act")];
 
@@ -125,6 +124,10 @@ impl Courier for World {
         if is_received {
             let message: Value = serde_json::from_str(row.message.as_ref().unwrap()).unwrap();
             assert_eq!(message["id"], row.alert_id.as_str());
+            for (key, state) in [("from", &row.from_state), ("to", &row.to_state)] {
+                let word = state.as_deref().unwrap_or("not_assessed");
+                assert!(row.kind == "baseline" || message[key] == word, "{key} is not {word}: {message}");
+            }
             self.received.push((row.channel.clone(), row.alert_id.clone()));
         }
         attempt
@@ -183,6 +186,14 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
         .map(|row| row.alert_id.as_str())
         .collect();
     assert_eq!(changes.len(), expected, "a change is written twice or lost");
+    // The changes of a unit are a chain: each begins where the one before ended.
+    for serial in SERIALS {
+        let is_of_unit =
+            |row: &&AlertRecord| row.channel.is_empty() && row.serial_number.as_deref() == Some(serial);
+        let mut changes: Vec<&AlertRecord> = world.table.values().filter(is_of_unit).collect();
+        changes.sort_by_key(|row| row.change_number);
+        assert!(changes.windows(2).all(|pair| pair[0].to_state == pair[1].from_state), "{changes:?}");
+    }
     let mut counts = BTreeMap::<&str, usize>::new();
     for row in world.table.values().filter(|row| !row.channel.is_empty() && row.kind == "change") {
         let name = (row.channel.clone(), row.alert_id.clone());
@@ -199,37 +210,6 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
     }
     assert_eq!(counts.values().sum::<usize>(), 3 * expected);
     assert!(counts["unconfirmed"] > 20 && counts["sent"] > 2 * expected, "{counts:?}");
-}
-
-/// The messages of one unit are a chain: each begins where the one before ended.
-#[test]
-fn the_changes_of_a_unit_are_a_chain_over_repeated_and_back_filled_runs() {
-    let channels = channels();
-    let mut table: Vec<AlertRecord> = Vec::new();
-    let mut run = |state, day| {
-        let now = Timestamp::UNIX_EPOCH;
-        let found = alert_changes::detect(&table, &[finding("7", state, day)], &channels, "R", now);
-        table.extend(found.clone());
-        found.iter().filter(|row| row.channel == "command").map(|row| row.message.clone().unwrap()).collect()
-    };
-    let text = |messages: Vec<String>| -> Vec<(String, String)> {
-        let read = |message: &String| -> Value { serde_json::from_str(message).unwrap() };
-        let words = |message: Value| (message["from"].to_string(), message["to"].to_string());
-        messages.iter().map(read).map(words).collect()
-    };
-    let one = |from: &str, to: &str| vec![(format!("\"{from}\""), format!("\"{to}\""))];
-    let baseline: Vec<String> = run(Some("watch"), 1);
-    let baseline: Value = serde_json::from_str(&baseline[0]).unwrap();
-    assert_eq!((&baseline["kind"], &baseline["states"]["watch"]), (&"baseline".into(), &1.into()));
-    // A back-fill that passed through `act` and ended in `watch` is no change.
-    assert_eq!(text(run(Some("watch"), 2)), []);
-    assert_eq!(text(run(Some("act"), 2)), one("watch", "act"));
-    // The same date: only the number of the change differs.
-    assert_eq!(text(run(Some("watch"), 2)), one("act", "watch"));
-    assert_eq!(text(run(Some("act"), 2)), one("watch", "act"));
-    assert_eq!(text(run(None, 3)), one("act", "not_assessed"));
-    let ids: BTreeSet<&String> = table.iter().map(|row| &row.alert_id).collect();
-    assert_eq!(ids.len(), 8, "one baseline, the summaries of three channels, four changes");
 }
 
 #[test]
@@ -277,36 +257,6 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     world.refused = ["S3".to_owned()].into();
     assert_eq!(run(&mut world, "5"), (7, 1, 0, 8));
     assert_eq!(run(&mut world, "6"), (0, 1, 0, 1));
-}
-
-/// The store keeps what was claimed when a process ends without a word.
-#[test]
-fn a_claim_is_durable_and_the_newest_status_counts() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = Store::create_or_open(dir.path().join("results")).unwrap();
-    assert_eq!(store.alerts().unwrap(), []);
-    let rows = alert_changes::detect(
-        &[],
-        &[finding("\"},{\n\u{0}", Some("act"), 1)],
-        &channels(),
-        "R",
-        Timestamp::UNIX_EPOCH,
-    );
-    let mut writer = store.lock(&Holder::this_process(), None).unwrap();
-    writer.write_alerts(&rows).unwrap();
-    let mut claimed = rows.iter().find(|row| row.channel == "command").unwrap().clone();
-    for status in [AlertStatus::Sending, AlertStatus::Unconfirmed, AlertStatus::Sent] {
-        claimed.status = status;
-        claimed.attempts += 1;
-        writer.write_alerts(std::slice::from_ref(&claimed)).unwrap();
-        let read = Store::open(dir.path().join("results")).unwrap().alerts().unwrap();
-        assert_eq!(read.len(), rows.len());
-        assert_eq!(read.iter().find(|row| row.channel == "command"), Some(&claimed));
-    }
-    writer.compact().unwrap();
-    let read = Store::open(dir.path().join("results")).unwrap().alerts().unwrap();
-    assert!(read.contains(&claimed) && read.len() == rows.len());
-    assert_eq!(store.verify(), []);
 }
 
 /// A change that a tail made, first seen on a day.

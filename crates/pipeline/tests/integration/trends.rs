@@ -160,13 +160,10 @@ fn a_fleet_without_a_failure_is_compared_with_the_levels_that_it_has_reached() {
     assert!(held > 0.8 && error < 0.15, "held {held}, median error {error}");
 }
 
-fn booked(file: &str) -> Config {
-    fleet::config_with("[logs]", &format!("[logs]\nmaintenance = \"tests/data/{file}\""))
-}
-
 #[test]
 fn recorded_maintenance_is_a_change_point_from_its_date_on() {
-    let rows = assess_with(&booked("maintenance.csv"), &flown(200), Some(day(199)));
+    let booked = fleet::config_with("[logs]", "[logs]\nmaintenance = \"tests/data/maintenance.csv\"");
+    let rows = assess_with(&booked, &flown(200), Some(day(199)));
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -174,16 +171,6 @@ fn recorded_maintenance_is_a_change_point_from_its_date_on() {
     assert_eq!(units, ["S03"]);
     let change = &rows[3].change_points[0];
     assert_eq!((change.departure_utc, change.flight_id.as_deref()), (day(101), Some("3-101")));
-}
-
-#[test]
-fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
-    let nobody = Installations::default();
-    let (config, flown) = (booked("maintenance_unknown.csv"), histories(&flown(20)));
-    let found = trends::assess(&config, &nobody, Some(flown), None, &UnitSelection::default());
-    let Err(pipeline::Error::Refused(diagnostics)) = found else { panic!("{found:?}") };
-    let text = format!("{diagnostics:?}");
-    assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }
 
 #[test]
@@ -347,24 +334,4 @@ fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them(
     assert_eq!(flagged.state, sound.state);
     let reason = flagged.reason.unwrap();
     assert!(reason.contains("6 of the latest 12 gaps") && reason.contains("estimators_disagree"), "{reason}");
-}
-
-/// Two rows of one flight that differ: named, and the state rests on the other flights.
-#[test]
-fn contradicting_rows_of_a_flight_are_named_and_decide_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("estimates.csv");
-    let day = |n: u32, gap_m: &str| format!("S1,2026-01-{n:02}T06:00:00Z,{gap_m},1.0\n");
-    let rows: String =
-        (1..=12).map(|n| day(n, "30e-6")).chain([day(12, "42e-6"), day(12, "30e-6")]).collect();
-    std::fs::write(&file, format!("serial_number,departure_utc,gap_m,flight_hours\n{rows}")).unwrap();
-    let histories = pipeline::fleet::external_estimates::read(&file, &BTreeSet::new()).unwrap();
-    let ask = UnitSelection {
-        as_of_utc: Some("2026-01-12T06:00:00Z".parse().unwrap()),
-        ..UnitSelection::default()
-    };
-    let rows = assess_histories(&config(), &Installations::default(), histories, &ask);
-    let reason = rows[0].reason.as_deref().unwrap();
-    assert!(reason.contains("1 flights with records that contradict each other"), "{reason}");
-    assert!((rows[0].gap_m.unwrap() - 30e-6).abs() < 1e-7, "{:?}", rows[0]);
 }

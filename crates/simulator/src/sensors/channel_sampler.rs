@@ -161,17 +161,6 @@ mod tests {
         Profile { duration_s: 6.0, sample_rate_hz: 50.0, ..Profile::default() }
     }
 
-    /// A step through a lag: `1 − e^(−t/τ)`.
-    #[test]
-    fn a_lag_answers_a_step_exponentially() {
-        let channel = Channel { lag_s: 0.2, ..Channel::default() };
-        let values = sampled(&channel, &profile(), |t| f64::from(u8::from(t > 1.0)));
-        for k in [60, 75, 100] {
-            let expected = 1.0 - (-(k as f64 / 50.0 - 1.0) / 0.2).exp();
-            assert!((values[k] - expected).abs() < 1e-3, "{} for {expected}", values[k]);
-        }
-    }
-
     /// A sine through a lag: amplitude `1/√(1 + (ωτ)²)`, phase `−atan ωτ`.
     #[test]
     fn a_lag_turns_and_shrinks_a_sine() {

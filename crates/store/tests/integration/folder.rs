@@ -93,13 +93,3 @@ fn a_table_that_cannot_be_read_is_not_taken_for_a_missing_store() {
         assert!(!error.diagnostic().hint.unwrap().contains("remove"), "{error}");
     }
 }
-
-#[test]
-fn an_address_with_a_password_is_refused_without_showing_it() {
-    for text in ["s3://AKIA:hunter2@fleet/results", "az://results?sv=1&sig=hunter2%2B"] {
-        for opened in [Store::open(text), Store::create_or_open(text)] {
-            let shown = opened.unwrap_err().diagnostic().to_string();
-            assert!(shown.contains("credentials") && !shown.contains("hunter2"), "{shown}");
-        }
-    }
-}

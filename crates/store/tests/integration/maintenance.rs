@@ -1,7 +1,7 @@
 //! Maintenance: figures about the store, and merging its files changes no row.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use store::{Query, Store, Writer};
@@ -88,21 +88,6 @@ fn an_empty_store_is_sound_and_counts_zero() {
 }
 
 #[test]
-fn verify_finds_any_flipped_byte() {
-    let (_dir, writer) = filled();
-    let file = data_file(&writer);
-    let sound = fs::read(&file).unwrap();
-    for at in (0..sound.len()).step_by(sound.len() / 7) {
-        let mut flipped = sound.clone();
-        flipped[at] ^= 0x10;
-        fs::write(&file, flipped).unwrap();
-        assert_eq!(codes(writer.store()), ["store_damaged"], "byte {at}");
-    }
-    fs::write(&file, sound).unwrap();
-    assert_eq!(codes(writer.store()), Vec::<String>::new());
-}
-
-#[test]
 fn stray_files_beside_the_data_are_no_rows() {
     let (dir, writer) = filled();
     fs::copy(data_file(&writer), dir.path().join("gaps/copy of yesterday.parquet")).unwrap();
@@ -165,41 +150,6 @@ fn superseded_files_are_kept_for_readers_until_they_are_old() {
     assert!(before.iter().all(|file| !file.exists()));
     assert_eq!(writer.store().verify(), []);
     assert_eq!(writer.store().records(&Query::default()).unwrap().len(), 36);
-}
-
-/// The files of a table's log that hold its content: commits and checkpoints.
-fn log_files(dir: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(dir.join("gaps/_delta_log")).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| !path.ends_with("_last_checkpoint")).collect();
-    files.sort();
-    files
-}
-
-#[test]
-fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
-    let (dir, mut writer) = filled();
-    (20..36).for_each(|flight| writer.commit(&[result(flight, 0, 1e-6)]).unwrap());
-    let files = log_files(dir.path());
-    assert!(files.iter().any(|file| file.to_str().unwrap().contains("checkpoint.parquet")), "{files:?}");
-    assert_eq!(writer.store().verify(), []);
-    // One byte of each file, and four in the gate.
-    let tries = if crate::gate::is_gate() { 4 } else { 1 };
-    for (number, file) in files.into_iter().enumerate() {
-        let whole = fs::read(&file).unwrap();
-        let places = [10, whole.len() / 3, whole.len() / 2, whole.len() - 10];
-        for at in (0..tries).map(|k| places[(number + k) % 4]) {
-            let mut changed = whole.clone();
-            changed[at] ^= 1;
-            fs::write(&file, changed).unwrap();
-            let findings = Store::open(dir.path()).unwrap().verify();
-            assert!(
-                findings.iter().any(|found| found.code == "store_damaged"),
-                "{file:?}, byte {at}: {findings:?}"
-            );
-        }
-        fs::write(&file, whole).unwrap();
-    }
-    assert_eq!(writer.store().verify(), []);
 }
 
 /// Delta readers skip actions that they do not know: a changed name would remove a file's rows without an error.
