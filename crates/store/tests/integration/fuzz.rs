@@ -15,7 +15,7 @@ mod edits;
 fn grown(dir: &Path) -> Store {
     let mut writer = writer(dir);
     writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &[]).unwrap();
-    for flight in 0..12 {
+    for flight in 0..21 {
         writer.commit(&[result(1, flight, 1e-5), result(2, flight, 2e-5)]).unwrap();
         if flight == 2 {
             writer.compact().unwrap();

@@ -6,8 +6,6 @@ mod commits;
 mod fixtures;
 mod folder;
 mod fuzz;
-#[path = "../../../../tests/gate.rs"]
-mod gate;
 #[path = "../../../../tests/made_up.rs"]
 mod made_up;
 mod maintenance;
