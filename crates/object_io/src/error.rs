@@ -93,8 +93,8 @@ impl Error {
 }
 
 /// Message of the innermost cause: the outer ones repeat the address.
-fn root_cause(error: &object_store::Error) -> String {
-    let mut cause: &dyn std::error::Error = error;
+pub(crate) fn root_cause(error: &dyn std::error::Error) -> String {
+    let mut cause = error;
     while let Some(next) = cause.source() {
         cause = next;
     }

@@ -92,15 +92,17 @@ fn resolution(values: &[f64], seen: &ChannelStats) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
-/// Stretches of `least` samples or more that repeat one value while another position travels further than `travel_m`; a
-/// channel that never changes has none.
+/// Stretches of `least` samples or more that repeat one value while another position travels further than `travel_m` and
+/// than a share of its range; a channel that never changes has none.
 #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
 fn still_runs(
     values: &[f64],
     partner_m: &[f64],
     least: usize,
     travel_m: f64,
+    share: f64,
 ) -> impl Iterator<Item = Range<usize>> {
+    let travel_m = travel_m.max(share * range(partner_m));
     let mut end = 0;
     values.chunk_by(|a, b| a == b).filter_map(move |run| {
         let start = end;
@@ -288,39 +290,35 @@ pub(crate) fn coarse_resolution(channels: &[Quality; 3], travel_m: f64) -> Vec<S
     positions.filter(|(q, _)| is_coarse(q)).map(|(_, role)| format!("{}_coarse", role.as_str())).collect()
 }
 
-/// Samples of a frozen position are no measurement: where one repeats its last value while the other
-/// travels further than any gap, it is marked as missing. Returns the codes of those that froze; no value of
-/// either is repeated for longer than `longest_run` samples.
+/// Samples of a frozen position are no measurement: where one repeats its last value for half a second while the other
+/// travels a millimetre and a twentieth of its range, it is marked as missing. Returns the codes of those that froze; no
+/// value of either is repeated for longer than `longest_run` samples. A channel that never moves is rejected elsewhere.
 pub(crate) fn drop_frozen_samples(
     motor_m: &mut [f64],
     screw_m: &mut [f64],
     longest_run: usize,
     step_s: f64,
 ) -> Vec<String> {
-    // A position may repeat its value for half a second.
-    let least = ((0.5 / step_s).ceil() as usize).max(3);
+    const LEAST_S: f64 = 0.5;
+    const LEAST_TRAVEL_M: f64 = 1e-3;
+    const LEAST_SHARE: f64 = 0.05;
+    let least = ((LEAST_S / step_s).ceil() as usize).max(3);
     if longest_run < least {
         return Vec::new();
     }
-    let still = [frozen_ranges(motor_m, screw_m, least), frozen_ranges(screw_m, motor_m, least)];
+    let still = |values: &[f64], partner_m: &[f64]| -> Vec<Range<usize>> {
+        still_runs(values, partner_m, least, LEAST_TRAVEL_M, LEAST_SHARE).collect()
+    };
+    let still = [still(motor_m, screw_m), still(screw_m, motor_m)];
     let mut found = Vec::new();
     for ((spans, values), role) in still.iter().zip([motor_m, screw_m]).zip([Role::Motor, Role::Screw]) {
-        spans.iter().for_each(|span| values[span.clone()].fill(f64::NAN));
+        // The first of the repeated values was measured.
+        spans.iter().for_each(|span| values[span.start + 1..span.end].fill(f64::NAN));
         if !spans.is_empty() {
             found.push(format!("{}_frozen", role.as_str()));
         }
     }
     found
-}
-
-/// Segments in which a position is constant for at least half a second while the other position moves a millimetre and
-/// a twentieth of its range. A channel that never moves is rejected as a whole elsewhere.
-fn frozen_ranges(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usize>> {
-    const LEAST_TRAVEL_M: f64 = 1e-3;
-    const LEAST_SHARE: f64 = 0.05;
-    let travel_m = (LEAST_SHARE * range(partner)).max(LEAST_TRAVEL_M);
-    // The first of the repeated values was measured.
-    still_runs(values, partner, least, travel_m).map(|run| run.start + 1..run.end).collect()
 }
 
 /// Whether the load was constant for ten seconds in which the actuator moved a fifth of its range.
@@ -336,8 +334,7 @@ pub(crate) fn load_frozen(
     if longest_run < least {
         return None;
     }
-    let travel_m = LEAST_SHARE * range(motor_m);
-    let mut frozen = still_runs(load_n, motor_m, least, travel_m);
+    let mut frozen = still_runs(load_n, motor_m, least, 0.0, LEAST_SHARE);
     frozen.next().map(|_| format!("{}_frozen", Role::Load.as_str()))
 }
 

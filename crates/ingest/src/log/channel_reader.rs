@@ -176,7 +176,8 @@ impl<'s> ChannelSampling<'s> {
             return Ok((None, clock::uniform(rows, rate_hz)));
         }
         let mut stamps = self.table.stamps(&self.samples, self.time_column.as_deref())?;
-        let base = clock::build_time_base(&mut stamps, &clock).map_err(|f| self.table.error(f))?;
+        let base = clock::build_time_base(&mut stamps, &clock);
+        let base = base.map_err(|fault| self.table.error(fault.column(&stamps.column)))?;
         Ok((Some(stamps), base))
     }
 

@@ -534,7 +534,8 @@ impl<'c> ActuatorReader<'c> {
         }
         let (table, map) = (master.table, master.map);
         let column = map.time_column.as_ref().or(table.clock.column.as_ref()).map_or("", String::as_str);
-        master.base.check_one_flight(&table.clock, column).map_err(|fault| table.error(fault))
+        let checked = master.base.check_one_flight(&table.clock);
+        checked.map_err(|fault| table.error(fault.column(column)))
     }
 }
 

@@ -47,7 +47,8 @@ impl ChannelArrays<'_> {
         let seconds = self.time_s.iter().map(|s| s - first_s).collect();
         let mut stamps =
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
-        let base = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
+        let base = clock::build_time_base(&mut stamps, &ClockMapping::default());
+        let base = base.map_err(|fault| fail(fault.column(&stamps.column)))?;
         let [motor, screw, load] =
             named.map(|(_, values)| base.keep(values.iter().copied().map(reading).collect()).into());
         let read = RawChannels {

@@ -108,8 +108,8 @@ impl TimeBase {
         Timestamps { seconds, ..stamps }
     }
 
-    /// Whether the rows are those of one flight by their clock, whose stamps are in `column`.
-    pub(crate) fn check_one_flight(&self, clock: &ClockMapping, column: &str) -> Result<(), Fault> {
+    /// Whether the rows are those of one flight by their clock.
+    pub(crate) fn check_one_flight(&self, clock: &ClockMapping) -> Result<(), Fault> {
         let max_gap_s = clock.max_gap_s.unwrap_or(MAX_GAP_S);
         let rows = self.segments.last().map_or(0, |last| last.end);
         let length_s = |rows: usize| rows as f64 * self.step_s;
@@ -122,7 +122,6 @@ impl TimeBase {
                 let hint = "write each flight to a file of its own, or name the column with the flight or the departure in `identity.columns`; if it is one flight, raise `clock.max_gap_s`";
                 let fault = Fault::new("several_flights", "the log seems to hold two flights", hint);
                 return Err(fault
-                    .column(column)
                     .row(row as u64)
                     .found(format!("samples from 0 to {before_s:.0} s and from {after_s:.0} to {end_s:.0} s after the first one"))
                     .expected(format!("pauses of no more than {max_gap_s} s (`clock.max_gap_s`)")));
@@ -196,14 +195,15 @@ pub(crate) fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
 }
 
 /// Puts timestamped rows on one clock, and repairs the timestamps where the mapping defines how.
+/// The caller adds the column of the timestamps to an error.
 pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, Fault> {
     if let TimeOrigin::Counted(first_s) = stamps.origin {
-        plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
+        plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S))?;
     }
     if clock.tick_s.is_none() && stamps.seconds.len() > 1 && strictly_rising(&stamps.seconds) {
         let steps: Vec<f64> = stamps.seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let longest_s = steps.iter().copied().fold(0.0, f64::max);
-        let step_s = checked_step(usual_step(steps), clock, &stamps.column)?;
+        let step_s = checked_step(usual_step(steps), clock)?;
         if longest_s <= BREAK_STEPS * step_s {
             return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
         }
@@ -212,7 +212,7 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let usual_s = if is_in_no_order { f64::INFINITY } else { MAX_BACK_S };
     let max_back_s = clock.max_back_s.unwrap_or(usual_s);
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
-    let pieces = split_at_resets(stamps, max_back_s, clock.split_at_jumps)?;
+    let pieces = split_at_resets(&stamps.seconds, max_back_s, clock.split_at_jumps)?;
     let jittered_s =
         if clock.tick_s.is_some() || is_in_no_order { None } else { jittered_step(&stamps.seconds) };
     if let Some(tick_s) = clock.tick_s.or(jittered_s) {
@@ -228,11 +228,11 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let step = |i: usize| at(i) - at(i - 1);
     if count < 2 {
         let hint = "map the column with the time, or give only `clock.rate_hz`";
-        let fault = Fault::new("time_stands_still", "time does not advance", hint).column(&stamps.column);
+        let fault = Fault::new("time_stands_still", "time does not advance", hint);
         return Err(fault.found(format!("{} rows with one stamp", t.len())));
     }
     let seen_s = usual_step((1..count).map(step).filter(|s| *s > 0.0).collect());
-    let step_s = checked_step(seen_s, clock, &stamps.column)?;
+    let step_s = checked_step(seen_s, clock)?;
     let breaks: Vec<usize> =
         (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
     let first_s = match stamps.origin {
@@ -293,29 +293,27 @@ fn is_in_no_order(seconds: &[f64]) -> bool {
 }
 
 /// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
-fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, Fault> {
+fn checked_step(seen_s: f64, clock: &ClockMapping) -> Result<f64, Fault> {
     let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
     if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
         let (declared_hz, seen_hz) = (step_s.recip(), seen_s.recip());
         let message = format!("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}");
         let hint = "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps";
-        let fault = Fault::new("rate_contradicts", message, hint).column(column);
-        return Err(fault
+        return Err(Fault::new("rate_contradicts", message, hint)
             .found(format!("{seen_hz:.6} Hz by the median step"))
             .expected(format!("{declared_hz} Hz (`clock.rate_hz`)")));
     }
-    plausible(step_s, "the step", PLAUSIBLE_STEP_S, column)
+    plausible(step_s, "the step", PLAUSIBLE_STEP_S)
 }
 
 /// A time within a range.
-fn plausible(value_s: f64, what: &str, (least_s, most_s): (f64, f64), column: &str) -> Result<f64, Fault> {
+fn plausible(value_s: f64, what: &str, (least_s, most_s): (f64, f64)) -> Result<f64, Fault> {
     if (least_s..=most_s).contains(&value_s) {
         return Ok(value_s);
     }
     let message = format!("the clock is not plausible: {what} is {value_s:e} s");
     let hint = "check `clock.column` and `clock.unit`, and that the file is intact";
-    let fault = Fault::new("time_implausible", message, hint).column(column);
-    Err(fault.expected(format!("{least_s:e} to {most_s:e} s")))
+    Err(Fault::new("time_implausible", message, hint).expected(format!("{least_s:e} to {most_s:e} s")))
 }
 
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
@@ -338,9 +336,9 @@ fn fill_missing(seconds: &mut [f64], rate_hz: f64) -> usize {
 }
 
 /// Cuts the rows where the clock falls too deep, or refuses to.
-fn split_at_resets(stamps: &Timestamps, max_back_s: f64, split: bool) -> Result<Vec<Range<usize>>, Fault> {
+fn split_at_resets(seconds: &[f64], max_back_s: f64, split: bool) -> Result<Vec<Range<usize>>, Fault> {
     let (mut newest, mut deep, mut cuts) = (f64::NEG_INFINITY, None, Vec::new());
-    for (row, &s) in stamps.seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
+    for (row, &s) in seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
         if newest - s > max_back_s {
             deep.get_or_insert((row as u64, newest, s));
             cuts.push(row);
@@ -351,12 +349,12 @@ fn split_at_resets(stamps: &Timestamps, max_back_s: f64, split: bool) -> Result<
     match deep {
         Some((row, before_s, after_s)) if !split => {
             let hint = "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does";
-            let fault = Fault::new("time_goes_back", "time runs backwards", hint).column(&stamps.column);
+            let fault = Fault::new("time_goes_back", "time runs backwards", hint);
             let found = format!("{after_s} s after {before_s} s; {} rows lie so far back", cuts.len());
             let most = format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)");
             Err(fault.row(row).found(found).expected(most))
         }
-        _ => Ok(split_at(stamps.seconds.len(), &cuts)),
+        _ => Ok(split_at(seconds.len(), &cuts)),
     }
 }
 

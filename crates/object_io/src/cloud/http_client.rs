@@ -6,6 +6,7 @@ use reqwest::header::CONTENT_TYPE;
 use reqwest::redirect::Policy;
 
 use crate::client::handle;
+use crate::error::root_cause;
 use crate::http_post::{Posted, parse};
 
 /// Posts a JSON document and waits for the status of the answer, at most `timeout`.
@@ -20,7 +21,7 @@ pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
     let client = reqwest::Client::builder().redirect(Policy::none()).referer(false);
     let client = match client.timeout(timeout).connect_timeout(timeout).build() {
         Ok(client) => client,
-        Err(error) => return Posted::NotSent(detail(&error)),
+        Err(error) => return Posted::NotSent(root_cause(&error)),
     };
     let request = client.post(url).header(CONTENT_TYPE, "application/json").body(body.to_owned());
     let answer = match handle() {
@@ -29,21 +30,12 @@ pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
     };
     match answer.map_err(reqwest::Error::without_url) {
         Ok(answer) => Posted::Answered(answer.status().as_u16()),
-        Err(error) if error.is_connect() => Posted::NotSent(detail(&error)),
+        Err(error) if error.is_connect() => Posted::NotSent(root_cause(&error)),
         Err(error) if error.is_timeout() => {
             Posted::Unknown(format!("no answer within {:.1} s", timeout.as_secs_f64()))
         }
-        Err(error) => Posted::Unknown(detail(&error)),
+        Err(error) => Posted::Unknown(root_cause(&error)),
     }
-}
-
-/// Message of the innermost cause.
-fn detail(error: &reqwest::Error) -> String {
-    let mut cause: &dyn std::error::Error = error;
-    while let Some(next) = cause.source() {
-        cause = next;
-    }
-    cause.to_string()
 }
 
 #[cfg(test)]
