@@ -185,7 +185,7 @@ impl LogFile {
 
     /// Whether each row holds a list of this leaf's samples; false if there is no such leaf.
     pub(crate) fn is_listed(&self, name: &str) -> bool {
-        self.leaf(name).is_ok_and(|leaf| leaf.is_listed)
+        matches!(self.named(name)[..], [leaf] if leaf.is_listed)
     }
 
     /// The unit of a column of durations: Parquet has no such type, so Arrow's writers note the unit in the metadata.
