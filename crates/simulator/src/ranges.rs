@@ -177,33 +177,4 @@ mod tests {
             assert!(found.iter().any(|path| ends_with(path, key)), "no key ends with {key}");
         }
     }
-
-    #[test]
-    fn a_number_is_refused_by_the_range_of_its_key() {
-        let refused = |text: &str| {
-            let spec: Spec = toml::from_str(text).unwrap();
-            check("", &spec).map_err(|e| e.to_string())
-        };
-        assert_eq!(refused("[[parts]]\npart_number = \"P\"\nplant.contact.gap_m = -1e-5"), Ok(()));
-        for (text, error) in [
-            ("tail_hours = -1.0", "`tail_hours` is -1, which must be zero or more and finite"),
-            ("spread.drift_m = nan", "`spread.drift_m` is NaN, which must be zero or more and finite"),
-            ("sensors.load.bias = inf", "`sensors.load.bias` is inf, which must be finite"),
-            ("profile.rest_share = 1", "`profile.rest_share` is 1, which must be between 0 and 0.9"),
-            (
-                "[[changes]]\nfrom_flight = 3\nto_flight = 2",
-                "`changes[0].to_flight` is 2, which must be no less than `from_flight`",
-            ),
-            (
-                "[[parts]]\npart_number = \"P\"\ngap_m = [2e-5, 1e-5]",
-                "`parts[0].gap_m` is 0.00001, which must be a range, the least value first",
-            ),
-            (
-                "[[parts]]\npart_number = \"P\"\nplant.contact.worn_at_m = [0.0, 0.0]",
-                "`parts[0].plant.contact.worn_at_m[1]` is 0, which must be greater than zero and finite",
-            ),
-        ] {
-            assert_eq!(refused(text), Err(error.to_owned()));
-        }
-    }
 }
