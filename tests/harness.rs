@@ -1,6 +1,6 @@
 //! What every test here needs: a folder of its own, a configuration in it, and the binary.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -203,15 +203,29 @@ impl TestFleet {
                 if is(&blank, name) {
                     values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
                 }
-                let rows = first..end.min(values.len());
-                *values = values[rows].iter().copied().step_by(step).collect();
+                if let Some(row) = how.restart_at.filter(|_| name == "time_s") {
+                    let restart = values[row] - values[0];
+                    values[row..].iter_mut().for_each(|time| *time -= restart);
+                }
+                let of_column =
+                    |(pattern, ..): &&(String, _, _, _)| Regex::new(pattern).unwrap().is_match(name);
+                let holes = how.left_out.iter().filter(of_column);
+                let holes: BTreeSet<usize> =
+                    holes.flat_map(|(_, first, end, step)| (*first..*end).step_by(*step)).collect();
+                let rows = (first..end.min(values.len())).step_by(step);
+                *values = if how.is_long {
+                    rows.map(|row| if holes.contains(&row) { f64::NAN } else { values[row] }).collect()
+                } else {
+                    rows.filter(|row| !holes.contains(row)).map(|row| values[row]).collect()
+                };
                 for (from, to) in &how.rename {
                     *name = Regex::new(from).unwrap().replace(name, to).into_owned();
                 }
             }
             let rows = table.first().map_or(0, |(_, values)| values.len());
             table.extend(how.add.iter().map(|(name, value)| (name.clone(), vec![*value; rows])));
-            write_log(&self.path(&how.to.replace("{log}", name)), table, &own);
+            let to = self.path(&how.to.replace("{log}", name));
+            if how.is_long { write_long(&to, &table, &own) } else { write_log(&to, table, &own) }
         }
     }
 
@@ -247,6 +261,14 @@ pub(crate) struct LogRewrite {
     blank: Option<String>,
     /// The first row, the row after the last, and the step.
     rows: Option<(usize, usize, usize)>,
+    /// Rows that are left out: pattern of the names of columns, the first row, the row after the last, and the step.
+    #[serde(default)]
+    left_out: Vec<(String, usize, usize, usize)>,
+    /// The row at which the clock starts again.
+    restart_at: Option<usize>,
+    /// A row for each instant and column, whose name is in the column `parameter` and whose number is in `value`.
+    #[serde(default)]
+    is_long: bool,
     /// Pattern of names, and what replaces them.
     #[serde(default)]
     rename: Vec<(String, String)>,
@@ -367,5 +389,22 @@ pub(crate) fn rewrite(
 pub(crate) fn write_log(to: &Path, columns: Vec<(String, Vec<f64>)>, facts: &[(String, String)]) {
     use ingest::parquet::writer::{Column, write_parquet};
     let columns: Vec<_> = columns.into_iter().map(|(name, values)| (name, Column::Real(values))).collect();
+    write_parquet(to, &columns, facts).unwrap();
+}
+
+/// Writes a log with a row for each number that is there.
+fn write_long(to: &Path, columns: &[(String, Vec<f64>)], facts: &[(String, String)]) {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let (times, channels): (Vec<_>, Vec<_>) = columns.iter().partition(|(name, _)| name == "time_s");
+    let numbers = channels.into_iter().flat_map(|(name, values)| {
+        times[0].1.iter().zip(values).map(move |(time_s, value)| (*time_s, name.clone(), *value))
+    });
+    let mut rows: Vec<(f64, String, f64)> = numbers.filter(|row| !row.2.is_nan()).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let columns = [
+        ("time_s".to_owned(), Column::Real(rows.iter().map(|row| row.0).collect())),
+        ("parameter".to_owned(), Column::Text(rows.iter().map(|row| row.1.clone()).collect())),
+        ("value".to_owned(), Column::Real(rows.iter().map(|row| row.2).collect())),
+    ];
     write_parquet(to, &columns, facts).unwrap();
 }
