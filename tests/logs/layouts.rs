@@ -2,7 +2,7 @@
 //! `tests/data/logs.md`.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::harness::{Table, TestFleet, facts, without};
 
@@ -21,16 +21,12 @@ fn one_tail() -> TestFleet {
     fleet
 }
 
-fn logs(fleet: &TestFleet) -> Vec<PathBuf> {
-    fleet.logs_of("N412FP")
-}
-
 /// A table of many flights, one file a day: rows of different flights alternate, and one flight goes on in the next file.
 #[test]
 fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
     use ingest::parquet::writer::{Column, write_parquet};
     let fleet = one_tail();
-    let tables: Vec<_> = logs(&fleet).iter().map(|log| (Table::read(log), facts(log))).collect();
+    let tables: Vec<_> = fleet.logs_of("N412FP").iter().map(|log| (Table::read(log), facts(log))).collect();
     let mut days: [Vec<(usize, usize)>; 3] = Default::default();
     let longest = tables.iter().map(|(table, _)| table.rows()).max().unwrap();
     for (row, flight) in (0..longest).flat_map(|row| (0..tables.len()).map(move |flight| (row, flight))) {
