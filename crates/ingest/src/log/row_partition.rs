@@ -267,11 +267,14 @@ impl Combinations {
         Ok(Self { columns, of_rows, first_rows })
     }
 
-    /// The texts of each combination, by number; `None` where one of them is missing.
+    /// The texts of each combination, by number, without blanks at their ends, to which databases pad; `None` where one of
+    /// them is missing.
     fn texts(&self) -> impl Iterator<Item = Option<Vec<&str>>> {
         self.first_rows.iter().map(|row| {
             let texts = self.columns.iter();
-            texts.map(|texts| Some(texts.values().as_string::<i32>().value(texts.key(*row)?))).collect()
+            texts
+                .map(|texts| Some(texts.values().as_string::<i32>().value(texts.key(*row)?).trim_end()))
+                .collect()
         })
     }
 }
@@ -285,9 +288,11 @@ mod tests {
     use super::*;
     use crate::parquet::writer::write_batch;
 
-    /// Rows of parameters p0 to p9 in turn, or one parameter after the other, whose values are their row numbers.
+    /// Rows of parameters p0 to p9 in turn, or one parameter after the other, whose values are their row numbers. Some names
+    /// are padded, as a database does.
     fn file(folder: &std::path::Path, is_sorted: bool) -> LogFile {
-        let name = |row: u32| format!("p{}", if is_sorted { row / 100 } else { row % 10 });
+        let pad = |row: u32| if row % 7 == 0 { "  " } else { "" };
+        let name = |row: u32| format!("p{}{}", if is_sorted { row / 100 } else { row % 10 }, pad(row));
         let names: StringArray = (0..1000).map(|row| Some(name(row))).collect();
         let values: Float64Array = (0..1000).map(f64::from).collect();
         let columns: [(&str, ArrayRef); 2] = [("name", Arc::new(names)), ("value", Arc::new(values))];

@@ -495,14 +495,15 @@ pub(crate) struct TextBounds<'f> {
 }
 
 impl TextBounds<'_> {
-    /// Whether the row group may hold a text.
+    /// Whether the row group may hold a text, which may be padded with blanks there.
     pub(crate) fn may_hold(&self, text: &str) -> bool {
-        self.least <= text.as_bytes() && text.as_bytes() <= self.greatest
+        self.least.trim_ascii_end() <= text.as_bytes() && text.as_bytes() <= self.greatest
     }
 
-    /// The text of the row group, if it has only one.
+    /// The text of the row group without blanks at its end, if it has only one.
     pub(crate) fn only(&self) -> Option<&str> {
-        if self.is_exact && self.least == self.greatest { std::str::from_utf8(self.least).ok() } else { None }
+        let is_one = self.is_exact && self.least == self.greatest;
+        is_one.then(|| std::str::from_utf8(self.least).ok()).flatten().map(str::trim_end)
     }
 }
 

@@ -89,23 +89,30 @@ pub(crate) fn write_encoded(
     metadata: &[(String, String)],
     encoding: Encoding,
 ) -> Result<(), Error> {
-    let io = |source: std::io::Error| Fault::from(source).in_file(file);
-    let bad = |e: ParquetError| bad_table(e).in_file(file);
+    let bad = |e: ParquetError| match object_io::system_error(&e.to_string()) {
+        Some(source) => Fault::from(source).in_file(file),
+        None => bad_table(e).in_file(file),
+    };
     let batch = batch(columns).map_err(|e| bad(e.into()))?;
-    if let Some(folder) = file.parent() {
-        fs::create_dir_all(folder).map_err(io)?;
-    }
     // Two processes, or workers, may write files of one name.
     let own = format!("{}-{}", std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
     let [bare, beside] = ["bare", "part"].map(|end| file.with_extension(format!("{own}.{end}")));
-    let sink = object_io::create_fresh(&bare).map_err(io)?;
-    write_batch(sink, &batch, properties(&batch, metadata, encoding)).map_err(bad)?;
-    let from = File::open(&bare).map_err(io)?;
-    let mut to = object_io::create_fresh(&beside).map_err(io)?;
-    page_crc::copy(&from, &mut to).map_err(bad)?;
-    to.sync_all().map_err(io)?;
-    fs::remove_file(&bare).map_err(io)?;
-    fs::rename(&beside, file).map_err(io)
+    let write = || {
+        file.parent().map_or(Ok(()), fs::create_dir_all)?;
+        write_batch(object_io::create_fresh(&bare)?, &batch, properties(&batch, metadata, encoding))?;
+        let mut to = object_io::create_fresh(&beside)?;
+        page_crc::copy(&File::open(&bare)?, &mut to)?;
+        to.sync_all()?;
+        fs::remove_file(&bare)?;
+        Ok(fs::rename(&beside, file)?)
+    };
+    write().map_err(|e| {
+        // A disk may be full: what was begun must not fill it.
+        for begun in [&bare, &beside] {
+            let _ = fs::remove_file(begun);
+        }
+        bad(e)
+    })
 }
 
 /// A batch as Parquet.
