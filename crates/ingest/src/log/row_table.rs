@@ -282,11 +282,7 @@ impl RowTable {
             return Ok(Timestamps::uniform(self.count(samples)?, rate_hz));
         };
         let ticks = self.ticks(column)?;
-        let lists = |file: &LogFile| file.is_listed(&samples.leaf) && !file.is_listed(column);
         let is_every_row = self.holds_all(samples);
-        if is_every_row && self.files.iter().any(lists) {
-            return self.burst_stamps(samples, column, ticks);
-        }
         if !ticks.is_whole && !self.is_listed(column) && !self.is_listed(&samples.leaf) {
             let own = SampleSelector { leaf: column.to_owned(), rows: samples.rows.clone() };
             let mut reader = TimestampParser::new(column, ticks, 0);
@@ -296,34 +292,11 @@ impl RowTable {
         let room = if is_every_row { self.rows() } else { 0 };
         let mut reader = TimestampParser::new(column, ticks, room);
         self.each(samples, column, |array| reader.append(array))?;
-        Ok(reader.stamps())
-    }
-
-    /// Rows that each hold a burst of samples from their stamp on: a burst's samples are spread evenly to
-    /// the next one, the last as the one before it.
-    fn burst_stamps(
-        &self,
-        samples: &SampleSelector,
-        column: &str,
-        ticks: TickFormat,
-    ) -> Result<Timestamps, Error> {
-        let (mut reader, mut bursts) = (TimestampParser::new(column, ticks, self.rows()), Vec::new());
-        for file in &self.files {
-            file.scan_flat(&[column, &samples.leaf], Scan::PLAIN, |_, flats| {
-                reader.append(&flats[0].values)?;
-                bursts.extend(flats[1].lengths.clone().unwrap_or_default());
-                Ok(())
-            })?;
+        let mut stamps = reader.stamps();
+        if self.is_listed(&samples.leaf) && !self.is_listed(column) {
+            spread_bursts(&mut stamps.seconds, self.clock.rate_hz);
         }
-        let starts = reader.stamps();
-        let (mut seconds, mut span_s) = (Vec::with_capacity(bursts.iter().sum()), f64::NAN);
-        for (row, &samples) in bursts.iter().enumerate() {
-            let start = starts.seconds[row];
-            span_s = starts.seconds.get(row + 1).map_or(span_s, |next| next - start);
-            let step_s = self.clock.rate_hz.map_or(span_s / samples.max(1) as f64, f64::recip);
-            seconds.extend((0..samples).map(|k| start + step_s * k as f64));
-        }
-        Ok(Timestamps { seconds, ..starts })
+        Ok(stamps)
     }
 
     /// How many samples those are.
@@ -375,4 +348,18 @@ impl RowTable {
 fn is_uniform(array: &ArrayRef) -> bool {
     let first = Scalar::new(array.slice(0, array.len().min(1)));
     !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
+}
+
+/// Spreads samples that have the stamp of the row whose list holds them: evenly up to the next stamp, those of the last row as
+/// those of the one before.
+fn spread_bursts(seconds: &mut [f64], rate_hz: Option<f64>) {
+    let stamps: Vec<(f64, usize)> =
+        seconds.chunk_by(|a, b| a == b).map(|burst| (burst[0], burst.len())).collect();
+    let (mut at, mut span_s) = (0, f64::NAN);
+    for (burst, &(start, samples)) in stamps.iter().enumerate() {
+        span_s = stamps.get(burst + 1).map_or(span_s, |(next, _)| next - start);
+        let step_s = rate_hz.map_or(span_s / samples as f64, f64::recip);
+        (0..samples).for_each(|k| seconds[at + k] = start + step_s * k as f64);
+        at += samples;
+    }
 }

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use arrow::array::{
     ArrayRef, Float64Array, Int16Array, Int32Array, ListArray, RecordBatch, StringArray,
-    Time32MillisecondArray, TimestampMillisecondArray,
+    Time32MillisecondArray, TimestampMillisecondArray, UInt32Array,
 };
+use arrow::compute::take;
 use arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::units::{TimeUnit, Unit};
@@ -449,6 +450,19 @@ fn lists_of_different_rates_lie_between_the_stamps_of_their_rows() {
     let held = |k: usize| 100.0 * 0.02 * (k / 2) as f64;
     let worst = (0..500).map(|k| (a.load_n[k] - held(k)).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst} N");
+    // Every second row is of another actuator.
+    let turns = UInt32Array::from_iter_values((0..100).map(|row| row / 2));
+    let twice = |(name, array): &(&'static str, ArrayRef)| (*name, take(array, &turns, None).unwrap());
+    let places: StringArray = (0..100).map(|row| Some(["left", "right"][row % 2])).collect();
+    let by_row: Vec<_> = columns.iter().map(twice).chain([("at", Arc::new(places) as ArrayRef)]).collect();
+    let mut own = plain();
+    own.layout.position_column = Some("at".into());
+    let (_dir, file) = written(&by_row);
+    let log = opened(&file, &own);
+    for at in log.actuators(&own.channels, None).unwrap() {
+        let b = log.read_actuator(&at, &own.channels, LINEAR).unwrap();
+        assert_eq!((b.dx_m, b.load_n, b.repairs.repeated), (a.dx_m.clone(), a.load_n.clone(), 0));
+    }
     (m.clock.column, m.clock.rate_hz) = (None, Some(100.0));
     let refused = refusal(&m, &columns);
     assert_eq!((refused.code.as_str(), refused.column.as_deref()), ("list_lengths", Some("f")));
