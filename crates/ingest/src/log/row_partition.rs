@@ -291,7 +291,7 @@ mod tests {
     /// Rows of parameters p0 to p9 in turn, or one parameter after the other, whose values are their row numbers. Some names
     /// are padded, as a database does.
     fn file(folder: &std::path::Path, is_sorted: bool) -> LogFile {
-        let pad = |row: u32| if row % 7 == 0 { "  " } else { "" };
+        let pad = |row: u32| if row.is_multiple_of(7) { "  " } else { "" };
         let name = |row: u32| format!("p{}{}", if is_sorted { row / 100 } else { row % 10 }, pad(row));
         let names: StringArray = (0..1000).map(|row| Some(name(row))).collect();
         let values: Float64Array = (0..1000).map(f64::from).collect();

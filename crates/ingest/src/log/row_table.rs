@@ -354,7 +354,7 @@ fn is_uniform(array: &ArrayRef) -> bool {
 /// those of the one before.
 fn spread_bursts(seconds: &mut [f64], rate_hz: Option<f64>) {
     let stamps: Vec<(f64, usize)> =
-        seconds.chunk_by(|a, b| a == b).map(|burst| (burst[0], burst.len())).collect();
+        seconds.chunk_by(|a, b| a.to_bits() == b.to_bits()).map(|burst| (burst[0], burst.len())).collect();
     let (mut at, mut span_s) = (0, f64::NAN);
     for (burst, &(start, samples)) in stamps.iter().enumerate() {
         span_s = stamps.get(burst + 1).map_or(span_s, |(next, _)| next - start);
