@@ -6,7 +6,7 @@
 //! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
 //! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
 //! `edit: ["FILE", "FROM", "TO"]` replaces text before its block, and `log: {…}` writes logs again before `first:`, with the
-//! keys of [`LogRewrite`]. `records` prints every stored record without what names the log, the settings and the run.
+//! keys of [`LogRewrite`]. `needs: PROGRAM` leaves a block out on a machine without that program. `records` prints every stored record without what names the log, the settings and the run.
 //! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except
 //! where lines are omitted.
 
@@ -16,6 +16,7 @@ use std::process::{Command, Stdio};
 
 use regex::Regex;
 
+use crate::gate::is_gate;
 use crate::harness::{LogRewrite, TestFleet, spread, top};
 use crate::markdown::{Block, Page, all};
 
@@ -108,6 +109,13 @@ fn runs(block: &Block) -> bool {
     block.language == "console" || (block.language == "sh" && block.text.lines().any(ours))
 }
 
+/// Whether a program is installed; the gate installs all of them.
+fn is_there(program: &str) -> bool {
+    let found = Command::new(program).arg("--version").output().is_ok();
+    assert!(found || !is_gate(), "{program} is not installed");
+    found
+}
+
 /// One command, the place of its output in the page, and its expected exit code.
 struct Step {
     script: String,
@@ -140,6 +148,10 @@ impl<'p> Try<'p> {
 
     /// Runs a block, or compares it with the output of the block before.
     fn block(&mut self, block: &Block, output: &mut String) {
+        let mut needed = block.marks.iter().filter_map(|mark| mark.strip_prefix("needs: "));
+        if !needed.all(is_there) {
+            return;
+        }
         for change in block.marks.iter().filter_map(|mark| mark.strip_prefix("edit: ")) {
             let [file, from, to]: [String; 3] = serde_json::from_str(change).unwrap();
             self.fleet.edit(&file, |text| text.replacen(&from, &to, 1));
