@@ -182,7 +182,7 @@ pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
     to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
 }
 
-/// Columns of a batch in the order of their names; `texts` are columns that it does not have.
+/// The columns `names`, in that order, of the batch or of `texts`, which are additional columns.
 pub(crate) fn columns(
     batch: &RecordBatch,
     names: &[&str],

@@ -56,7 +56,7 @@ impl Display for Error {
 
 impl std::error::Error for Error {}
 
-/// A cause of an [`Error`], where the file is not known. Rows count from 0.
+/// An [`Error`] before its file is known. Rows of a log count from 0, rows of a table from 1.
 #[derive(Debug)]
 pub(crate) struct Fault(pub(crate) Box<Diagnostic>);
 
@@ -131,7 +131,7 @@ impl From<Excess> for Fault {
     }
 }
 
-/// What a parser of Parquet says of a file, or the failed read that it says it of.
+/// A file that the Parquet parser refuses; a failed read, if the parser's message contains one.
 pub(crate) fn not_parquet(detail: impl Into<String>) -> Fault {
     let detail = detail.into();
     let hint = "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`";
@@ -141,7 +141,7 @@ pub(crate) fn not_parquet(detail: impl Into<String>) -> Fault {
 
 const CORRUPT: &str = "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`";
 
-/// A column chunk that cannot be decoded, or the failed read because of which it cannot.
+/// A column chunk that cannot be decoded; a failed read, if `detail` contains one.
 pub(crate) fn decode_failed(column: &str, row_group: usize, detail: &str) -> Fault {
     if let Some(failed_read) = object_io::system_error(detail) {
         return failed_read.into();

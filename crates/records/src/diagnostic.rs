@@ -1,6 +1,6 @@
 //! Structured error for users: code, message, location, found and expected value, and a hint.
 //!
-//! Every crate has its own error enum. [`Diagnostic`] is the one form in which an error reaches the terminal,
+//! Every crate has its own error type. [`Diagnostic`] is the one form in which an error reaches the terminal,
 //! the run summary and a script, so that all three report the same.
 
 use std::borrow::Cow;

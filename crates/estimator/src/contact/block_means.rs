@@ -337,7 +337,7 @@ fn longest_step(values: &[f64], segments: &[Range<usize>]) -> Result<f64, Reject
     };
     let stride = (segments.iter().map(Range::len).sum::<usize>() / LOOKS).max(1);
     let looked_at = steps(stride);
-    // A channel that holds its values may step only between the pairs that are looked at.
+    // A channel that holds its values may step only in the pairs that the subsample skips.
     let mut steps = if looked_at.is_empty() { steps(1) } else { looked_at };
     if steps.is_empty() {
         return Err(Rejection::ChannelConstant);

@@ -350,8 +350,8 @@ fn is_uniform(array: &ArrayRef) -> bool {
     !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
 }
 
-/// Spreads samples that have the stamp of the row whose list holds them: evenly up to the next stamp, those of the last row as
-/// those of the one before.
+/// Spreads the samples of each row's list evenly from the row's stamp to the next row's; the last list takes the interval
+/// before.
 fn spread_bursts(seconds: &mut [f64], rate_hz: Option<f64>) {
     let stamps: Vec<(f64, usize)> =
         seconds.chunk_by(|a, b| a.to_bits() == b.to_bits()).map(|burst| (burst[0], burst.len())).collect();

@@ -124,8 +124,9 @@ pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<
         lengths.iter().enumerate().flat_map(|(row, &n)| std::iter::repeat_n(row as u64, n)).collect();
     let spread = |(name, flat): (&&str, FlatLeaf)| match flat.lengths {
         Some(_) => Ok(flat.values),
-        None => take(&flat.values, &rows, None)
-            .map_err(|_| wrong_type(name, &flat.values, "no plain values next to lists")),
+        None => take(&flat.values, &rows, None).map_err(|_| {
+            wrong_type(name, &flat.values, "a type that can be repeated for each item of a list")
+        }),
     };
     names.iter().zip(flats).map(spread).collect()
 }

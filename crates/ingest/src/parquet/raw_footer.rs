@@ -115,7 +115,7 @@ struct Walk<'b> {
 impl<'b> Walk<'b> {
     fn new(footer: &'b [u8]) -> Self {
         let bytes = footer.len();
-        // The protocol counts eight bytes for each element of a list, two for each struct, and those of texts.
+        // Budget of the protocol: it charges eight bytes per list element, two per struct, and the length of texts.
         let footer = TCompactInputProtocol::new(footer, 16 * bytes);
         Self { footer, bytes, path: Vec::new(), children: 0, open: Vec::new(), claims: Claims::default() }
     }

@@ -196,7 +196,7 @@ pub struct TableSplits {
     parquet: Option<ParquetTable>,
 }
 
-/// A Parquet file, its columns by the types in which they are read, and those that are.
+/// A Parquet file, the types in which its columns are read, and the mask of the columns that are read.
 struct ParquetTable {
     file: Arc<File>,
     metadata: Arc<ParquetMetaData>,
@@ -336,7 +336,7 @@ fn csv(file: &Path) -> Result<Rows, Fault> {
 /// The first line that is a comment by its `#`, and a row by its number of fields; the header comes before it.
 fn commented_row(text: &[u8], fields: usize) -> Option<usize> {
     let lines = text.split(|byte| *byte == b'\n').zip(1..);
-    let mut rows = lines.skip_while(|(line, _)| line.is_empty() || line.starts_with(b"#"));
+    let mut rows = lines.skip_while(|(line, _)| line.trim_ascii().is_empty() || line.starts_with(b"#"));
     let is_row = |line: &[u8]| line.starts_with(b"#") && line.split(|byte| *byte == b',').count() == fields;
     rows.find(|(line, _)| fields > 1 && is_row(line)).map(|(_, line)| line)
 }

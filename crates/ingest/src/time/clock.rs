@@ -2,9 +2,9 @@
 //!
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
 //! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
-//! are left out, or spread evenly if `tick_s` is given, as are rows whose stamps jitter by a large part of the step. After
-//! a step of more than one and a half times the usual one, the filter starts again, unless single rows are lost so often
-//! that no stretch would last, up to a quarter of them: those count as missing samples.
+//! are left out. They are spread evenly if `tick_s` is given or if the stamps jitter by a large part of the step. After a
+//! step of more than one and a half times the usual one, the filter starts again. Where up to five rows at a time are lost
+//! often (after over 1 % of the rows, a quarter of all at most), they count as missing samples.
 //! Rows that are in order stay as they are.
 
 use std::ops::Range;
@@ -23,7 +23,7 @@ pub(crate) const BREAK_STEPS: f64 = 1.5;
 /// Most rows lost in a row that count as missing samples, and the share of the rows with a break before them from which they do.
 const MOST_LOST: f64 = 5.0;
 const OFTEN_LOST: f64 = 0.01;
-/// Stamps jitter if at least this share of the steps is no whole multiple of the usual one, within this share of it.
+/// Stamps jitter if over `JITTERED` of the steps are off a multiple of the usual step by over `JITTER_STEPS` of it.
 const JITTERED: f64 = 0.25;
 const JITTER_STEPS: f64 = 0.2;
 /// Fewer rows do not show jitter.
@@ -48,7 +48,7 @@ const UNORDERED_SHARE: f64 = 1.0 / 3.0;
 /// The longest pause within one flight by default, s: recorders pause for minutes, and a turnaround lasts longer.
 const MAX_GAP_S: f64 = 3600.0;
 
-/// The shortest recording on both sides of a pause that two flights have, s: wrong stamps before a clock is set are none.
+/// A pause divides two flights only if each side is at least this long, s: wrong stamps before a clock is set are shorter.
 const SHORTEST_FLIGHT_S: f64 = 30.0;
 
 /// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
@@ -132,12 +132,12 @@ impl TimeBase {
     }
 }
 
-/// Origin of a clock: the meaning of its first timestamp.
+/// Origin of a clock: the meaning of its first timestamp, or of the number 0 in its column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TimeOrigin {
     /// Where the log begins: rows without stamps.
     Start,
-    /// Seconds on a zero of the clock's own, which all clocks of a log share.
+    /// Seconds from an unknown zero that all clocks of a log share.
     Counted(f64),
     /// Seconds since midnight.
     OfDay(f64),
@@ -255,29 +255,45 @@ pub(crate) fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> 
     let segments = split_at(count, &breaks);
     let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
     debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
-    let lost = |row: usize| {
-        let steps = step(row) / step_s;
+    let broken = |&row: &usize| Break { row, steps: step(row) / step_s, after_s: at(row) - at(0) };
+    let breaks: Vec<Break> = breaks.iter().map(broken).collect();
+    Ok(with_lost_rows(
+        TimeBase { step_s, rows: t.len(), kept, segments, breaks: Vec::new(), repairs },
+        &breaks,
+    ))
+}
+
+/// A step that is too long: the row after it, its length in usual steps, and the time since the first row, s.
+struct Break {
+    row: usize,
+    steps: f64,
+    after_s: f64,
+}
+
+/// The same with its breaks; where rows are often lost, the lost rows are missing samples instead.
+fn with_lost_rows(base: TimeBase, breaks: &[Break]) -> TimeBase {
+    let lost = |Break { steps, .. }: &Break| {
         let lost = steps.round() - 1.0;
         ((1.0..=MOST_LOST).contains(&lost) && (steps - lost - 1.0).abs() < 0.3).then_some(lost as usize)
     };
+    let count = base.segments.last().map_or(0, |last| last.end);
     let is_often = breaks.len() as f64 > OFTEN_LOST * count as f64;
-    let all_lost: usize = breaks.iter().filter_map(|row| lost(*row)).sum();
+    let all_lost: usize = breaks.iter().filter_map(lost).sum();
     if !is_often || all_lost == 0 || all_lost > count / 3 {
-        let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
-        return Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs });
+        return TimeBase { breaks: breaks.iter().map(|found| (found.row, found.after_s)).collect(), ..base };
     }
     let (mut filled, mut left) = (Vec::new(), Vec::new());
-    for segment in segments {
-        match lost(segment.start.max(1)).filter(|_| segment.start > 0) {
-            Some(lost) => filled.extend(std::iter::repeat_n(LOST, lost)),
-            None if segment.start > 0 => left.push((filled.len(), at(segment.start) - at(0))),
-            None => {}
+    for (k, segment) in base.segments.into_iter().enumerate() {
+        if let Some(before) = k.checked_sub(1).map(|k| &breaks[k]) {
+            match lost(before) {
+                Some(lost) => filled.extend(std::iter::repeat_n(LOST, lost)),
+                None => left.push((filled.len(), before.after_s)),
+            }
         }
-        filled.extend(segment.map(|row| kept.as_ref().map_or(row as u32, |kept| kept[row])));
+        filled.extend(segment.map(|row| base.kept.as_ref().map_or(row as u32, |kept| kept[row])));
     }
     let rows: Vec<usize> = left.iter().map(|(row, _)| *row).collect();
-    let segments = split_at(filled.len(), &rows);
-    Ok(TimeBase { step_s, rows: t.len(), segments, breaks: left, kept: Some(filled), repairs })
+    TimeBase { segments: split_at(filled.len(), &rows), breaks: left, kept: Some(filled), ..base }
 }
 
 /// Whether rows were written backwards or in no order, so that sorting them loses nothing. Two recordings whose rows
@@ -335,7 +351,7 @@ fn fill_missing(seconds: &mut [f64], rate_hz: f64) -> usize {
     filled
 }
 
-/// Cuts the rows where the clock falls too deep, or refuses to.
+/// Splits the rows where the clock falls back by more than `max_back_s`; an error unless `split`.
 fn split_at_resets(seconds: &[f64], max_back_s: f64, split: bool) -> Result<Vec<Range<usize>>, Fault> {
     let (mut newest, mut deep, mut cuts) = (f64::NEG_INFINITY, None, Vec::new());
     for (row, &s) in seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
@@ -393,8 +409,8 @@ fn jittered_step(seconds: &[f64]) -> Option<f64> {
     is_jittered.then(|| whole().sum::<f64>() / whole().count() as f64)
 }
 
-/// Spreads rows evenly over coarse ticks. A row lies within the tick that stamps it; where the stamps
-/// leave the even rows behind by more than a tick and a break, time broke there.
+/// Spreads rows evenly over coarse ticks. A row lies within the tick that stamps it. Where a stamp differs from the even
+/// time by more than one tick and one break, the even time starts again at the stamp.
 fn spread_ticks(seconds: &mut [f64], step_s: f64, tick_s: f64) {
     let follow = (step_s / TICK_FOLLOW_S).min(1.0);
     let mut even = f64::NAN;
@@ -409,7 +425,7 @@ fn spread_ticks(seconds: &mut [f64], step_s: f64, tick_s: f64) {
     }
 }
 
-/// NaN compares false, so a row without a stamp makes the answer no.
+/// Whether the stamps rise strictly; false if a row has no stamp, as NaN compares false.
 fn strictly_rising(t: &[f64]) -> bool {
     t.first().is_some_and(|s| !s.is_nan()) && t.windows(2).all(|w| w[0] < w[1])
 }
@@ -427,7 +443,7 @@ fn sort_dedup(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
     rows
 }
 
-/// Steps one tick apart, when the tick is at least this share of the step.
+/// Ticks are coarse if steps differ by more than this share of the median step.
 const COARSE_TICK_SHARE: f64 = 0.02;
 
 /// The usual step: the lower median, which is an element of the steps, so that none is invented.
@@ -442,7 +458,7 @@ fn usual_step(mut steps: Vec<f64>) -> f64 {
     }
     let middle = (steps.len() - 1) / 2;
     let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let even = |s: &&f64| **s <= (BREAK_STEPS + SAME_S) * median;
+    let even = |s: &&f64| **s <= BREAK_STEPS * median + SAME_S;
     let (mut low, mut high) = (median, median);
     for &s in steps.iter().filter(even) {
         (low, high) = (low.min(s), high.max(s));

@@ -91,7 +91,7 @@ fn of_open(
         return closed(WorkEventKind::Removed, reason, removed);
     }
     if finding.is_none() && !tables.is_known(&name) {
-        let reason = "no installation and no record is this unit's any more".to_owned();
+        let reason = "the unit no longer has an installation or a record".to_owned();
         return closed(WorkEventKind::Removed, reason, now);
     }
     let known = TailPosition { tail_number: request.tail_number.clone(), position: request.position.clone() };

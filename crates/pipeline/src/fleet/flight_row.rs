@@ -92,7 +92,8 @@ impl FlightExtras {
         self.gap_se_m.is_sign_negative()
     }
 
-    /// The flight as the trend knows it, in an installation, with its number among those that depart with it. The standard error spans both estimators where they disagree.
+    /// The observation of a flight, with its installation and its number among the flights of its day. The standard error
+    /// spans both estimators where they disagree.
     pub(crate) fn observation(&self, flown: &FlightRow, installation: u32, flight: u32) -> Observation {
         Observation {
             departure_us: flown.departure_us,

@@ -198,7 +198,10 @@ pub fn plan(
     let contents: HashSet<&String> = here.iter().filter_map(|a| a.log_digest.as_ref()).collect();
     let lies_elsewhere =
         |a: &&LogRecord| a.log_digest.as_ref().is_some_and(|digest| contents.contains(digest));
-    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0 && !lies_elsewhere(a)).count();
+    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0 && !lies_elsewhere(a));
+    // A log that was moved before it was deleted is one.
+    let absent: HashSet<&str> = absent.map(|a| a.log_digest.as_deref().unwrap_or(&a.log_path)).collect();
+    let absent = absent.len();
     let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     // Names and digests of a hundred thousand logs are made only where they decide something.
     let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {

@@ -89,7 +89,7 @@ pub struct MaintenanceEvent {
 
 /// The flights of one serial number, by departure.
 ///
-/// Usage follows these rules, each of which uses earlier flights only, so that a series cut at a date is
+/// Usage follows these rules. The first four use earlier flights only, so that a series cut at a date is
 /// the series that was known on that date:
 ///
 /// 1. Between two flights of one installation that both state the tail's hours, usage is their
@@ -100,7 +100,7 @@ pub struct MaintenanceEvent {
 ///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
 /// 4. Two rows of one installation, departure and flight number are one flight: the row with a gap wins, then the larger
 ///    gap, then the smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is flagged.
-/// 5. Where no row has flown for longer than 0 hours, the hours are unknown.
+/// 5. If no row of the whole series states more than 0 flight hours, all flight hours are unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,

@@ -1,8 +1,9 @@
 //! The present pace of a unit: flight hours a day.
 //!
-//! It is that of its last ninety days of flights, with two exceptions. A pause that stands out (a heavy check, a part in
-//! store) is no flying time. And where the last weeks were all busier than every week before, by half, they alone count: the
-//! unit flies on a busier aircraft now, or its records have become complete.
+//! It is the mean of the last 91 days of flights, with two exceptions. A pause three times as long as any other (a heavy
+//! check, a part in store) counts only as long as the next longest. If each of the last one to four weeks has 1.5 times the
+//! hours of every week before, only these weeks count: the unit flies on a busier aircraft now, or its records have become
+//! complete.
 
 use crate::data::series::{DAY_US, Flight};
 use crate::statement::types::Utilization;

@@ -22,11 +22,11 @@ use crate::table::{self, count, unit_name};
 
 /// Findings of a kind that are printed.
 const MAX_SHOWN: usize = 5;
-/// The same of failed logs and of changes.
+/// Failed logs, recorder and quantity changes that are printed.
 const MAX_FAILURES: usize = 10;
-/// The same of changed units.
+/// Changed units that are printed.
 const MAX_CHANGED: usize = 20;
-/// Where the others are.
+/// Command that prints all findings.
 const IN_JSON: &str = "`freeplay run --json`";
 
 /// Labelled lines.

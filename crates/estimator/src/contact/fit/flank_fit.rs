@@ -2,7 +2,7 @@
 //!
 //! The gap is the distance of the two flanks, extrapolated along their stiff part to zero load. Flanks that are soft at
 //! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. The gap lies between those of a
-//! fit of all loads and of one of higher loads. Where they differ by less than the jackknife error of their difference,
+//! fit of all loads and of one of higher loads. Where they differ by less than √2 jackknife errors of their difference,
 //! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads.
 
 use std::ops::Range;

@@ -154,19 +154,21 @@ pub(crate) fn departures_in_another_zone<'a>(
     })
 }
 
-/// Logs of which the flights table has no row, where they are most of its aircraft's logs in its time.
+/// A note on logs without a row in the flights table, if these are over half of the logs in the table's period.
 pub(crate) fn logs_without_row<'a>(
     config: &Config,
     accounts: impl Iterator<Item = &'a LogRecord>,
 ) -> Option<String> {
     const MIN_LOGS: usize = 3;
+    let mut departures = BTreeMap::<String, Vec<Timestamp>>::new();
     let has_row = |account: &LogRecord| {
         let (tail, id, at) =
             (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
-        let of_tail = || config.flights.of_tail(tail.as_str());
-        let (first, last) = (of_tail().next()?.departure_utc, of_tail().last()?.departure_utc);
-        let is_row = of_tail().any(|flight| flight.departure_utc == at);
-        (first..=last).contains(&at).then(|| is_row || config.flights.of(tail, id, at).is_some())
+        let of_table = || config.flights.of_tail(tail).map(|flight| flight.departure_utc).collect();
+        let of_tail = departures.entry(tail.clone()).or_insert_with(of_table);
+        let is_in_period = (*of_tail.first()?..=*of_tail.last()?).contains(&at);
+        let is_row = of_tail.binary_search(&at).is_ok() || config.flights.of(tail, id, at).is_some();
+        is_in_period.then_some(is_row)
     };
     let found: Vec<bool> = accounts.filter_map(has_row).collect();
     let (all, without) = (found.len(), found.iter().filter(|has_row| !**has_row).count());

@@ -29,7 +29,7 @@ pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
     let dropped: Vec<usize> = order.chunk_by(is_of_one).flat_map(contradicting).collect();
     dropped.iter().for_each(|&row| rows[row].tail_hours_end = None);
     let mut still = 0;
-    // Installation and reading of the last meter that gained, and the hours stated since.
+    // Installation, the last reading at which its meter had gained, and the flight hours stated since.
     let mut gained: Option<(u32, f64, f64)> = None;
     for row in all {
         let row = &mut rows[row];
@@ -42,7 +42,7 @@ pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
             (gain_h < LEAST_GAIN * stated_h).then_some(stated_h - gain_h)
         };
         match before.and_then(lag_h) {
-            // A rounded reading lags by less; its flight has its own hours all the same.
+            // The reading is left out; a lag within the allowance is rounding and is not counted.
             Some(lag_h) => {
                 row.tail_hours_end = None;
                 still += usize::from(lag_h > ALLOWANCE_HOURS);

@@ -37,8 +37,7 @@ impl InspectionRow {
 
     /// When it was made.
     pub(crate) fn date(&self) -> DateAhead {
-        let part_number = self.part_number.clone().unwrap_or_else(|| "any part".to_owned());
-        DateAhead::new(part_number, self.serial_number.clone(), "date_utc", self.date_utc)
+        DateAhead::new(self.part_number.clone(), self.serial_number.clone(), "date_utc", self.date_utc)
     }
 
     /// Median of the last estimates before it, m, and their number.

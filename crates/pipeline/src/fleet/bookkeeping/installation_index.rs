@@ -51,7 +51,7 @@ impl<'a> InstallationIndex<'a> {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct DateAhead {
-    pub part_number: String,
+    pub part_number: Option<String>,
     pub serial_number: String,
     /// `installed_utc`, `removed_utc`, or the date of a maintenance or an inspection.
     pub column: &'static str,
@@ -62,7 +62,7 @@ pub struct DateAhead {
 
 impl DateAhead {
     pub(crate) fn new(
-        part_number: String,
+        part_number: Option<String>,
         serial_number: String,
         column: &'static str,
         date: Timestamp,
@@ -76,6 +76,7 @@ impl std::fmt::Display for DateAhead {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { part_number, serial_number, column, date, exchanged } = self;
         let day = |at: &Timestamp| at.strftime("%Y-%m-%d");
+        let part_number = part_number.as_deref().unwrap_or("any part");
         write!(f, "{part_number} / {serial_number}: `{column}` is {}, a date to come", day(date))?;
         match exchanged {
             Some(past) => write!(f, "; day and month may be exchanged ({})", day(past)),
@@ -92,7 +93,7 @@ pub fn dates_ahead(
 ) -> Vec<DateAhead> {
     let dates = |i: &Installation| {
         let columns = [("installed_utc", Some(i.installed_utc)), ("removed_utc", i.removed_utc)];
-        let (part, serial) = (i.part_number.to_string(), i.serial_number.to_string());
+        let (part, serial) = (Some(i.part_number.to_string()), i.serial_number.to_string());
         columns.map(|(column, date)| Some(DateAhead::new(part.clone(), serial.clone(), column, date?)))
     };
     let all = installations.iter().flat_map(dates).flatten().chain(others);

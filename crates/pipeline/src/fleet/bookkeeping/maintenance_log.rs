@@ -44,7 +44,7 @@ pub(crate) fn dates(log: &MaintenanceLog) -> impl Iterator<Item = DateAhead> {
     log.iter().flat_map(|((part, serial), events)| {
         events.iter().filter_map(|event| {
             let done = Timestamp::from_microsecond(event.utc_us).ok()?;
-            Some(DateAhead::new(part.clone(), serial.clone(), "utc", done))
+            Some(DateAhead::new(Some(part.clone()), serial.clone(), "utc", done))
         })
     })
 }

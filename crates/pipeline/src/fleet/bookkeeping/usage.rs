@@ -20,7 +20,7 @@ pub(crate) struct OperatorTables<'a> {
     flights: &'a Flights,
     installations: InstallationIndex<'a>,
     pub(crate) inspections: Vec<InspectionRow>,
-    /// Whether installations and inspections are those of the units: of external tables none apply.
+    /// Whether the installations and inspections tables apply; they do not to external estimates.
     is_booked: bool,
 }
 
