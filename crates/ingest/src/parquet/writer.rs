@@ -90,7 +90,12 @@ pub(crate) fn write_encoded(
     encoding: Encoding,
 ) -> Result<(), Error> {
     let bad = |e: ParquetError| match object_io::system_error(&e.to_string()) {
-        Some(source) => Fault::from(source).in_file(file),
+        Some(source) => Fault::new(
+            "cannot_write",
+            format!("the file cannot be written: {source}"),
+            "make room on the disk or check the permissions, or name another folder",
+        )
+        .in_file(file),
         None => bad_table(e).in_file(file),
     };
     let batch = batch(columns).map_err(|e| bad(e.into()))?;
