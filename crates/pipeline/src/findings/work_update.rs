@@ -10,10 +10,8 @@ use crate::findings::finding::Finding;
 use crate::findings::work_requests::{event_of, next_number, requests};
 use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
+use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day};
 use crate::fleet::histories::{TailPosition, UnitKey};
-
-/// Microseconds of a day.
-const DAY_US: i64 = 86_400_000_000;
 
 /// What the tables of the operator hold about units.
 pub struct Tables<'a> {
@@ -212,7 +210,7 @@ impl<'a> Tables<'a> {
     /// day.
     fn repair_after(&self, (part, serial): &UnitKey, after: Timestamp) -> Option<Timestamp> {
         let unit = (part.clone().unwrap_or_default(), serial.clone());
-        let whole_day = |us: i64| if us % DAY_US == 0 { us + DAY_US - 1 } else { us };
+        let whole_day = |us: i64| if is_day(us) { us + DAY_US - 1 } else { us };
         let repairs = self.maintenance.get(&unit)?.iter().filter(|event| event.renews);
         let mut ends = repairs.map(|event| whole_day(event.utc_us));
         let end = ends.find(|us| *us > after.as_microsecond() && *us - DAY_US < self.at.as_microsecond())?;

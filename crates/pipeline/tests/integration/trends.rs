@@ -193,10 +193,17 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
 fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     const UNITS: i32 = 14;
     const DAYS: i32 = 300;
-    let row = |unit: i32, at: i32| format!("T{unit:02},{unit}-{at},{},2.0\n", day(at));
-    let rows = (0..UNITS).flat_map(|unit| (0..DAYS + 50).map(move |at| row(unit, at)));
-    let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
-    let config_with = fleet::with_flights(config(), &rows.fold(head, |all, row| all + &row));
+    // The table from a day on, with a prefix of its names, and how many hours later flights with and without a log depart.
+    let table = |first: i32, prefix: &str, late_h: [i64; 2]| {
+        let row = |(unit, at): (i32, i32)| {
+            let departs = day(at) + SignedDuration::from_hours(late_h[usize::from(at % 2 == 0)]);
+            format!("T{unit:02},{prefix}{unit}-{at},{departs},2.0\n")
+        };
+        let flights = (0..UNITS).flat_map(|unit| (first..DAYS + 50).map(move |at| (unit, at)));
+        let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
+        fleet::with_flights(config(), &flights.map(row).fold(head, |all, row| all + &row))
+    };
+    let config_with = table(0, "", [0, 0]);
     let installed = |unit| Installation { unit_hours_at_install: Some(100.0), ..installation(unit, None) };
     let installations = Installations::new((0..UNITS).map(installed).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
@@ -217,6 +224,10 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         ratios += rate / truth;
         assert!(without.rate_m_per_hour.unwrap() > 1.5 * truth);
     }
+    // By other names, and in another time zone: each log is one of the flights all the same.
+    assert!(assess(&table(0, "TK", [3, 3])).iter().all(|row| row.flights == 300));
+    // A table of the last fifty days, with flights ten hours after a log: these are others.
+    assert!(assess(&table(250, "", [0, -14])).iter().all(|row| row.flights == 150 + 25));
     // Some of them lie high and some low, by what their scatter allows: 3 % of the mean of all.
     let mean = ratios / f64::from(UNITS);
     assert!((mean - 1.0).abs() < 0.06, "{mean} of the true rates");

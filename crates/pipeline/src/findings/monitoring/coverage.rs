@@ -154,14 +154,15 @@ pub(crate) fn departures_in_another_zone<'a>(
     })
 }
 
-/// A note on logs without a row in the flights table, if these are over half of the logs in the table's period.
+/// A note on logs without a row in the flights table, of aircraft for which these are over half of the logs in the table's
+/// period.
 pub(crate) fn logs_without_row<'a>(
     config: &Config,
     accounts: impl Iterator<Item = &'a LogRecord>,
 ) -> Option<String> {
     const MIN_LOGS: usize = 3;
     let mut departures = BTreeMap::<String, Vec<Timestamp>>::new();
-    let has_row = |account: &LogRecord| {
+    let mut has_row = |account: &LogRecord| {
         let (tail, id, at) =
             (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
         let of_table = || config.flights.of_tail(tail).map(|flight| flight.departure_utc).collect();
@@ -170,10 +171,16 @@ pub(crate) fn logs_without_row<'a>(
         let is_row = of_tail.binary_search(&at).is_ok() || config.flights.of(tail, id, at).is_some();
         is_in_period.then_some(is_row)
     };
-    let found: Vec<bool> = accounts.filter_map(has_row).collect();
-    let (all, without) = (found.len(), found.iter().filter(|has_row| !**has_row).count());
+    let mut by_tail = BTreeMap::<&str, (usize, usize)>::new();
+    for account in accounts {
+        let Some((tail, has_row)) = account.tail_number.as_deref().zip(has_row(account)) else { continue };
+        let (all, without) = by_tail.entry(tail).or_default();
+        (*all, *without) = (*all + 1, *without + usize::from(!has_row));
+    }
+    let lacking = by_tail.into_values().filter(|(all, without)| 2 * without > *all);
+    let (all, without) = lacking.fold((0, 0), |sum, of_tail| (sum.0 + of_tail.0, sum.1 + of_tail.1));
     let table = config.document.logs.flights.as_deref().unwrap_or_default();
-    (without >= MIN_LOGS && 2 * without > all).then(|| {
+    (without >= MIN_LOGS).then(|| {
         format!(
             "{table}: {without} of {all} logs have no row by flight number or departure; a row within 12 hours of such a log \
              counts as its flight; write flight numbers as the logs do, or departures in UTC"

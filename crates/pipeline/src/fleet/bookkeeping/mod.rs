@@ -6,5 +6,5 @@ pub(crate) mod inspections;
 pub mod installation_index;
 pub mod join;
 pub mod maintenance_log;
-mod unlogged_flights;
+pub(crate) mod unlogged_flights;
 pub(crate) mod usage;

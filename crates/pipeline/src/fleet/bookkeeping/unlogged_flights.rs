@@ -11,10 +11,10 @@ use crate::fleet::histories::History;
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
 /// Microseconds of a day.
-pub(super) const DAY_US: i64 = 86_400_000_000;
+pub(crate) const DAY_US: i64 = 86_400_000_000;
 
 /// Whether a time is that of a day alone.
-pub(super) fn is_day(utc_us: i64) -> bool {
+pub(crate) fn is_day(utc_us: i64) -> bool {
     utc_us % DAY_US == 0
 }
 
@@ -33,9 +33,13 @@ pub(crate) fn unlogged_flights<'a>(
         let tail = installation.tail_number.as_str();
         let flights = table.of_tail(tail).filter(|f| installation.covers(f.departure_utc));
         let (logged, mut missing): (Vec<_>, Vec<_>) = flights.partition(|flight| is_logged(flight, history));
+        let period = table.of_tail(tail).next().zip(table.of_tail(tail).last());
+        let is_in_period = |at: Timestamp| {
+            period.is_some_and(|(first, last)| (first.departure_utc..=last.departure_utc).contains(&at))
+        };
         let records = history.flights().iter().filter(|flown| {
-            let place = history.place(flown).tail_number.as_deref();
-            place == Some(tail) && installation.covers(flown.departure_utc())
+            let (place, at) = (history.place(flown).tail_number.as_deref(), flown.departure_utc());
+            place == Some(tail) && installation.covers(at) && is_in_period(at)
         });
         let records: Vec<Timestamp> = records.map(FlightRow::departure_utc).collect();
         // By other names, or in another time zone, a table would count most flights twice.
@@ -47,14 +51,14 @@ pub(crate) fn unlogged_flights<'a>(
     missing.collect()
 }
 
-/// Leaves out one flight within 12 hours of each record, as far as there is one.
+/// Leaves out one of the flights, which are by departure, within 12 hours of each record, as far as there is one.
 fn leave_out_nearest(flights: &mut Vec<&Flight>, records: Vec<Timestamp>) {
     for departure_utc in records {
-        let apart = |flight: &Flight| flight.departure_utc.duration_since(departure_utc).abs();
-        let near = flights.iter().enumerate().min_by_key(|(_, flight)| apart(flight));
-        if let Some(at) = near.filter(|(_, flight)| apart(flight) <= SAME_FLIGHT).map(|(at, _)| at) {
-            flights.remove(at);
-        }
+        let apart = |at: &usize| flights[*at].departure_utc.duration_since(departure_utc).abs();
+        let next = flights.partition_point(|flight| flight.departure_utc < departure_utc);
+        let near = next.saturating_sub(1)..flights.len().min(next + 1);
+        let nearest = near.min_by_key(apart).filter(|at| apart(at) <= SAME_FLIGHT);
+        nearest.map(|at| flights.remove(at));
     }
 }
 
