@@ -236,14 +236,9 @@ pub(crate) fn identity_invalid(fact: &str, found: &dyn Display, detail: &dyn Dis
 /// What is wrong with a table, or with a cell of it.
 #[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error")]
 pub(crate) fn bad_table(detail: impl ToString) -> Fault {
+    let hint =
+        "columns and formats: docs/configuration.md (tables of the fleet), docs/columns.md (estimates)";
     let detail = detail.to_string();
-    let hint = if detail.contains("is not a UTC date") {
-        "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z"
-    } else if detail.contains(',') && detail.ends_with("is not a number") {
-        "write decimals with a point, such as 1168.5"
-    } else {
-        "columns and formats are in docs/configuration.md"
-    };
     Fault::new("bad_table", format!("the table cannot be used: {detail}"), hint)
 }
 

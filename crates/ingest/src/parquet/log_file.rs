@@ -18,7 +18,6 @@ use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{self, Error, Fault, encrypted, not_parquet};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
-use crate::io::foreign_format;
 use crate::io::read_at;
 use crate::mapping::column_pattern::composed;
 use crate::mapping::field_metadata::FieldMetadata;
@@ -32,34 +31,6 @@ use crate::parquet::row_selection::{RowSelection, intersects};
 
 /// Rows decoded at a time: few enough for the cache, many enough that the cost of a batch is small.
 const BATCH_ROWS: usize = 8192;
-
-/// Why a footer could not be read, from the first bytes of the file where those identify another format.
-fn footer_error(source: &ByteSource, error: Fault) -> Fault {
-    if error.0.code != "not_parquet" {
-        return error;
-    }
-    let mut head = [0; foreign_format::HEAD_BYTES];
-    let fetched = source.want(once(0..head.len() as u64));
-    let length = match fetched.and_then(|()| Ok(read_at::read_at(&source.file, &mut head, 0)?)) {
-        Ok(length) => length,
-        Err(error) => return error,
-    };
-    match &head[..length] {
-        [b'P', b'A', b'R', b'E', ..] => encrypted(None),
-        [b'P', b'A', b'R', b'1', ..] => {
-            let detail = error.0.message.trim_start_matches("cannot read as Parquet: ");
-            not_parquet(format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: ")))
-        }
-        head => match foreign_format::of(head) {
-            Some(format) => Fault::new(
-                "not_parquet",
-                format!("this is {format}, not a Parquet file"),
-                "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`",
-            ),
-            None => not_parquet("not a Parquet file"),
-        },
-    }
-}
 
 /// An open Parquet file, of which only the footer has been read.
 #[derive(Debug)]
@@ -110,9 +81,8 @@ impl LogFile {
         if read_at::file_length(&source.file)? == 0 {
             return Err(empty());
         }
-        let read = raw_footer::read(&source.file, |range| source.want(once(range)));
         let Footer { metadata, start: footer_start, claims } =
-            read.map_err(|error| footer_error(&source, error))?;
+            raw_footer::read(&source.file, |range| source.want(once(range)))?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer = caught(|| ArrowReaderMetadata::try_new(metadata, options)).map_err(not_parquet)?;

@@ -11,8 +11,8 @@ use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use polars_parquet_format::thrift::protocol::{TCompactInputProtocol, TInputProtocol, TType};
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
-use crate::error::{Fault, not_parquet};
-use crate::io::read_at;
+use crate::error::{Fault, encrypted, not_parquet};
+use crate::io::{foreign_format, read_at};
 
 /// The highest encoding that is read: byte stream split.
 const HIGHEST_ENCODING: i64 = 9;
@@ -34,15 +34,16 @@ pub(crate) struct Footer {
 /// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
 /// `want` fetches bytes before they are read.
 pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Footer, Fault> {
-    let corrupt = || not_parquet("Invalid Parquet file. Corrupt footer");
     let length = read_at::file_length(file)?;
     want(length.saturating_sub(USUAL_FOOTER)..length)?;
-    let end = length.checked_sub(8).ok_or_else(corrupt)?;
+    let end = length.saturating_sub(8);
     let mut trailer = [0; 8];
-    read_at::read_exact(file, &mut trailer, end)?;
+    read_at::read_exact(file, &mut trailer[..length.min(8) as usize], end)?;
     let [a, b, c, d, magic @ ..] = trailer;
     let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
-    let start = end.checked_sub(bytes).filter(|_| magic == *b"PAR1").ok_or_else(corrupt)?;
+    let Some(start) = end.checked_sub(bytes).filter(|_| magic == *b"PAR1") else {
+        return Err(without_footer(file, want)?);
+    };
     bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
     want(start..length)?;
     let mut footer = vec![0; bytes as usize];
@@ -67,6 +68,25 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
     }
     let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&footer)).map_err(not_parquet)?;
     Ok(Footer { metadata: Arc::new(metadata), start, claims })
+}
+
+/// What a file is that does not end with a Parquet footer, by its first bytes.
+fn without_footer(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Fault, Fault> {
+    let mut head = [0; foreign_format::HEAD_BYTES];
+    want(0..head.len() as u64)?;
+    let length = read_at::read_at(file, &mut head, 0)?;
+    Ok(match &head[..length] {
+        [b'P', b'A', b'R', b'E', ..] => encrypted(None),
+        [b'P', b'A', b'R', b'1', ..] => not_parquet("the file is truncated: it does not end with a footer"),
+        head => match foreign_format::of(head) {
+            Some(format) => Fault::new(
+                "not_parquet",
+                format!("this is {format}, not a Parquet file"),
+                "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`",
+            ),
+            None => not_parquet("not a Parquet file"),
+        },
+    })
 }
 
 /// A result of the parquet crate, which panics on some damaged bytes.

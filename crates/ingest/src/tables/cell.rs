@@ -55,6 +55,9 @@ pub fn name<T: TryFrom<String, Error = records::ids::IdError>>(text: &str) -> Re
 pub fn number(text: &str) -> Result<f64, String> {
     match f64::from_str(text) {
         Ok(value) if value.is_finite() => Ok(value),
+        _ if text.contains(',') => {
+            Err(format!("`{text}` is not a number: write decimals with a point, such as 1168.5"))
+        }
         _ => Err(format!("`{text}` is not a number")),
     }
 }
