@@ -89,7 +89,9 @@ pub enum QualityFlag {
     LoadJumps,
     /// The 95 % load is under three times the friction.
     FrictionHeavy,
-    /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
+    /// A fit of higher loads alone reads a narrower gap: the load reads less at high load than it is.
+    LoadBends,
+    /// Flanks are soft at low load: a fit of higher loads alone reads a wider gap.
     SoftContact,
     /// The gap depends on the place of the stroke: `gap_m` is its mean over time.
     GapVaries,

@@ -1,7 +1,7 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
 use crate::contact::block_means::BlockMeans;
-use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::stats::{median, median_and_error};
@@ -13,16 +13,22 @@ const LEAST_SPEED_M_PER_S: f64 = 1e-3;
 /// the flanks times their stiffness.
 ///
 /// While both flanks press, the coupling is twice as stiff. So the flanks, extrapolated from higher loads to zero load,
-/// overlap; and lightly loaded contact lies outwards of both, so that the loop closes at zero load.
-pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
+/// overlap; and contact under loads below the preload lies outwards of both, so that the loop closes at zero load. A preload
+/// beyond the 95 % load would leave no flank to extrapolate; one of a few per cent may leave no rows below it.
+pub(crate) fn preload_n(contact: &FlankFit, scaling: &Scaling) -> Option<(f64, f64)> {
     let (gap_m, gap_se_m) = contact.gap_m;
     let overlap_m = -gap_m;
+    if overlap_m < (3.0 * gap_se_m).max(2e-6) {
+        return None;
+    }
     let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n;
-    let is_overlap = overlap_m > 3.0 * gap_se_m && overlap_m > 2e-6;
-    let light = is_overlap.then(|| contact.search.line.design.light.iter())?;
-    // A closed loop, of the lightly loaded rows that the straight fit never saw, overlaps by less than half of what the
-    // extrapolated flanks do.
-    let closes = travel_m(contact, 0.0, &light)?.0 > -0.5 * overlap_m;
+    let share = force_n(overlap_m) / scaling.load_n;
+    let rows = contact.search.line.design.light.iter().chain(&contact.search.line.design.firm);
+    let closes = match travel_m(contact, 0.0, &rows.filter(|row| row.x[FORCE].abs() < share)) {
+        // A closed loop overlaps by less than half of what the extrapolated flanks do.
+        Some((travel_m, _)) => share < 1.0 && travel_m > -0.5 * overlap_m,
+        None => share < FIRM_SHARE,
+    };
     closes.then(|| (force_n(overlap_m), force_n(gap_se_m)))
 }
 
@@ -36,17 +42,18 @@ pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
     let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
     let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
-    // The side that the load comes from, and the position on its branch.
+    // The side that the load comes from, and the position on its branch. Within a gap the load is noise about zero.
     let on_branch = |k: usize| {
-        let load_n = blocks.load_n[k] - contact.search.line.at.load_zero_n;
-        let turned_n = blocks.load_n[k + reach] - blocks.load_n[k - reach];
+        let [before_n, load_n, after_n] =
+            [k - reach, k, k + reach].map(|k| blocks.load_n[k] - contact.search.line.at.load_zero_n);
         let side = load_n.signum();
+        let turns = side * before_n > near_n && side * (after_n - before_n) < -turn_n;
         let is_pressed = || scaling.is_locked() || side * blocks.speed_m_per_s(k) < -LEAST_SPEED_M_PER_S;
-        let is_on_branch = load_n.abs() <= near_n && side * turned_n < -turn_n && is_pressed();
         let position_m = || {
             blocks.without_slow_parts_m(scaling, k, &contact.search.line.fit.beta)
                 - load_n * contact.compliance_m_per_n
         };
+        let is_on_branch = load_n.abs() <= near_n && turns && is_pressed();
         is_on_branch.then(position_m).filter(|m| m.is_finite()).map(|m| (side, m, blocks.stretch(k)))
     };
     let positions: Vec<_> = (reach..blocks.len().saturating_sub(reach)).filter_map(on_branch).collect();

@@ -138,7 +138,8 @@ fn look(
     let contact = flank_fit::fit(samples, workspace, &scaling)?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
-    let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
+    let is_possible =
+        gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact, &scaling).is_some();
     // A load that is later still moves the gap.
     let is_in_time = contact.search.line.state.load_delay_s.abs() < LATEST_S;
     // Channels of absurd size overflow the sums of the fit.
@@ -155,7 +156,7 @@ fn report(
     prior: &PartPrior,
     contact: &FlankFit,
 ) -> ContactEstimate {
-    let preload_n = lost_motion::preload_n(contact);
+    let preload_n = lost_motion::preload_n(contact, scaling);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
     let gap_se_m = contact.gap_m.1;
     let compliance = contact.compliance_m_per_n;

@@ -3,7 +3,9 @@
 //! The gap is the distance of the two flanks, extrapolated along their stiff part to zero load. Flanks that are soft at
 //! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. The gap lies between those of a
 //! fit of all loads and of one of higher loads. Where they differ by less than √2 jackknife errors of their difference,
-//! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads.
+//! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads. No
+//! contact is stiffer at low load: where higher loads read a narrower gap, the load reads less there than it is. The gap is
+//! then that of all loads, and the difference joins its error.
 
 use std::ops::Range;
 
@@ -34,6 +36,8 @@ const EXCERPT_BLOCKS: usize = 6000;
 const SHORT_BLOCKS: usize = 10 * EXCERPT_BLOCKS;
 /// Share of the 95 % load beyond which flanks are stiff.
 const STIFF_SHARE: f64 = 0.3;
+/// Rms of a position sensor's error along the stroke that no column describes, over the scatter about the fit.
+const OWN_ERROR: f64 = 2.0;
 /// Groups of rows that the jackknife leaves out in turn.
 const GROUPS: usize = 10;
 
@@ -53,8 +57,10 @@ pub(crate) struct FlankFit {
     pub(crate) compliance_m_per_n: f64,
     /// The gap along the stroke, where it varies.
     pub(crate) profile: Option<StrokeProfile>,
-    /// Whether higher loads alone read another gap, by more than 2.3 jackknife errors.
+    /// Whether higher loads alone read a wider gap, by more than 2.3 jackknife errors.
     pub(crate) is_soft: bool,
+    /// Whether they read a narrower one, by as much.
+    pub(crate) load_bends: bool,
     /// Travel that neither gap nor wind-up accounts for, m: a part of the error of the gap and of the loop.
     pub(crate) unexplained_m: f64,
     /// Whether a jump of the load cell's reading at zero load contributes most to the error of the gap.
@@ -95,6 +101,7 @@ pub(crate) fn fit(
         profile,
         compliance_m_per_n: search.line.fit.beta[FORCE] / scaling.load_n,
         is_soft: sigma > 2.3,
+        load_bends: sigma < -2.3,
         unexplained_m: 0.0,
         load_jumps: false,
         search,
@@ -212,7 +219,7 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
     })
 }
 
-/// The gap and its standard error, m, and by how many errors the fit of higher loads differs.
+/// The gap and its standard error, m, and by how many errors the fit of higher loads reads it wider.
 ///
 /// The error has three parts: the jackknife error; the spread of the candidates, which are those of the parameter search
 /// and both fits as far as their difference is significant and no softer flank than a load cell may show; and what no
@@ -245,7 +252,7 @@ fn gap_and_error_m(
         _ => (0.0, 0.0),
     };
     // 50 nm are never significant. Fits that differ by √2 errors count alike.
-    let sigma = difference_m.abs() / (error_m + 5e-8);
+    let sigma = difference_m / (error_m + 5e-8);
     let weight = sigma * sigma / (sigma * sigma + 2.0);
     let (windup_m, FrictionState { stiffness_n_per_m, friction, .. }) = (scaling.windup_m(), line.state);
     // The weights of the parts of the error, and the exponents of its growth, are fitted by maximum likelihood (Student's
@@ -267,13 +274,27 @@ fn gap_and_error_m(
     let floor_m = (4.5e-4 * windup_m).hypot(0.4 * vibration_m);
     let (gap_m, jackknife_m, candidates_m) = profile.map_or_else(
         || {
-            let candidates_m = (0.45 * search.spread_m).hypot(weight * difference_m * choice.hypot(bend));
-            (line.fit.beta[GAP] + weight * difference_m, jackknife_m, candidates_m)
+            let counted_m = weight * difference_m;
+            let doubt = choice.hypot(bend).max(if counted_m < 0.0 { 1.5 } else { 0.0 });
+            let gap_m = line.fit.beta[GAP] + counted_m.max(0.0);
+            (gap_m, jackknife_m, (0.45 * search.spread_m).hypot(doubt * counted_m))
         },
         // The profile explains what one gap for the whole stroke could not.
         |profile| (profile.mean_m.0, profile.mean_m.1, 0.0),
     );
-    ((gap_m, (0.8 * jackknife_m).hypot(candidates_m).hypot(floor_m) * growth), sigma)
+    // Where the load follows the place, as in calm air, a position sensor's error along the stroke looks like a gap. Where it
+    // does not, the jackknife shows it.
+    let tied = (2.0 * scaling.tied_share - 1.0).max(0.0);
+    let place_m = tied * OWN_ERROR * search.scale_m * line.fit.error_along(GAP, PLACE, rows);
+    // Rows that lie nearer to the other flank than to that of their load: the load is not the actuator's own there, and
+    // makes the gap too small (errors in variables).
+    let is_astray = |row: &&DesignRow<COLUMNS>| {
+        row.x[GAP].signum() * line.fit.residual_m(row) < -0.5 * line.fit.beta[GAP].abs()
+    };
+    let astray: f64 = rows.iter().filter(is_astray).map(|row| row.blocks).sum();
+    let attenuated_m = 2.0 * gap_m * astray / all;
+    let error_m = (0.8 * jackknife_m).hypot(candidates_m).hypot(floor_m) * growth;
+    ((gap_m, error_m.hypot(place_m).hypot(attenuated_m)), sigma)
 }
 
 /// Groups of about equally many rows, in order of time; no stretch is divided.

@@ -209,6 +209,28 @@ impl<const N: usize> RobustFit<N> {
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
 
+    /// By how much a coefficient moves for an unknown error of rms 1 m that depends on the place alone: on the column `by`,
+    /// from −1 to 1, in bins that err independently.
+    pub(crate) fn error_along(&self, column: usize, by: usize, rows: &[DesignRow<N>]) -> f64 {
+        const BINS: usize = 16;
+        let influence: [f64; N] = std::array::from_fn(|i| self.inverse[(column, i)]);
+        let mut moved = [0.0; BINS];
+        for (row, w) in rows.iter().zip(&self.weights) {
+            let bin = (0.5 * (row.x[by] + 1.0) * BINS as f64) as usize;
+            moved[bin.min(BINS - 1)] += w * dot(&influence, &row.x);
+        }
+        dot(&moved, &moved).sqrt()
+    }
+
+    /// The share of a column's variance that the other columns do not explain: one over its variance inflation factor.
+    pub(crate) fn own_share(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
+        let moment = |power: i32| -> f64 {
+            rows.iter().zip(&self.weights).map(|(row, w)| w * row.x[column].powi(power)).sum()
+        };
+        let variance = moment(2) - moment(1).powi(2) / moment(0);
+        (self.inverse[(column, column)] * variance).recip().min(1.0)
+    }
+
     /// Standard error of a weighted sum of coefficients, m: the sandwich estimate over stretches, and the share of
     /// uncertain priors; of one coefficient
     ///

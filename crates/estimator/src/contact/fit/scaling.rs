@@ -35,6 +35,8 @@ pub(crate) struct Scaling {
     pub(crate) time_s: (f64, f64),
     /// Middle and half length of the stroke seen, m.
     pub(crate) place_m: (f64, f64),
+    /// Share of the place's variance that load, speed and time explain: near one in calm air, where the load follows the place.
+    pub(crate) tied_share: f64,
     /// One over the load, over half of the stroke and over half of the time: a product takes a quarter of a division's time.
     pub(crate) per_load: f64,
     pub(crate) per_place: f64,
@@ -72,6 +74,7 @@ impl Scaling {
             stiffness_n_per_m: prior.stiffness_n_per_m,
             time_s,
             place_m,
+            tied_share: 0.0,
             per_load: load_n.recip(),
             // A locked screw shows nothing of its transducer.
             per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },

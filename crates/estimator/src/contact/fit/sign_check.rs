@@ -24,7 +24,7 @@ impl SignCheck {
     pub(crate) const NONE: Self = Self { follows_load: true, shows_gap: true };
 }
 
-/// Regresses δX on the load, the side it presses to, the sign of the speed, speed and place.
+/// Regresses δX on the load, the side it presses to, the sign of the speed, speed, place and time.
 ///
 /// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
 /// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case. Where the slope
@@ -41,13 +41,17 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     // Every fourth block is used, and fewer of long flights.
     let stride = (blocks.len() / LOOKS).max(4);
     let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, scaling, k)).collect();
-    let Some(found) = fit(&rows, &[GaussianPrior::NONE; 6], 4) else { return Ok(SignCheck::NONE) };
-    let [_, side_m, load_m, slip_m, speed_m, place_m] = found.beta;
+    let Some(found) = fit(&rows, &[GaussianPrior::NONE; 7], 4) else { return Ok(SignCheck::NONE) };
+    let [_, side_m, load_m, slip_m, speed_m, place_m, _] = found.beta;
     let [side_se_m, load_se_m, place_se_m] =
         [1, 2, 5].map(|column| found.standard_error_m(&[(column, 1.0)], &rows));
     // Two positions of one screw have a slope of one. A slope that differs by 1 % means another lead or unit; a difference
-    // of less than 60 µm at the ends of the travel may be the transducer's own error.
-    if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * scaling.place_m.1).max(60e-6) {
+    // of less than 60 µm at the ends of the travel may be the transducer's own error. Where the load follows the place, as
+    // in calm air, errors that the regression does not know move this slope by more, the less of the place is its own.
+    let own_share = found.own_share(5, &rows);
+    scaling.tied_share = 1.0 - own_share;
+    let own_error_m = 60e-6 / own_share.sqrt();
+    if place_m.abs() - SIGNIFICANT * place_se_m > (0.01 * scaling.place_m.1).max(own_error_m) {
         return Err(Rejection::PositionRatio);
     }
     let windup_m = side_m + load_m;
@@ -66,12 +70,13 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     Err(if slip_m + speed_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
 }
 
-fn row(blocks: &BlockMeans, scaling: &Scaling, k: usize) -> Option<DesignRow<6>> {
+fn row(blocks: &BlockMeans, scaling: &Scaling, k: usize) -> Option<DesignRow<7>> {
     let (load, speed) = (blocks.load_n[k] / scaling.load_n, blocks.speed_m_per_s(k));
     let place = (blocks.motor_m[k] - scaling.place_m.0) / scaling.place_m.1;
     // Slower than 1 mm/s the screw may stick.
     let slip = if speed.abs() > 1e-3 { speed.signum() } else { 0.0 };
-    let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];
+    let time = scaling.time_share(blocks.time_s[k]);
+    let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place, time];
     let row = DesignRow { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: blocks.stretch(k) };
     (row.y_m + speed + load + place).is_finite().then_some(row)
 }

@@ -14,7 +14,7 @@ use crate::contact::types::GapAtPlace;
 const KNOTS: usize = 9;
 /// Columns with a gap and an error at each knot.
 const ALL: usize = COLUMNS + 2 * KNOTS;
-/// Standard errors by which the largest gap must exceed the mean.
+/// Standard errors by which the largest gap must exceed the mean, and by which no gap is below zero.
 const CERTAIN: f64 = 4.0;
 /// Least share of the time near a knot that counts.
 const VISITED: f64 = 0.05;
@@ -74,9 +74,12 @@ pub(crate) fn stroke_profile(
         gap_m: value_m(&only(knot)),
         gap_se_m: error_m(1.0, &only(knot)),
     };
-    is_certain.then(|| StrokeProfile {
+    let places: Vec<GapAtPlace> = visited().map(place).collect();
+    // Where the load follows the place, each place shows one flank only: its gap is then an error of the fit.
+    let is_possible = places.iter().all(|at| at.gap_m > -CERTAIN * at.gap_se_m);
+    (is_certain && is_possible).then(|| StrokeProfile {
         mean_m: (mean_m, error_m(1.0, &shares)),
-        places: visited().map(place).collect(),
+        places,
         beyond_m: std::array::from_fn(|knot| value_m(&only(knot)) - line.fit.beta[GAP]),
     })
 }
