@@ -85,10 +85,12 @@ pub enum Error {
     UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
 }
 
-/// The validated installations table: rows by tail, position and date, found by bisection.
+/// The validated installations table: rows by tail, position and date, and their numbers by unit; found by bisection.
 #[derive(Debug, Clone, Default)]
 pub struct Installations {
     rows: Vec<Installation>,
+    /// Numbers of the rows by the serial number that the unit has today, the earliest installation first.
+    by_serial: Vec<usize>,
 }
 
 impl Installations {
@@ -126,7 +128,13 @@ impl Installations {
         }
         rows.sort_unstable_by(|a, b| place(a).cmp(&place(b)).then_with(|| period(a).cmp(&period(b))));
         follow_modifications(&mut rows);
-        Ok(Self { rows })
+        Ok(Self::indexed(rows))
+    }
+
+    fn indexed(rows: Vec<Installation>) -> Self {
+        let mut by_serial: Vec<usize> = (0..rows.len()).collect();
+        by_serial.sort_by_key(|&row| (rows[row].unit().1, rows[row].installed_utc));
+        Self { rows, by_serial }
     }
 
     /// The same with units under the part and serial numbers that they have today.
@@ -145,7 +153,7 @@ impl Installations {
                 row.today = Some((part, alias.serial_number.clone()));
             }
         }
-        self
+        Self::indexed(self.rows)
     }
 
     /// Two places that one unit has at once by the numbers of today, which aliases made of two units: what is wrong, in words.
@@ -177,6 +185,32 @@ impl Installations {
     ) -> Option<&Installation> {
         let rows = self.of_position(tail.as_str(), position.as_str());
         rows.iter().find(|installation| installation.covers(at))
+    }
+
+    /// Every installation of a unit, the earliest first; where the part number is not known, of all units with the serial
+    /// number.
+    pub fn of_unit<'s>(
+        &'s self,
+        (part, serial): &(Option<String>, String),
+    ) -> impl Iterator<Item = &'s Installation> {
+        let serial_of = |row: usize| self.rows[row].unit().1.as_str();
+        let first = self.by_serial.partition_point(|&row| serial_of(row) < serial.as_str());
+        let of_serial = self.by_serial[first..].iter().map(|&row| &self.rows[row]);
+        of_serial
+            .take_while(move |row| row.unit().1.as_str() == serial)
+            .filter(move |row| part.as_deref().is_none_or(|part| row.unit().0.as_str() == part))
+    }
+
+    /// The installation that a unit is in on a date.
+    pub fn installed(&self, unit: &(Option<String>, String), as_of: Timestamp) -> Option<&Installation> {
+        self.of_unit(unit).find(|installation| installation.covers(as_of))
+    }
+
+    /// The last installation of a unit that is in none on a date; nothing of a unit without installations before it.
+    pub fn removal(&self, unit: &(Option<String>, String), as_of: Timestamp) -> Option<&Installation> {
+        let before = || self.of_unit(unit).filter(|installation| installation.installed_utc <= as_of);
+        let is_open = |i: &Installation| i.removed_utc.is_none_or(|removed| removed > as_of);
+        if before().any(is_open) { None } else { before().max_by_key(|i| i.removed_utc) }
     }
 
     /// Every unit installed on that tail at that instant, by position.

@@ -8,14 +8,13 @@ use trend::State;
 
 use crate::findings::finding::Finding;
 use crate::findings::work_requests::{event_of, next_number, requests};
-use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
 use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day};
 use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// What the tables of the operator hold about units.
 pub struct Tables<'a> {
-    installations: InstallationIndex<'a>,
+    installations: &'a Installations,
     maintenance: &'a MaintenanceLog,
     /// The date that counts: today, or that of the newest flight where it is later.
     at: Timestamp,
@@ -187,7 +186,7 @@ fn rank(state: Option<&str>) -> State {
 impl<'a> Tables<'a> {
     /// The tables on a date.
     pub fn new(installations: &'a Installations, maintenance: &'a MaintenanceLog, at: Timestamp) -> Self {
-        Self { installations: InstallationIndex::new(installations), maintenance, at }
+        Self { installations, maintenance, at }
     }
 
     /// The last installation and the removal of a unit that is installed nowhere.
@@ -198,7 +197,7 @@ impl<'a> Tables<'a> {
 
     /// Whether a unit has ever been installed.
     fn is_known(&self, name: &UnitKey) -> bool {
-        !self.installations.of(name).is_empty()
+        self.installations.of_unit(name).next().is_some()
     }
 
     /// Where a unit is installed.

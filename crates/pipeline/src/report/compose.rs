@@ -15,7 +15,6 @@ use crate::assess::trends::{self, ReportAssessments, StoreAssessment, UnitSelect
 use crate::error::Error;
 use crate::findings::work_requests;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
-use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::flight_row::FlightRow as FlownRow;
 use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::report::flight_columns::{FlightExtras, StoreContents};
@@ -68,7 +67,7 @@ pub fn compose(
         before: &before,
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
-        installations: &InstallationIndex::new(installations),
+        installations,
         quantities: by_unit(&followed.rows, |row| row.unit()),
         values: &values,
     };
@@ -141,7 +140,7 @@ struct ReportComposer<'a> {
     before: &'a BTreeMap<i64, BTreeMap<Name, TrendRow>>,
     past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
-    installations: &'a InstallationIndex<'a>,
+    installations: &'a Installations,
     quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
     values: &'a FleetValues,
 }
@@ -155,7 +154,7 @@ impl ReportComposer<'_> {
         extras: Vec<FlightExtras>,
     ) -> UnitView {
         let name = row.unit();
-        let installations: Vec<Installation> = self.installations.of(&name).into_iter().cloned().collect();
+        let installations: Vec<Installation> = self.installations.of_unit(&name).cloned().collect();
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let before = self.before.get(&1).and_then(|units| units.get(&name));
         let checks = self.checks.iter().filter(|check| check.is_of(&name));

@@ -16,7 +16,7 @@ use crate::findings::monitoring::mapping_faults::MappingFault;
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::findings::monitoring::repeated_samples::RepeatedSamples;
 use crate::findings::summary::FollowUpSummary;
-use crate::fleet::bookkeeping::installation_index::DateAhead;
+use crate::fleet::bookkeeping::dates_ahead::DateAhead;
 use crate::fleet::bookkeeping::join::MovedFlights;
 use crate::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use crate::fleet::histories::UnitKey;

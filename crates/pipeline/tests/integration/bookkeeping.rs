@@ -6,7 +6,7 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::fleet::bookkeeping::installation_index::dates_ahead;
+use pipeline::fleet::bookkeeping::dates_ahead::dates_ahead;
 use pipeline::fleet::bookkeeping::join::Bookkeeping;
 use records::{
     Alias, GapEstimate, GapRecord, Installation, Installations, Position, RunRecord, SerialNumber, Status,

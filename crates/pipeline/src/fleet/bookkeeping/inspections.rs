@@ -8,7 +8,7 @@ use records::time::days_between;
 use records::{Installation, SerialNumber};
 
 use crate::error::Error;
-use crate::fleet::bookkeeping::installation_index::DateAhead;
+use crate::fleet::bookkeeping::dates_ahead::DateAhead;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::UnitKey;
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 use trend::MaintenanceEvent;
 
 use crate::error::Error;
-use crate::fleet::bookkeeping::installation_index::DateAhead;
+use crate::fleet::bookkeeping::dates_ahead::DateAhead;
 
 /// Entries by part and serial number.
 pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;

@@ -8,7 +8,6 @@ use trend::{Observation, Series, UsageSource};
 use crate::error::Error;
 use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
-use crate::fleet::bookkeeping::installation_index::InstallationIndex;
 use crate::fleet::bookkeeping::maintenance_log;
 use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day, unlogged_flights};
 use crate::fleet::flight_row::FlightRow;
@@ -18,7 +17,7 @@ use crate::fleet::histories::{History, UnitKey};
 pub(crate) struct OperatorTables<'a> {
     maintenance: maintenance_log::MaintenanceLog,
     flights: &'a Flights,
-    installations: InstallationIndex<'a>,
+    installations: &'a Installations,
     pub(crate) inspections: Vec<InspectionRow>,
     /// Whether the installations and inspections tables apply; they do not to external estimates.
     is_booked: bool,
@@ -33,15 +32,15 @@ impl<'a> OperatorTables<'a> {
         Ok(Self {
             maintenance: maintenance_log::read(config)?,
             flights: &config.flights,
-            installations: InstallationIndex::new(installations),
+            installations,
             inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
             is_booked,
         })
     }
 
     /// The installations that say where units are.
-    pub(crate) fn installations(&self) -> Option<&InstallationIndex<'a>> {
-        self.is_booked.then_some(&self.installations)
+    pub(crate) fn installations(&self) -> Option<&'a Installations> {
+        self.is_booked.then_some(self.installations)
     }
 
     /// Where the hours of a unit are known from.
@@ -58,14 +57,13 @@ impl<'a> OperatorTables<'a> {
 
     /// A unit's flights, added up.
     pub(crate) fn series(&self, name: &UnitKey, history: &History) -> Result<Series, Error> {
-        let installations = self.installations.of(name);
+        let installations: Vec<&Installation> = self.installations.of_unit(name).collect();
         let installed = if self.is_booked { &installations[..] } else { &[] };
-        let first = installations.iter().min_by_key(|installation| installation.installed_utc);
         let unlogged = unlogged_flights(self.flights, history, installed);
         let mut observations = observations(history, installed, &unlogged);
         let dropped = drop_contradicting(&mut observations);
         let mut series = Series::new(observations)?;
-        series.unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
+        series.unit_hours_at_start = installations.first().and_then(|first| first.unit_hours_at_install);
         series.source = self.source(history);
         series.faults.meter_readings = dropped;
         // None is recorded of a unit without a part number.

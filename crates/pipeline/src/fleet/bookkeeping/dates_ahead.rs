@@ -1,51 +1,10 @@
-//! The installations table, unit by unit.
-
-use std::collections::HashMap;
+//! Dates of the operator's tables that are still to come.
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use records::time::days_between;
 use records::{Installation, Installations};
 use serde::Serialize;
-
-use crate::fleet::histories::UnitKey;
-
-/// Installations by unit, earliest first.
-pub(crate) struct InstallationIndex<'a>(HashMap<&'a str, Vec<&'a Installation>>);
-
-impl<'a> InstallationIndex<'a> {
-    pub(crate) fn new(installations: &'a Installations) -> Self {
-        let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
-        for installation in installations.iter() {
-            by_serial.entry(installation.unit().1.as_str()).or_default().push(installation);
-        }
-        by_serial
-            .values_mut()
-            .for_each(|installations| installations.sort_by_key(|installation| installation.installed_utc));
-        Self(by_serial)
-    }
-
-    /// The last installation of a unit that is in none on a date; nothing of a unit without installations before it.
-    pub(crate) fn removal(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
-        let mut before = self.of(name);
-        before.retain(|installation| installation.installed_utc <= as_of);
-        let is_open = |i: &&Installation| i.removed_utc.is_none_or(|removed| removed > as_of);
-        if before.iter().any(is_open) { None } else { before.into_iter().max_by_key(|i| i.removed_utc) }
-    }
-
-    /// The installation that a unit is in on a date.
-    pub(crate) fn installed(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
-        self.of(name).into_iter().find(|installation| installation.covers(as_of))
-    }
-
-    /// A unit's installations; where its part number is unknown, by its serial number.
-    pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
-        let is_of = |installation: &&&Installation| {
-            part.as_deref().is_none_or(|part| installation.unit().0.as_str() == part)
-        };
-        self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
-    }
-}
 
 /// A date of the installations, maintenance or inspections table that is still to come.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
