@@ -153,8 +153,7 @@ pub(crate) fn check(
             None => {
                 let found = discover::discover(config)?;
                 let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
-                let logs = found.logs.into_iter().map(|(name, files)| (files, name)).take(limit);
-                (logs.collect(), faults)
+                (found.logs.into_iter().take(limit).collect(), faults)
             }
         };
         let (config, installations) = (Arc::new(config.clone()), Arc::new(installations.clone()));

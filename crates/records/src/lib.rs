@@ -18,7 +18,9 @@ pub mod time;
 pub mod uncertainty;
 
 pub use assessment::action::Action;
-pub use assessment::quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
+pub use assessment::quantity_row::{
+    ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep, significant,
+};
 pub use assessment::report_rows;
 pub use assessment::trend_row::{ChangePoint, TrendRow};
 pub use assessment::unit_state::UnitState;

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
 use crate::error::Error;
+use crate::logs::discover::NamedLog;
 use crate::run::event::Event;
 
 /// What became of the logs.
@@ -31,7 +32,7 @@ pub struct Normalized {
 pub fn normalize(
     config: &Config,
     installations: &Installations,
-    logs: &[(LogFiles, String)],
+    logs: &[NamedLog],
     folder: &Path,
     encoding: Encoding,
     jobs: Option<usize>,
@@ -40,7 +41,7 @@ pub fn normalize(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
     let request = Normalization { config, installations, folder, encoding, claims: Mutex::default() };
-    let one = |(files, log_path): &(LogFiles, String)| {
+    let one = |(log_path, files): &NamedLog| {
         let mut done = Normalized::default();
         let failed = catch_panic(log_path, || request.one(files, log_path, &mut done)).err();
         done.diagnostics.extend(failed);

@@ -33,8 +33,8 @@ pub struct DiscoveredLogs {
     pub(crate) seen: SeenObjects,
 }
 
-/// A log and its name in records.
-pub type NamedLog = (LogFiles, String);
+/// A log after its name in records.
+pub type NamedLog = (String, LogFiles);
 
 /// Every log that fits the patterns, by the shown name of its first file.
 ///
@@ -98,7 +98,7 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
 /// # Errors
 /// As [`discover`], where groups or pieces must be searched.
 pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<NamedLog>, Error> {
-    let named = |path: &PathBuf| Ok((log_containing(config, path)?, path.display().to_string()));
+    let named = |path: &PathBuf| Ok((path.display().to_string(), log_containing(config, path)?));
     flight_paths(config, paths).iter().map(named).collect()
 }
 
@@ -107,7 +107,7 @@ pub fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLo
     /// Of more logs the tails are not read: each takes a read of its footer.
     const IDENTIFIED: usize = 10_000;
     let all = logs.len();
-    let tail = |(files, name): &NamedLog| Some(identify(files, name, config).ok()?.0.tail_number);
+    let tail = |(name, files): &NamedLog| Some(identify(files, name, config).ok()?.0.tail_number);
     let tails: Vec<_> = logs.par_iter().map(|log| if all > IDENTIFIED { None } else { tail(log) }).collect();
     let is_even = |k: usize| (k + 1) * most / all > k * most / all;
     let mut seen: BTreeSet<_> = (0..all).filter(|k| is_even(*k)).filter_map(|k| tails[k].clone()).collect();

@@ -78,6 +78,12 @@ impl Quantity {
     }
 }
 
+/// A number with three significant digits.
+pub fn significant(value: f64) -> String {
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    format!("{value:.*}", (2 - magnitude).clamp(0, 4) as usize)
+}
+
 /// Whose a change is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]

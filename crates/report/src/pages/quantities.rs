@@ -1,7 +1,7 @@
 //! Followed quantities on the pages of unit, tail and fleet: small charts, levels, and what changed.
 
 use jiff::Timestamp;
-use records::{Quantity, QuantityChange};
+use records::{Quantity, QuantityChange, significant};
 
 use crate::charts::quantities::small_chart;
 use crate::format::NO_DATA;
@@ -83,12 +83,6 @@ fn level(view: &QuantityView) -> Option<Level> {
         limit: shown(row.change_limit),
         state: row.state.unwrap_or_default().replace('_', " "),
     })
-}
-
-/// A number with three significant digits.
-fn significant(value: f64) -> String {
-    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
-    format!("{value:.*}", (2 - magnitude).clamp(0, 4) as usize)
 }
 
 /// What changed on some of the fleet's units, tails and parts.

@@ -74,7 +74,7 @@ fn logs(
         output.note(&format!("{stray}: no matching main log for this flight; not used"));
     }
     let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
-    let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).collect();
+    let mut logs: Vec<_> = found.logs.into_iter().collect();
     if logs.len() > args.limit {
         let all = logs.len();
         logs = discover::sampled(config, logs, args.limit.max(1));

@@ -1,6 +1,5 @@
 //! `normalize`: writes the normalized log of each actuator.
 
-use ingest::LogFiles;
 use pipeline::logs::discover;
 
 use crate::args::{Global, NormalizeArgs};
@@ -19,8 +18,8 @@ use crate::commands::context::{display_path, load_with_installations};
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     row_output::check_folder(&args.output)?;
     let (config, installations) = load_with_installations(global)?;
-    let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {
-        discover::discover(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
+    let logs = if args.logs.is_empty() {
+        discover::discover(&config)?.logs.into_iter().collect()
     } else {
         discover::named_logs(&config, &args.logs)?
     };

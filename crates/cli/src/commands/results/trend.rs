@@ -11,7 +11,7 @@ use pipeline::State;
 use pipeline::assess::trends::{self, StoreAssessment, UnitSelection};
 use pipeline::fleet::external_estimates;
 use records::uncertainty::NORMAL_95;
-use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
+use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow, significant};
 
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
@@ -86,7 +86,9 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
     let quantity = |row: &QuantityRow| Quantity::from_name(row.quantity);
     let unit = |row: &QuantityRow| quantity(row).map_or(("", 1.0), Quantity::display_unit);
     let value = |row: &QuantityRow, value: Option<f64>, sign: bool| {
-        value.map_or_else(table::empty_cell, |value| significant(value * unit(row).1, sign))
+        let value = value.map(|value| value * unit(row).1);
+        let plus = if sign && value.is_some_and(|value| value > 0.0) { "+" } else { "" };
+        value.map_or_else(table::empty_cell, |value| format!("{plus}{}", significant(value)))
     };
     let columns: &table::Columns<'_, QuantityRow> = &[
         (text("part / serial", 0), &|r| unit_name(r.part_number.as_deref(), &r.serial_number)),
@@ -102,13 +104,6 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
         (text("state", 0), &|r| r.state.unwrap_or_default().replace('_', " ")),
     ];
     table::of(rows, columns)
-}
-
-/// A number with three significant digits.
-fn significant(value: f64, sign: bool) -> String {
-    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
-    let places = (2 - magnitude).clamp(0, 4) as usize;
-    if sign && value != 0.0 { format!("{value:+.places$}") } else { format!("{value:.places$}") }
 }
 
 fn changes_page(changes: &[QuantityChange], units: usize) -> String {

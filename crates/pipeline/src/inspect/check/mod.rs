@@ -5,13 +5,13 @@ mod channels;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use ingest::LogFiles;
 use jiff::Timestamp;
 use job::flight_log::{FlightLog, duplicate_flight, may_be_pieces, pieces_undeclared};
 use job::part_identification::IdentifiedParams;
 use job::{Config, rejection};
 use records::{Diagnostic, Installations, PartNumber, Position};
 
+use crate::logs::discover::NamedLog;
 use crate::run::time_limit::within_time_limit;
 
 use channels::{ActuatorCheck, Identified, actuator};
@@ -67,11 +67,11 @@ impl LogsCheck {
 pub fn check_logs(
     config: &Arc<Config>,
     installations: &Arc<Installations>,
-    logs: Vec<(LogFiles, String)>,
+    logs: Vec<NamedLog>,
     faults: Vec<Diagnostic>,
 ) -> LogsCheck {
     let mut seen = LogsCheck { diagnostics: faults, ..LogsCheck::default() };
-    for (files, name) in logs {
+    for (name, files) in logs {
         let (of_log, installed, shown) = (Arc::clone(config), Arc::clone(installations), name.clone());
         let looked = within_time_limit(&name, config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
