@@ -133,8 +133,8 @@ row! {
         /// `normal`, `watch`, `unassessed`, `plan`, `act`, from least to most urgent; null for a removed unit.
         pub state: Option<&'static str>,
         /// Code of the reason: `no_record`, `no_limit`, `stale`, `renewed`, `above_limit`, `limit_held`, `unconfirmed`,
-        /// `repeated`, `crosses_soon`, `rises_to_limit`, `at_watch`, `jumped`, `changed`, `onset`, `inspected`,
-        /// `clear`.
+        /// `repeated`, `crosses_soon`, `rises_to_limit`, `at_watch`, `imprecise`, `jumped`, `changed`, `onset`,
+        /// `inspected`, `clear`.
         pub reason_code: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,

@@ -20,8 +20,10 @@ const FALL_SHARE: f64 = 0.05;
 pub struct Level {
     /// The gap, metres.
     pub gap_m: f64,
-    /// Its standard error from the errors and the scatter of its records, metres.
+    /// Its standard error from the errors and the scatter of its records, and from what these may share, metres.
     pub se_m: f64,
+    /// The same without what the records may share, which two levels of a unit share too, metres.
+    pub(crate) own_se_m: f64,
     /// Number of records that it rests on.
     pub records: usize,
     /// Number of records from the first of these to the last one, outliers included.
@@ -117,7 +119,7 @@ pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<Level> {
     };
     let fall_m = rest.gap_m - last.gap_m;
     let is_lone_fall = before.last().is_some_and(|record| record.renewals == last.renewals)
-        && fall_m > (FALL_ERRORS * rest.se_m.hypot(last.error_m)).max(FALL_SHARE * limit_m);
+        && fall_m > (FALL_ERRORS * rest.own_se_m.hypot(last.error_m)).max(FALL_SHARE * limit_m);
     Some(if is_lone_fall { Level { window: rest.window + 1, ..rest } } else { level })
 }
 
@@ -131,9 +133,12 @@ fn level_at_end(sound: &[Record]) -> Option<Level> {
 fn explained(records: &[Record]) -> Option<Level> {
     let level = |line: Line, count: usize| {
         let last = records[records.len() - 1];
+        let own_se_m = (line.end_m2 * line.inflation()).sqrt();
         Level {
             gap_m: line.end_m,
-            se_m: (line.end_m2 * line.inflation()).sqrt(),
+            // No mean lowers an error that all records have.
+            se_m: own_se_m.hypot(last.shared_m),
+            own_se_m,
             records: count,
             window: records.len(),
             period: last.period,

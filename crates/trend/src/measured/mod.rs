@@ -101,7 +101,7 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         if from == 0 || (sound.len() - from > JUMP_RECORDS && days > CHANGE_WATCH_DAYS) {
             return None;
         }
-        found = jump_at(sound, from, now.at(first.hours), now.se_m, &present, settings);
+        found = jump_at(sound, from, now.at(first.hours), now.own_se_m, &present, settings);
         to = from;
     }
     found
@@ -122,7 +122,7 @@ fn jump_at(
     const CONTRADICTING: usize = 3;
     let before = measured_level(&sound[..from], settings.limit_m)?;
     let (first, records) = (&sound[from], sound.len() - from);
-    let error_m = before.se_m.hypot(after_se_m.min(first.error_m)).max(first.error_m);
+    let error_m = before.own_se_m.hypot(after_se_m.min(first.error_m)).max(first.error_m);
     let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
     // Between two periods only a rise is a jump: a new installation or maintenance may lower the gap.
     let sign = if before.period == first.period { (after_m - before.gap_m).signum() } else { 1.0 };

@@ -33,6 +33,8 @@ pub struct Record {
     pub gap_m: f64,
     /// Its standard error with the scatter that was found, metres.
     pub error_m: f64,
+    /// What its stated error has beyond that scatter: an error that the flights may share, metres.
+    pub(crate) shared_m: f64,
     /// Without a quality flag that makes it uncertain.
     pub(crate) is_sound: bool,
     /// A new one begins with each installation and after each renewal.
@@ -54,11 +56,12 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
         data.flights.iter().enumerate().rev().filter_map(|(i, f)| Some((i, f, f.gap?))).take(MOST).collect();
     seen.reverse();
     let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
-    let errors = noise(&gaps, limit_m).errors;
+    let noise = noise(&gaps, limit_m);
+    let shared = (noise.factor.recip() - 1.0).max(0.0).sqrt();
     let mut dates = data.maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
     let (mut period, mut renewals, mut installation) = (0, 0, None);
     let mut records = Vec::with_capacity(seen.len());
-    for ((flight, flown, gap), error_m) in seen.into_iter().zip(errors) {
+    for ((flight, flown, gap), error_m) in seen.into_iter().zip(noise.errors) {
         let mut is_new = installation.is_some_and(|before| before != flown.installation);
         while dates.next_if(|utc_us| *utc_us <= flown.departure_us).is_some() {
             (is_new, renewals) = (true, renewals + 1);
@@ -70,7 +73,18 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
         // No gap is below zero: such a record shows a fault, and nothing of the unit.
         let is_possible = gap_m > -(IMPOSSIBLE_ERRORS * error_m).max(IMPOSSIBLE_SHARE * limit_m);
         let is_sound = is_possible && !is_doubtful;
-        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound, period, renewals });
+        let shared_m = shared * error_m;
+        records.push(Record {
+            flight,
+            departure_us,
+            hours,
+            gap_m,
+            error_m,
+            shared_m,
+            is_sound,
+            period,
+            renewals,
+        });
     }
     (records, dates.next())
 }

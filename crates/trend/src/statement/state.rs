@@ -5,6 +5,7 @@ use std::fmt;
 use strum::{EnumString, IntoStaticStr};
 
 use crate::data::series::DAY_US;
+use crate::math::NORMAL_95;
 use crate::measured::exceedance::Exceedance;
 use crate::measured::record::HYSTERESIS;
 use crate::measured::{Jump, Measured};
@@ -66,6 +67,8 @@ pub enum Reason {
     RisesToLimit { p05_hours: f64, planning_horizon_hours: f64, records: usize, m_per_hour: f64 },
     /// The gap is at its watch limit.
     AtWatch { gap_m: f64, watch_m: f64, records: usize },
+    /// The error of the gap reaches its limit.
+    Imprecise { gap_m: f64, upper_m: f64, limit_m: f64 },
     /// The gap rose at once.
     Jumped { before_m: f64, after_m: f64, records: usize },
     /// A recent unrecorded change.
@@ -167,6 +170,13 @@ impl fmt::Display for Reason {
                 let (gap, watch) = (um(gap_m), um(watch_m));
                 write!(f, "gap {gap} is above the watch limit of {watch}, by the last {}", records(count))
             }
+            Self::Imprecise { gap_m, upper_m, limit_m } => write!(
+                f,
+                "gap {}, or up to {} by its error (95 %): it may be above the limit of {}",
+                um(gap_m),
+                um(upper_m),
+                um(limit_m)
+            ),
             Self::Jumped { before_m, after_m, records: count } => {
                 let (before_um, after) = (1e6 * before_m, um(after_m));
                 write!(f, "gap rose at once from {before_um:.1} to {after}, {} ago", records(count))
@@ -247,6 +257,10 @@ pub(crate) fn alert_state(
     }
     if gap_m >= watch_m || (measured.was_at_watch && gap_m >= HYSTERESIS * watch_m) {
         return (State::Watch, Reason::AtWatch { gap_m, watch_m, records: level.records });
+    }
+    let upper_m = gap_m + NORMAL_95 * level.se_m;
+    if upper_m >= limit_m {
+        return (State::Watch, Reason::Imprecise { gap_m, upper_m, limit_m });
     }
     match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
         // Counted to the last record: that no flight follows clears nothing.
