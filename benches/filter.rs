@@ -13,7 +13,7 @@ mod made_flight;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use estimator::contact::{self, PartPrior};
-use estimator::{Filter, GainSchedule, Samples, Stream, StreamingGap, gap, midrange};
+use estimator::{Filter, GainSchedule, Samples, Stream, gap, midrange};
 use made_flight::{STEP_S, channels};
 
 /// Number of samples whose positions, loads and S fit into the second-level cache.
@@ -105,16 +105,6 @@ fn stream_as_batch(bencher: Bencher) {
 fn gap_of_the_batch(bencher: Bencher) {
     let [_, s_m, _] = channels(SAMPLES);
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| gap::mid_range(black_box(&s_m)).unwrap());
-}
-
-#[divan::bench]
-fn gap_running(bencher: Bencher) {
-    let [_, s_m, _] = channels(SAMPLES);
-    bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
-        let mut gap = StreamingGap::<256>::new(2e-6).unwrap();
-        black_box(&s_m).iter().for_each(|s| gap.push(*s));
-        gap.read().unwrap()
-    });
 }
 
 /// A product and two sums, each waiting for the one before: no recursion of this kind is shorter.

@@ -6,7 +6,7 @@
 //! in an Operational Behavior*; items note where the printed equation differs from its meaning.
 //!
 //! Without the feature `std` and with `libm`, the crate needs neither a standard library nor an allocator. It then
-//! contains model, discretisation, noise, filter, [`Stream`] and [`StreamingGap`], for an on-board controller.
+//! contains model, discretisation, noise, filter, [`Stream`] and [`gap::mid_range`], for an on-board controller.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -24,9 +24,9 @@ mod samples;
 #[cfg(feature = "std")]
 pub use contact::ContactEstimate;
 pub use error::Error;
+pub use gap::GapStatistic;
 #[cfg(feature = "std")]
 pub use gap::midrange::{self, MidRangeEstimate};
-pub use gap::{BoundedGap, GapStatistic, StreamingGap};
 pub use kalman::{Filter, FilterStep, InitialVariances, KalmanState, Stream, StreamStep};
 #[cfg(feature = "std")]
 pub use kalman::{GainSchedule, Nis};

@@ -10,22 +10,20 @@ mod panics;
 mod print;
 mod stack;
 #[path = "../../freestanding/src/vector.rs"]
-#[allow(dead_code, reason = "the running gap is compared in the other program")]
+#[allow(dead_code, reason = "the gap is compared in the other program")]
 mod vector;
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug;
-use estimator::{ActuatorModel, Error, Filter, NoiseModel, Stream, StreamingGap};
+use estimator::{ActuatorModel, Error, Filter, NoiseModel, Stream};
 use nalgebra::Matrix3;
 
 /// Ticks of a millisecond: the emulated boards count the clock of their processor, 25 MHz.
 const PERIOD_TICKS: u32 = 25_000_000 / 1000;
 /// Ticks of the clock for four instructions: `run` lets an instruction last 32 ns, and a tick lasts 40 ns.
 const TICKS_OF_INSTRUCTIONS: (u32, u32) = (4, 5);
-/// Bins of a sixtieth of the gap.
-const BIN_M: f64 = 2e-6;
 /// Largest difference of S, as a share of its peak.
 const TOLERANCE: f64 = 1e-12;
 
@@ -72,7 +70,6 @@ fn start(mut clock: SYST) -> Result<bool, Error> {
     let (constant, settled) = (Stream::constant_time(&filter), Stream::steady_state(&filter));
     print::line("start", ", bytes of stack ", deepest);
     print::line("state", ", bytes of a stream ", size_of::<Stream>() as u32);
-    print::line("state", ", bytes of a running gap ", size_of::<StreamingGap<256>>() as u32);
     let is_right = run(constant, &mut clock, "every step whole:")?;
     Ok(run(settled, &mut clock, "steady state:")? && is_right)
 }
@@ -93,26 +90,19 @@ fn step(stream: &mut Stream, y_m: f64, load_n: f64) -> Result<f64, Error> {
 
 /// Takes a sample at each tick of 1 kHz; whether S is the reference's.
 fn run(mut stream: Stream, clock: &mut SYST, name: &str) -> Result<bool, Error> {
-    let mut gap = StreamingGap::<256>::new(BIN_M)?;
-    let (mut cost, mut running) = (Cost::default(), Cost::default());
+    let mut cost = Cost::default();
     let (mut peak_m, mut worst_m, mut deepest) = (0.0_f64, 0.0_f64, 0);
     for ((y_m, load_n), wanted_m) in vector::POSITION_M.iter().zip(vector::LOAD_N).zip(vector::S_M) {
         while !clock.has_wrapped() {}
         let before = stack::paint();
         let started = SYST::get_current();
         let s_m = step(&mut stream, *y_m, load_n)?;
-        let filtered = SYST::get_current();
-        gap.push(s_m);
         let done = SYST::get_current();
         deepest = deepest.max(stack::used(before));
-        cost.add(started, filtered);
-        running.add(filtered, done);
+        cost.add(started, done);
         (peak_m, worst_m) = (peak_m.max(wanted_m.abs()), worst_m.max((s_m - wanted_m).abs()));
     }
     cost.print(name);
-    running.print("running gap:");
     print::line(name, " bytes of stack ", deepest);
-    let found = gap.read()?;
-    print::line(name, " gap in nm ", (1e9 * found.gap_m) as u32);
     Ok(worst_m <= TOLERANCE * peak_m)
 }

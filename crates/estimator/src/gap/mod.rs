@@ -1,13 +1,11 @@
-//! Gap statistic of the published method: batch, streaming, and with the load band.
+//! Gap statistic of the published method, and the load band.
 
 #[cfg(feature = "std")]
 pub(crate) mod load_band;
 #[cfg(feature = "std")]
 pub mod midrange;
 pub(crate) mod statistic;
-pub(crate) mod streaming;
 
 #[cfg(feature = "std")]
 pub use load_band::{LoadBand, load_band};
 pub use statistic::{GapStatistic, mid_range};
-pub use streaming::{BoundedGap, StreamingGap};

@@ -256,6 +256,40 @@ fn a_nonlinear_load_cell_widens_the_interval() {
     assert!(held >= 4, "{held} of 8 lie within three standard errors");
 }
 
+/// A ground sweep against a spring: the load follows the place, so that each place shows one flank only.
+#[test]
+fn a_sweep_against_a_spring_shows_its_gap() {
+    let case = Case::nominal(216e-6);
+    for seed in 0..24 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut noise_m = || 2e-6 * random.random_range(-1.7..1.7);
+        let motor_m: Vec<f64> = (0..90 * 125)
+            .map(|k| 4e-3 * (std::f64::consts::TAU * 0.05 * f64::from(k) / 125.0).sin())
+            .collect();
+        let load_n: Vec<f64> = motor_m.iter().map(|x_m| 4e5 * x_m).collect();
+        let dx_m: Vec<f64> = load_n.iter().map(|n| 108e-6 * n.signum() + n / 5e7 + noise_m()).collect();
+        // A refused sweep misleads nobody.
+        if let Ok(found) = case.look(&motor_m, &dx_m, &load_n) {
+            let error_m = (found.gap_m - 216e-6).abs();
+            assert!(error_m < 4e-6 + 2.0 * found.gap_se_m && found.preload_n.is_none(), "{seed}: {found:?}");
+        }
+    }
+}
+
+/// A load that reads a·tanh(F/a), as of a saturating motor current: no contact is stiffer at low load.
+#[test]
+fn a_load_that_flattens_is_flagged_and_its_interval_holds() {
+    for seed in 0..6 {
+        let case = Case::nominal(80e-6);
+        let mut flight = case.fly(seed);
+        let most_n = 2.0 * case.profile.load_n;
+        flight.load_n.iter_mut().for_each(|n| *n = most_n * (*n / most_n).tanh());
+        let found = case.outcome(&flight).unwrap();
+        assert!(found.flags.contains(&QualityFlag::LoadBends), "{found:?}");
+        assert!((found.gap_m - 80e-6).abs() < 2.0 * found.gap_se_m, "{seed}: {found:?}");
+    }
+}
+
 /// Errors of the screw channel that repeat with each turn of the motor become terms of the fit.
 #[test]
 fn errors_periodic_in_position_become_terms() {
@@ -305,6 +339,25 @@ fn a_bench_shows_gap_and_loop_and_how_far_they_change() {
     let changing = bench(&[40e-6, 40e-6, 40e-6, 600e-6].repeat(3));
     assert!(changing.flags.contains(&QualityFlag::Imprecise), "{changing:?}");
     assert!(changing.gap_bounds_m.0 < 40e-6 && changing.gap_bounds_m.1 > 600e-6, "{changing:?}");
+}
+
+/// Within the gap of a bench without friction the load is noise about zero, which belongs to neither branch of the loop.
+#[test]
+fn the_loop_of_a_slow_bench_is_its_gap() {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let motor_m: Vec<f64> =
+        (0..120 * 50).map(|k| 3e-4 * (std::f64::consts::TAU * 0.1 * f64::from(k) / 50.0).sin()).collect();
+    let pressed_n = |x_m: f64| -5e7 * (x_m - x_m.clamp(-58e-6, 58e-6));
+    let load_n: Vec<f64> = motor_m.iter().map(|x| pressed_n(*x) + random.random_range(-30.0..30.0)).collect();
+    let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
+    let whole = 0..dx_m.len();
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s: 0.02, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
+    let found =
+        fit(&samples, &PartPrior { output_locked: true, ..PartPrior::of_stiffness(5e7) }).unwrap().unwrap();
+    for width_m in [found.gap_m, found.loop_width_m.unwrap().0] {
+        assert!((width_m - 116e-6).abs() < 4e-6, "{found:?}");
+    }
 }
 
 /// By hand: twice the dry friction of 150 N over 5·10⁷ N/m makes the loop 6 µm wider than the gap; its interval holds that.

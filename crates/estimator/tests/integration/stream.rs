@@ -1,25 +1,14 @@
-//! The filter and the statistic as the samples come, against the batch that has them all.
+//! The filter as the samples come, against the batch that has them all.
 
-use estimator::{BoundedGap, Error, Stream, StreamingGap, gap};
+use estimator::Stream;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
 
-use crate::vectors::{SETS, Set};
 use crate::{batch, filter};
-
-/// 256 bins of 2 µm: 4 KiB, for gaps from 30 to 300 µm.
-type Histogram = StreamingGap<256>;
-const BIN_M: f64 = 2e-6;
 
 fn streamed(mut stream: Stream, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
     dx_m.iter().zip(load_n).map(|(y, u)| stream.push(*y, *u).unwrap().s_m()).collect()
-}
-
-fn running(s_m: &[f64]) -> Result<BoundedGap, Error> {
-    let mut gap = Histogram::new(BIN_M).unwrap();
-    s_m.iter().for_each(|s| gap.push(*s));
-    gap.read()
 }
 
 /// Largest difference, held against the peak.
@@ -62,56 +51,6 @@ fn a_stream_starts_at_the_first_measurement() {
     assert_eq!(found[40..], batch(&filter, &dx_m[40..], &load_n[40..]));
 }
 
-/// Thirty-two flights, four gaps, three frictions, two rates: the error that `StreamingGap` states.
-#[test]
-fn a_running_gap_keeps_near_the_batch_over_many_flights() {
-    for seed in 0..32 {
-        let gap_m = [30e-6, 60e-6, 100e-6, 300e-6][seed as usize % 4];
-        let (friction, rate_hz) = ([0.5, 1.0, 3.0][seed as usize % 3], [50.0, 125.0][seed as usize % 2]);
-        let flight = fly(seed, gap_m, friction, rate_hz);
-        let (dx_m, load_n) = channels(&flight);
-        let s_m = batch(&filter(rate_hz, 10.0), &dx_m, load_n);
-        let (found, wanted) = (running(&s_m).unwrap(), gap::mid_range(&s_m).unwrap());
-        assert!(holds(&found, wanted.gap_m), "seed {seed}: {found:?} is not about {wanted:?}");
-        assert_eq!(found.samples, (wanted.upper + wanted.lower) as u64);
-        let error = (found.gap_m / wanted.gap_m - 1.0).abs();
-        assert!(error < 2e-3, "seed {seed}: off by {error:.2e} of the batch's gap");
-    }
-}
-
-/// The batch's gap lies within the bounds, but for the rounding of sums taken in another order.
-fn holds(found: &BoundedGap, wanted_m: f64) -> bool {
-    let (least_m, greatest_m) = (found.least_m - 1e-15, found.greatest_m + 1e-15);
-    [wanted_m, found.gap_m].iter().all(|gap_m| (least_m..=greatest_m).contains(gap_m))
-}
-
-/// S moves through the mid-range of these between two samples: nothing is in its bin, nothing is lost.
-#[test]
-fn a_running_gap_agrees_with_the_fifty_digits() {
-    for name in &SETS[..3] {
-        let set = Set::load(name);
-        let found = running(&set.columns["x_filt_2"]).unwrap();
-        let error = found.gap_m / set.number("gap") - 1.0;
-        assert!(error.abs() < 1e-12, "{name}: off by {error:e} of the gap");
-    }
-}
-
-#[test]
-fn a_streaming_gap_without_motion_reports_the_reason() {
-    assert_eq!(running(&[f64::NAN]), Err(Error::NothingMeasured));
-    assert_eq!(running(&[2.0; 3]), Err(Error::Constant { samples: 3, s_m: 2.0 }));
-    assert!(matches!(Histogram::new(0.0), Err(Error::Parameter { name: "bin_m", .. })));
-}
-
-/// By hand: two samples about 0 and one at 100 µm, no bin shared with the mid-range, so nothing is hidden.
-#[test]
-fn a_gap_wide_of_the_bins_is_exact() {
-    let found = running(&[0.0, 1e-6, 100e-6]).unwrap();
-    for gap_m in [found.gap_m, found.least_m, found.greatest_m] {
-        assert!((gap_m - 99.5e-6).abs() < 1e-18, "{found:?}");
-    }
-}
-
 proptest! {
     /// After a restart, with any missing samples and loads after the first sample: bitwise identical.
     #[test]
@@ -132,13 +71,5 @@ proptest! {
         prop_assert_eq!(&steady, &wanted);
         let even = difference(&even, &wanted);
         prop_assert!(even < 1e-12, "off by {even:e} of the peak");
-    }
-
-    /// Whatever S does, within the bins or beyond them: the batch lies within the bounds.
-    #[test]
-    fn the_bounds_of_a_running_gap_hold(s_m in vec(-1e-3..1e-3, 2..300), offset_m in -1e-2..1e-2, share in 1e-3..1.0) {
-        let s_m: Vec<f64> = s_m.iter().map(|s: &f64| s * share + offset_m).collect();
-        let (found, wanted) = (running(&s_m).unwrap(), gap::mid_range(&s_m).unwrap());
-        prop_assert!(holds(&found, wanted.gap_m), "{found:?} is not about {wanted:?}");
     }
 }
