@@ -3,9 +3,9 @@
 //! The gap is the distance of the two flanks, extrapolated along their stiff part to zero load. Flanks that are soft at
 //! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. The gap lies between those of a
 //! fit of all loads and of one of higher loads. Where they differ by less than √2 jackknife errors of their difference,
-//! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads. No
-//! contact is stiffer at low load: where higher loads read a narrower gap, the load reads less there than it is. The gap is
-//! then that of all loads, and the difference joins its error.
+//! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads. Only a
+//! preloaded nut, whose flanks overlap, is stiffer at low load: where higher loads read a narrower gap, but a gap, the load
+//! reads less there than it is. The gap is then that of all loads, and the difference joins its error.
 
 use std::ops::Range;
 
@@ -101,7 +101,7 @@ pub(crate) fn fit(
         profile,
         compliance_m_per_n: search.line.fit.beta[FORCE] / scaling.load_n,
         is_soft: sigma > 2.3,
-        load_bends: sigma < -2.3,
+        load_bends: sigma < -2.3 && gap_m.0 > 0.0,
         unexplained_m: 0.0,
         load_jumps: false,
         search,
@@ -274,9 +274,10 @@ fn gap_and_error_m(
     let floor_m = (4.5e-4 * windup_m).hypot(0.4 * vibration_m);
     let (gap_m, jackknife_m, candidates_m) = profile.map_or_else(
         || {
-            let counted_m = weight * difference_m;
-            let doubt = choice.hypot(bend).max(if counted_m < 0.0 { 1.5 } else { 0.0 });
-            let gap_m = line.fit.beta[GAP] + counted_m.max(0.0);
+            let (all_m, counted_m) = (line.fit.beta[GAP], weight * difference_m);
+            let bends = counted_m < 0.0 && all_m + counted_m > 0.0;
+            let doubt = choice.hypot(bend).max(if bends { 1.5 } else { 0.0 });
+            let gap_m = if bends { all_m } else { all_m + counted_m };
             (gap_m, jackknife_m, (0.45 * search.spread_m).hypot(doubt * counted_m))
         },
         // The profile explains what one gap for the whole stroke could not.
