@@ -89,7 +89,7 @@ pub enum QualityFlag {
     LoadJumps,
     /// The 95 % load is under three times the friction.
     FrictionHeavy,
-    /// A fit of higher loads alone reads a narrower gap: the load reads less at high load than it is.
+    /// A fit of higher loads alone reads a narrower gap: at high load the logged load is less than the true one.
     LoadBends,
     /// Flanks are soft at low load: a fit of higher loads alone reads a wider gap.
     SoftContact,

@@ -33,7 +33,7 @@ pub struct Record {
     pub gap_m: f64,
     /// Its standard error with the scatter that was found, metres.
     pub error_m: f64,
-    /// What its stated error has beyond that scatter: an error that the flights may share, metres.
+    /// The part of its stated error that the scatter does not show: an error that the flights may share, metres.
     pub(crate) shared_m: f64,
     /// Without a quality flag that makes it uncertain.
     pub(crate) is_sound: bool,

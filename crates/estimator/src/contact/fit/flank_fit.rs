@@ -4,8 +4,9 @@
 //! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. The gap lies between those of a
 //! fit of all loads and of one of higher loads. Where they differ by less than √2 jackknife errors of their difference,
 //! it is nearer to that of all loads, which rests on more data; where they differ by more, to that of higher loads. Only a
-//! preloaded nut, whose flanks overlap, is stiffer at low load: where higher loads read a narrower gap, but a gap, the load
-//! reads less there than it is. The gap is then that of all loads, and the difference joins its error.
+//! preloaded nut, whose flanks overlap, is stiffer at low load: where higher loads read a gap that is narrower and above
+//! zero, the logged load is less than the true one there. The gap is then that of all loads, and the difference joins its
+//! error.
 
 use std::ops::Range;
 

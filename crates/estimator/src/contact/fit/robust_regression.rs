@@ -209,8 +209,8 @@ impl<const N: usize> RobustFit<N> {
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
 
-    /// By how much a coefficient moves for an unknown error of rms 1 m that depends on the place alone: on the column `by`,
-    /// from −1 to 1, in bins that err independently.
+    /// Standard deviation of a coefficient under an error of rms 1 m that depends on the place alone: on the column `by`, a
+    /// place from −1 to 1, whose sixteenths err independently.
     pub(crate) fn error_along(&self, column: usize, by: usize, rows: &[DesignRow<N>]) -> f64 {
         const BINS: usize = 16;
         let influence: [f64; N] = std::array::from_fn(|i| self.inverse[(column, i)]);
