@@ -48,7 +48,7 @@ pub(crate) fn flags(
         (QualityFlag::FitPoor, is_poor),
         (QualityFlag::LoadJumps, contact.load_jumps),
         (QualityFlag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
-        (QualityFlag::LoadBends, contact.load_bends && !is_preloaded),
+        (QualityFlag::LoadBends, contact.load_bends),
         (QualityFlag::SoftContact, contact.is_soft && !is_preloaded),
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * windup_m || exceeds(found.gap_se_m, VAGUE_OF_GAP)),
     ];

@@ -80,6 +80,17 @@ fn a_state_stands_from_the_first_record_on() {
     );
 }
 
+/// 20 µm below a limit of 100 µm, where the stated error is 60 µm. Twelve records that agree better than that may share it.
+#[test]
+fn a_level_whose_error_reaches_the_limit_is_watched() {
+    for count in [1, 12] {
+        let rows = (0..count).map(|day| histories::row(day, DAY_US, 2.0, 20.0, 60.0));
+        let found = state_of(&histories::series(rows), count);
+        assert!(matches!(found.reason, Reason::Imprecise { .. }), "{count}: {found:?}");
+        assert_eq!((found.state, found.reason.code()), (State::Watch, "imprecise"));
+    }
+}
+
 #[test]
 fn settings_nothing_can_be_judged_by_are_refused() {
     let settings = Settings { watch_m: 2e-4, ..Settings::for_limit(1e-4) };
