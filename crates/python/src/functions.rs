@@ -123,11 +123,11 @@ pub(crate) fn normalize(
 ) -> PyResult<(Vec<PathBuf>, Option<Py<PyAny>>)> {
     let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
     let done = config.with(py, |config, installations| {
-        let logs = discover::named_logs(config, &logs)?;
+        let selected = discover::select(config, Some(&logs), usize::MAX)?;
         pipeline::inspect::normalize::normalize(
             config,
             installations,
-            &logs,
+            selected,
             &output,
             encoding,
             jobs,
@@ -148,16 +148,9 @@ pub(crate) fn check(
     limit: usize,
 ) -> PyResult<Table> {
     let (batch, diagnostics) = config.with(py, |config, installations| {
-        let (logs, faults) = match logs {
-            Some(logs) => (discover::named_logs(config, &logs)?, Vec::new()),
-            None => {
-                let found = discover::discover(config)?;
-                let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
-                (found.logs.into_iter().take(limit).collect(), faults)
-            }
-        };
+        let selected = discover::select(config, logs.as_deref(), limit)?;
         let (config, installations) = (Arc::new(config.clone()), Arc::new(installations.clone()));
-        let seen = pipeline::inspect::check::check_logs(&config, &installations, logs, faults);
+        let seen = pipeline::inspect::check::check_logs(&config, &installations, selected);
         let batch: RecordBatch = to_nullable_batch(&seen.channels())?;
         Ok((batch, seen.diagnostics.into_iter().chain(seen.mapping_faults).collect()))
     })?;

@@ -38,19 +38,19 @@ pub struct TailWideStep {
 }
 
 /// The tail-wide steps among the steps of a tail's units, by time: three quarters of the units with gaps before and
-/// after it, and two at least, step within a week.
+/// after it, and two at least, step in one direction within a week.
 ///
 /// ```
 /// use trend::{UnitOnTail, tail_wide_steps};
 ///
 /// let day_us = |day: i64| day * 86_400_000_000;
 /// let unit = |steps| UnitOnTail { first_us: 0, last_us: day_us(90), steps };
-/// // Three of four actuators step by some 15 µm within two days; one of them steps alone later.
+/// // Three of four actuators rise by some 15 µm within two days, where the fourth falls; one of them rises alone later.
 /// let units = [
 ///     unit(vec![(day_us(40), 15e-6), (day_us(70), 9e-6)]),
 ///     unit(vec![(day_us(41), 14e-6)]),
 ///     unit(vec![(day_us(42), 16e-6)]),
-///     unit(vec![]),
+///     unit(vec![(day_us(41), -15e-6)]),
 /// ];
 /// let found = tail_wide_steps(&units);
 /// assert_eq!((found.len(), found[0].units, found[0].units_able), (1, 3, 4));
@@ -58,8 +58,18 @@ pub struct TailWideStep {
 /// assert!((found[0].step_m - 15e-6).abs() < 1e-12);
 /// ```
 pub fn tail_wide_steps(units: &[UnitOnTail]) -> Vec<TailWideStep> {
+    let mut found = of_sign(units, |step_m| step_m > 0.0);
+    found.extend(of_sign(units, |step_m| step_m < 0.0));
+    found.sort_by_key(|step| step.first_us);
+    found
+}
+
+/// The tail-wide steps up, or those down: no sensor and no recorder moves one unit up and another down, but a swap of two
+/// units does.
+fn of_sign(units: &[UnitOnTail], is_of_sign: impl Fn(f64) -> bool) -> Vec<TailWideStep> {
     let of_unit = |(unit, on_tail): (usize, &UnitOnTail)| {
-        on_tail.steps.iter().map(move |(at_us, step_m)| (*at_us, unit, *step_m)).collect::<Vec<_>>()
+        let steps = on_tail.steps.iter().filter(|(_, step_m)| is_of_sign(*step_m));
+        steps.map(move |(at_us, step_m)| (*at_us, unit, *step_m)).collect::<Vec<_>>()
     };
     let mut steps: Vec<(i64, usize, f64)> = units.iter().enumerate().flat_map(of_unit).collect();
     steps.sort_unstable_by_key(|step| (step.0, step.1));

@@ -26,7 +26,7 @@ pub(crate) struct InitArgs {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct CheckArgs {
     /// Logs to read; default: those of the configuration.
-    pub logs: Vec<PathBuf>,
+    pub logs: Option<Vec<PathBuf>>,
     /// Check N logs, and at least one of each tail.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub limit: usize,
@@ -57,7 +57,7 @@ pub(crate) struct EstimateArgs {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct NormalizeArgs {
     /// Logs to read; default: those of the configuration.
-    pub logs: Vec<PathBuf>,
+    pub logs: Option<Vec<PathBuf>>,
     /// Write TAIL/DEPARTURE_FLIGHT/POSITION.parquet below this folder.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,

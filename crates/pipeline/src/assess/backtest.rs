@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use records::Installations;
-use trend::{ChangePointKind, Series, WearStatus};
+use trend::{ChangePointKind, Series};
 
 use crate::assess::trends::FleetContext;
 use crate::error::Error;
@@ -55,9 +55,10 @@ records::row! {
     }
 }
 
-/// Past forecasts of the wearing units, by part number, serial number and date.
+/// Past forecasts of the units that have worn since, by part number, serial number and date.
 ///
-/// A forecast is left out if a step or a reset came between it and its target, or if the unit has not clearly worn since.
+/// A forecast is left out if a step or a reset came between it and its target, or if the unit has not clearly worn since. A unit
+/// that seemed steady at the date of its forecast counts: its forecast was the late one.
 ///
 /// # Errors
 /// When a history or a part's limits are invalid.
@@ -97,7 +98,7 @@ fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Opti
     };
     let (Some(before), Some(after)) = (then.level, now.level) else { return Ok(None) };
     let moved = after.gap_m - before.gap_m > 2.0 * before.se_m.hypot(after.se_m);
-    if then.wear != WearStatus::Wearing || !moved || now.changes.iter().any(disturbed) {
+    if !moved || now.changes.iter().any(disturbed) {
         return Ok(None);
     }
     let then_hours = series.flights_until(as_of_us).last().map_or(0.0, |f| f.hours);

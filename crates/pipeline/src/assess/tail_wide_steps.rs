@@ -54,7 +54,9 @@ impl<'m> TailWide<'m> {
     /// The tail whose change it is; none where it is the unit's own.
     pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
         let (flown, tail) = made_on(change, history)?;
-        let is_within = |step: &TailWideStep| (step.first_us..=step.last_us).contains(&change.departure_us);
+        let is_within = |step: &TailWideStep| {
+            (step.first_us..=step.last_us).contains(&change.departure_us) && step.step_m * change.step_m > 0.0
+        };
         let steps = self.steps.get(tail).map_or(&[][..], Vec::as_slice);
         let is_wide = is_sudden(change) && (steps.iter().any(is_within) || self.is_explained(flown, tail));
         is_wide.then_some(tail)

@@ -65,7 +65,7 @@ impl RowSources<'_> {
         // Usage goes on at the unit's own rate after its last flight; a date that has passed stays what it was.
         let day =
             |hours: Option<f64>| days_after(as_of, (hours? - trend.elapsed_hours) / use_now?.hours_per_day);
-        let (state, cause) = if limit_m.is_some() {
+        let (state, cause) = if limit_m.is_some() || trend.flights == 0 {
             (trend.state, trend.reason)
         } else {
             (State::Unassessed, Reason::NoLimit)

@@ -23,6 +23,7 @@ use crate::findings::monitoring::mapping_faults::{self, MappingFault};
 use crate::findings::monitoring::recent::{RecentFlights, recent_flights};
 use crate::findings::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::findings::monitoring::repeated_samples;
+use crate::fleet::bookkeeping::inspections;
 use crate::fleet::bookkeeping::join::open_store;
 use crate::fleet::bookkeeping::usage::OperatorTables;
 use crate::fleet::builder;
@@ -399,6 +400,9 @@ impl<'a> FleetContext<'a> {
         let newest_log = rows.iter().filter_map(|row| self.latest_flight(&row.unit(), row.as_of_utc)).max();
         let today = given.unwrap_or_else(Timestamp::now);
         let mut notes = coverage::notes(rows, newest_log, today, self.limits.config);
+        let later =
+            |row: &TrendRow| inspections::later_note(&self.tables.inspections, &units, row.as_of_utc, today);
+        notes.extend(rows.first().and_then(later));
         notes.extend(peers::notes(&self.followed.rows, |row| units.contains(&row.unit())));
         notes
     }

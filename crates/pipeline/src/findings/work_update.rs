@@ -100,7 +100,8 @@ fn of_open(
     }
     let is_worse = rank(state) > rank(request.state.as_deref());
     let is_due = request.status == "open" && request.until_utc.is_some();
-    if is_due || (request.status == "deferred" && is_worse) {
+    // What a person decided, they decided about a less urgent state.
+    if is_due || (request.status != "open" && is_worse) {
         found.push(event(WorkEventKind::Returned));
     }
     found.extend(finding.and_then(|finding| state_change(request, finding, now)));

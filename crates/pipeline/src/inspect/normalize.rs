@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
 use crate::error::Error;
-use crate::logs::discover::NamedLog;
+use crate::logs::discover::{NamedLog, SelectedLogs};
 use crate::run::event::Event;
 
 /// What became of the logs.
@@ -24,7 +24,7 @@ pub struct Normalized {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Writes the normalized logs of some logs below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight number
+/// Writes the normalized logs of the selected logs below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight number
 /// flies again.
 ///
 /// # Errors
@@ -32,14 +32,14 @@ pub struct Normalized {
 pub fn normalize(
     config: &Config,
     installations: &Installations,
-    logs: &[NamedLog],
+    selected: SelectedLogs,
     folder: &Path,
     encoding: Encoding,
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Normalized, Error> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
-    watch(Event::Planned { logs: logs.len(), bytes: 0 });
+    watch(Event::Planned { logs: selected.logs.len(), bytes: 0 });
     let request = Normalization { config, installations, folder, encoding, claims: Mutex::default() };
     let one = |(log_path, files): &NamedLog| {
         let mut done = Normalized::default();
@@ -49,8 +49,8 @@ pub fn normalize(
         watch(Event::Finished { log, bytes: 0, estimated: done.written.len(), refused: 0, diagnostics });
         done
     };
-    let done: Vec<_> = pool.install(|| logs.par_iter().map(one).collect());
-    let mut all = Normalized::default();
+    let done: Vec<_> = pool.install(|| selected.logs.par_iter().map(one).collect());
+    let mut all = Normalized { diagnostics: selected.faults, ..Normalized::default() };
     for of_log in done {
         all.written.extend(of_log.written);
         all.diagnostics.extend(of_log.diagnostics);

@@ -93,17 +93,42 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
     paths.iter().flat_map(of).collect()
 }
 
-/// The logs that files given by hand hold or belong to, each with its name.
+/// Logs to inspect.
+#[derive(Debug, Clone, Default)]
+pub struct SelectedLogs {
+    /// The logs, each with its name.
+    pub logs: Vec<NamedLog>,
+    /// Files that cannot be read.
+    pub faults: Vec<Diagnostic>,
+    /// What is left out, in words.
+    pub notes: Vec<String>,
+}
+
+/// The logs that files given by hand hold or belong to; without files, about `most` of all logs.
 ///
 /// # Errors
-/// As [`discover`], where groups or pieces must be searched.
-pub fn named_logs(config: &Config, paths: &[PathBuf]) -> Result<Vec<NamedLog>, Error> {
-    let named = |path: &PathBuf| Ok((path.display().to_string(), log_containing(config, path)?));
-    flight_paths(config, paths).iter().map(named).collect()
+/// As [`discover`].
+pub fn select(config: &Config, paths: Option<&[PathBuf]>, most: usize) -> Result<SelectedLogs, Error> {
+    if let Some(paths) = paths {
+        let named = |path: &PathBuf| Ok((path.display().to_string(), log_containing(config, path)?));
+        let logs = flight_paths(config, paths).iter().map(named).collect::<Result<_, Error>>()?;
+        return Ok(SelectedLogs { logs, ..SelectedLogs::default() });
+    }
+    let found = discover(config)?;
+    let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
+    let stray = |file| format!("{file}: no matching main log for this flight; not used");
+    let mut notes: Vec<String> = found.strays.into_iter().map(stray).collect();
+    let mut logs: Vec<NamedLog> = found.logs.into_iter().collect();
+    let all = logs.len();
+    if all > most {
+        logs = sampled(config, logs, most.max(1));
+        notes.push(format!("checking {} of {all} logs; use `--limit` to check more", logs.len()));
+    }
+    Ok(SelectedLogs { logs, faults, notes })
 }
 
 /// About `most` of some logs: evenly among all, which are in order of their names, and at least one of each tail.
-pub fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLog> {
+fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLog> {
     /// Of more logs the tails are not read: each takes a read of its footer.
     const IDENTIFIED: usize = 10_000;
     let all = logs.len();

@@ -350,7 +350,8 @@ def check(
 ) -> Table:
     """How logs are mapped, channel by channel, and what would be refused; nothing is estimated or stored.
 
-    Without ``logs`` the first ``limit`` of the configuration are checked. Failed logs are rows of ``Table.errors``.
+    Without ``logs`` about ``limit`` of the configuration are checked, at least one of each tail. Failed logs are rows of
+    ``Table.errors``.
     """
     return _freeplay.check(None if logs is None else _paths(logs), load(config), limit)
 

@@ -14,7 +14,7 @@ const MAX_INFLATION: f64 = 8.0;
 
 /// Two standard errors, 2 · 1.17 · √2, of a variance that the median of one normal deviate gives; of n deviates, as many
 /// over √n.
-const CERTAIN: f64 = 3.3;
+pub(crate) const CERTAIN: f64 = 3.3;
 
 /// With at most this many values, a jump may pass for noise: the factor of stated variances is then limited.
 const FEW: usize = 9;

@@ -65,12 +65,14 @@ pub(crate) fn agrees(
     has_level && has_rate
 }
 
-/// The records of the measured level; without a lone last record, which the next one confirms or refutes.
+/// The records of the measured level; without a lone last record, which the next one confirms or refutes, unless it is the
+/// first after a renewal.
 fn last_records(measured: &Measured, limit_m: f64) -> Option<&[Record]> {
     let (level, sound) = (measured.level?, &measured.sound[..]);
-    let before = sound.split_last().filter(|_| level.records == 1).map(|(_, before)| before);
-    let rest = before.and_then(|before| Some((before, measured_level(before, limit_m)?)));
-    if let Some((before, rest)) = rest.filter(|(_, rest)| rest.records > 1) {
+    let (last, before) = sound.split_last()?;
+    let is_lone = level.records == 1 && before.last().is_some_and(|record| record.renewals == last.renewals);
+    let rest = measured_level(before, limit_m).filter(|rest| is_lone && rest.records > 1);
+    if let Some(rest) = rest {
         return Some(&before[before.len().saturating_sub(rest.window)..]);
     }
     Some(&sound[sound.len().saturating_sub(level.window)..])

@@ -1,5 +1,6 @@
 //! Records of a unit in order, with the periods in which they can be compared.
 
+use crate::data::noise::CERTAIN;
 use crate::data::outliers::noise;
 use crate::data::series::{Flight, Gap, UnitData};
 
@@ -57,6 +58,9 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
     seen.reverse();
     let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
     let noise = noise(&gaps, limit_m);
+    // Few differences are small by chance as well: a scatter below the stated errors counts as far as it is certain.
+    let certain = (noise.factor * (1.0 + CERTAIN / (seen.len() as f64).sqrt())).min(1.0).max(noise.factor);
+    let widened = (certain / noise.factor).sqrt();
     let shared = (noise.factor.recip() - 1.0).max(0.0).sqrt();
     let mut dates = data.maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
     let (mut period, mut renewals, mut installation) = (0, 0, None);
@@ -73,7 +77,7 @@ pub(crate) fn records(data: UnitData<'_>, limit_m: f64) -> (Vec<Record>, Option<
         // No gap is below zero: such a record shows a fault, and nothing of the unit.
         let is_possible = gap_m > -(IMPOSSIBLE_ERRORS * error_m).max(IMPOSSIBLE_SHARE * limit_m);
         let is_sound = is_possible && !is_doubtful;
-        let shared_m = shared * error_m;
+        let (error_m, shared_m) = (widened * error_m, shared * error_m);
         records.push(Record {
             flight,
             departure_us,

@@ -103,8 +103,8 @@ impl<'a> History<'a> {
         self.changes.push(ChangePoint { departure_us, kind, step_m, se_m, certainty });
         if begins_anew {
             self.begin(step.at, Some(0.0));
-        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
-            // To undo what may be damage would hide it.
+        } else if (self.undone_m + step.step_m).abs() > MAX_RIGGING_STEP * prior.limit_m() {
+            // To undo a rise that may be damage would hide it; to undo a large fall would forecast a gap that is gone.
             let hidden_m = std::mem::take(&mut self.undone_m);
             self.shift(step.at, hidden_m);
             self.begin(step.at, None);

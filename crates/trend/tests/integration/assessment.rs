@@ -109,6 +109,18 @@ fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flight
     assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
 }
 
+/// The gap rises from 40 to 97 of 100 µm and falls by 57 µm with a lubrication, which cannot close a gap.
+#[test]
+fn a_forecast_begins_at_the_gap_after_a_large_fall() {
+    let wear_um = |flight: i64| if flight < 300 { 40.0 + 0.19 * flight as f64 } else { 40.0 };
+    let um = |flight: i64| wear_um(flight) + 0.3 * (1.7 * flight as f64).sin();
+    let rows = (0..340).map(|flight| histories::row(flight, DAY_US, 2.0, um(flight), 0.3));
+    let entry = trend::MaintenanceEvent { utc_us: 300 * DAY_US - 1, renews: false };
+    let found = state_of(&histories::series(rows).with_maintenance(vec![entry]), 340);
+    assert!(found.over_limit_probability.is_some_and(|over| over < 0.01), "{found:?}");
+    assert!(found.crossing.and_then(|crossing| crossing.p05_hours).is_none_or(|hours| hours > 100.0));
+}
+
 /// One flight in ten has a record. The re-shim was entered five records before its fall shows, with fifty flights between.
 #[test]
 fn a_repair_is_on_record_whatever_the_number_of_flights_without_a_log() {

@@ -1,7 +1,7 @@
 //! States of drawn histories: none less urgent than due, and hardly a false alarm.
 
 use trend::State::{self, Act, Normal, Plan, Unassessed, Watch};
-use trend::assess;
+use trend::{Observation, assess};
 
 use crate::histories::{Drawn, LIMIT_UM, prior, settings};
 
@@ -142,6 +142,21 @@ fn calm_units_raise_no_alarm() {
     let calm = kinds(false);
     let alarms = off(51, &calm, |found, due| found > due);
     assert!(alarms.len() * 1000 <= 3 * calm.len() * UNITS as usize, "{} alarms: {alarms:#?}", alarms.len());
+}
+
+/// Units with large errors, assessed after each of a hundred flights.
+#[test]
+fn healthy_units_are_seldom_planned_in_a_hundred_flights() {
+    let is_planned = |seed: &u64| {
+        let mut d = Drawn::new(7000 + seed, 1);
+        d.error_um = d.between(2.5, 8.0);
+        d.stay((100, 100), (30.0, 60.0));
+        let series = d.series();
+        let state = |row: &Observation| assess(&series, row.departure_us, &settings(), None).unwrap().state;
+        d.rows.iter().any(|row| state(row) >= Plan)
+    };
+    let planned = (0..50).filter(is_planned).count();
+    assert!(planned <= 3, "{planned} of 50");
 }
 
 /// The level shown is that of the last records, and its interval holds the truth.

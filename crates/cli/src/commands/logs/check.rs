@@ -7,7 +7,7 @@ use std::sync::Arc;
 use job::Config;
 use job::part_identification::{IdentifiedParams, ParamComparison};
 use pipeline::inspect::check::{ChannelCheck, LogCheck, RATIO, check_logs};
-use pipeline::logs::discover::{self, NamedLog};
+use pipeline::logs::discover;
 use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 
@@ -34,10 +34,11 @@ const NOTHING: &str = "  no actuator could be checked; see errors above\n";
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let (logs, faults) = logs(args, &config, output)?;
-    let count = logs.len();
+    let selected = discover::select(&config, args.logs.as_deref(), args.limit)?;
+    selected.notes.iter().for_each(|note| output.note(note));
+    let count = selected.logs.len();
     let (config, installations) = (Arc::new(config), Arc::new(installations));
-    let seen = check_logs(&config, &installations, logs, faults);
+    let seen = check_logs(&config, &installations, selected);
     let channels = seen.channels();
     let is_short = count > MOST_WHOLE_LOGS && args.rows.output.is_none() && !output.is_verbose();
     let page =
@@ -58,29 +59,6 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     let diagnostics: Vec<Diagnostic> = seen.diagnostics.into_iter().chain(seen.mapping_faults).collect();
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
-}
-
-/// The logs to be checked, and the faults of what cannot be listed.
-fn logs(
-    args: &CheckArgs,
-    config: &Config,
-    output: &Output,
-) -> Result<(Vec<NamedLog>, Vec<Diagnostic>), Failure> {
-    if !args.logs.is_empty() {
-        return Ok((discover::named_logs(config, &args.logs)?, Vec::new()));
-    }
-    let found = discover::discover(config)?;
-    for stray in &found.strays {
-        output.note(&format!("{stray}: no matching main log for this flight; not used"));
-    }
-    let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
-    let mut logs: Vec<_> = found.logs.into_iter().collect();
-    if logs.len() > args.limit {
-        let all = logs.len();
-        logs = discover::sampled(config, logs, args.limit.max(1));
-        output.note(&format!("checking {} of {all} logs; use `--limit` to check more", logs.len()));
-    }
-    Ok((logs, faults))
 }
 
 /// One line for each layout of the logs, and each note once.

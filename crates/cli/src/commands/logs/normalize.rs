@@ -18,17 +18,15 @@ use crate::commands::context::{display_path, load_with_installations};
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     row_output::check_folder(&args.output)?;
     let (config, installations) = load_with_installations(global)?;
-    let logs = if args.logs.is_empty() {
-        discover::discover(&config)?.logs.into_iter().collect()
-    } else {
-        discover::named_logs(&config, &args.logs)?
-    };
+    let selected = discover::select(&config, args.logs.as_deref(), usize::MAX)?;
+    selected.notes.iter().for_each(|note| output.note(note));
+    let logs = selected.logs.len();
     let (folder, jobs) = (args.output.as_path(), args.jobs.map(usize::from));
     let done = progress::shown("normalize", output, |watch| {
         pipeline::inspect::normalize::normalize(
             &config,
             &installations,
-            &logs,
+            selected,
             folder,
             args.encoding,
             jobs,
@@ -38,7 +36,7 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) 
     output.write_result(&format!(
         "{} of {} below {}\n",
         count(done.written.len(), "normalized log"),
-        count(logs.len(), "log"),
+        count(logs, "log"),
         display_path(&args.output)
     ))?;
     output.diagnostics(&done.diagnostics);

@@ -1,5 +1,7 @@
 //! Inspections table: free play measured in the hangar.
 
+use std::collections::BTreeSet;
+
 use ingest::tables::{TableBatch, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
@@ -92,6 +94,25 @@ pub(crate) fn latest<'i>(
         a.date_utc.cmp(&b.date_utc).then(a.play_m.total_cmp(&b.play_m))
     };
     inspections.iter().filter(is_of_now).max_by(order)
+}
+
+/// A note on inspections of some units after the date of assessments, which no state counts.
+pub(crate) fn later_note(
+    inspections: &[InspectionRow],
+    units: &BTreeSet<UnitKey>,
+    as_of: Timestamp,
+    today: Timestamp,
+) -> Option<String> {
+    let is_later = |inspection: &&InspectionRow| {
+        inspection.date_utc > as_of
+            && inspection.date_utc <= today
+            && units.iter().any(|unit| inspection.is_of(unit))
+    };
+    let count = inspections.iter().filter(is_later).count();
+    (count > 0).then(|| {
+        let (what, day) = (if count == 1 { "inspection is" } else { "inspections are" }, as_of.strftime("%Y-%m-%d"));
+        format!("{count} {what} later than {day}, the date of all states, and not counted; set `trend.as_of = \"now\"`")
+    })
 }
 
 /// A measured play, m.

@@ -11,7 +11,7 @@ use job::part_identification::IdentifiedParams;
 use job::{Config, rejection};
 use records::{Diagnostic, Installations, PartNumber, Position};
 
-use crate::logs::discover::NamedLog;
+use crate::logs::discover::SelectedLogs;
 use crate::run::time_limit::within_time_limit;
 
 use channels::{ActuatorCheck, Identified, actuator};
@@ -63,15 +63,14 @@ impl LogsCheck {
     }
 }
 
-/// Checks logs, each with its name. `faults` are errors of logs that could not be listed.
+/// Checks logs.
 pub fn check_logs(
     config: &Arc<Config>,
     installations: &Arc<Installations>,
-    logs: Vec<NamedLog>,
-    faults: Vec<Diagnostic>,
+    selected: SelectedLogs,
 ) -> LogsCheck {
-    let mut seen = LogsCheck { diagnostics: faults, ..LogsCheck::default() };
-    for (name, files) in logs {
+    let mut seen = LogsCheck { diagnostics: selected.faults, ..LogsCheck::default() };
+    for (name, files) in selected.logs {
         let (of_log, installed, shown) = (Arc::clone(config), Arc::clone(installations), name.clone());
         let looked = within_time_limit(&name, config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
