@@ -6,15 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use arrow::array::{AsArray, RecordBatch};
-use arrow::compute::{cast, concat_batches};
-use arrow::datatypes::{DataType, Float64Type};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use regex::Regex;
 use serde::Deserialize;
 use serde_json::Value;
 
 use crate::gate::is_gate;
+pub(crate) use crate::table::Table;
 
 /// Prints a measurement past the test runner, which captures what tests print.
 pub(crate) fn print_line(line: &str) {
@@ -308,51 +305,6 @@ pub(crate) fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A Parquet table, read whole with the plain reader of the Arrow library.
-pub(crate) struct Table(RecordBatch);
-
-impl Table {
-    pub(crate) fn read(file: &Path) -> Self {
-        let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(file).unwrap()).unwrap();
-        let schema = reader.schema().clone();
-        let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
-        Self(concat_batches(&schema, &batches).unwrap())
-    }
-
-    pub(crate) fn rows(&self) -> usize {
-        self.0.num_rows()
-    }
-
-    pub(crate) fn texts(&self, column: &str) -> Vec<String> {
-        let text = cast(self.0.column_by_name(column).unwrap(), &DataType::Utf8).unwrap();
-        text.as_string::<i32>().iter().map(|v| v.unwrap_or_default().to_owned()).collect()
-    }
-
-    pub(crate) fn names(&self) -> Vec<String> {
-        self.0.schema().fields().iter().map(|field| field.name().clone()).collect()
-    }
-
-    /// A column of numbers of any type as doubles; NaN where null.
-    pub(crate) fn numbers(&self, column: &str) -> Vec<f64> {
-        let real = cast(self.0.column_by_name(column).unwrap(), &DataType::Float64).unwrap();
-        real.as_primitive::<Float64Type>().iter().map(|value| value.unwrap_or(f64::NAN)).collect()
-    }
-
-    /// All columns of numbers, by name.
-    pub(crate) fn columns(&self) -> Vec<(String, Vec<f64>)> {
-        self.names().into_iter().map(|name| (name.clone(), self.numbers(&name))).collect()
-    }
-
-    /// One number for each flight and position.
-    pub(crate) fn by_flight(&self, column: &str) -> BTreeMap<(String, String, String), f64> {
-        let keys =
-            self.texts("tail_number").into_iter().zip(self.texts("flight_id")).zip(self.texts("position"));
-        keys.zip(self.numbers(column))
-            .map(|(((tail, flight), position), v)| ((tail, flight, position), v))
-            .collect()
-    }
-}
-
 /// Key-value pairs of a footer.
 pub(crate) type Facts = Vec<(String, String)>;
 
@@ -368,16 +320,9 @@ pub(crate) fn facts(log: &Path) -> Facts {
         .collect()
 }
 
-/// Rewrites some columns and rows of a log as doubles, under an identity.
-pub(crate) fn rewrite(
-    from: &Path,
-    to: &Path,
-    facts: &Facts,
-    columns: impl Fn(&str) -> bool,
-    rows: impl Fn(usize) -> bool,
-) {
+/// Rewrites some rows of a log as doubles, under an identity.
+pub(crate) fn rewrite(from: &Path, to: &Path, facts: &Facts, rows: impl Fn(usize) -> bool) {
     let mut kept = Table::read(from).columns();
-    kept.retain(|(name, _)| columns(name));
     for (_, values) in &mut kept {
         let mut row = 0..;
         values.retain(|_| row.next().is_some_and(&rows));

@@ -11,4 +11,5 @@ mod logs;
 mod markdown;
 mod runs;
 mod same_story;
+mod table;
 mod traces;

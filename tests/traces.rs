@@ -10,7 +10,7 @@ fn a_trace_has_the_log_s_own_times_after_a_break() {
     let own_s = Table::read(log).numbers("time_s");
     let broken = fleet.path("broken.parquet");
     let keep = |row: usize| !(3000..3400).contains(&row);
-    rewrite(log, &broken, &crate::harness::facts(log), |_| true, keep);
+    rewrite(log, &broken, &crate::harness::facts(log), keep);
     let part = ["--part", "EMA-27-1040", "--trace", "trace.parquet"];
     fleet.run_ok(&[&["estimate", "broken.parquet"][..], &part].concat());
     let times_s = Table::read(&fleet.path("trace.parquet")).numbers("time_s");

@@ -1,9 +1,6 @@
 //! Logs in shapes that are made row by row give the numbers of the plain ones. The other shapes are in
 //! `tests/data/logs.md`.
 
-use std::fmt::Write;
-use std::path::Path;
-
 use crate::harness::{Table, TestFleet, facts, without};
 
 /// Every number of every record, without what names the log and the settings it was read by.
@@ -62,28 +59,4 @@ fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
         checked.contains("2 logs checked, 0 failed") && checked.contains("2.parquet#N412FP/"),
         "{checked}"
     );
-}
-
-/// The log of a Delta table, by the format's own specification: a version adds files, a later one removes one.
-pub(crate) fn delta_log(table: &Path, added: &[&str], removed: &[&str]) {
-    let log = table.join("_delta_log");
-    std::fs::create_dir_all(&log).unwrap();
-    let schema = r#"{\"type\":\"struct\",\"fields\":[{\"name\":\"time_s\",\"type\":\"double\",\"nullable\":true,\"metadata\":{}}]}"#;
-    let mut first = format!(
-        "{{\"protocol\":{{\"minReaderVersion\":1,\"minWriterVersion\":2}}}}\n{{\"metaData\":{{\"id\":\"af23c9d7-fff1-4a5a-a2c8-55c59bd782aa\",\"format\":{{\"provider\":\"parquet\",\"options\":{{}}}},\"schemaString\":\"{schema}\",\"partitionColumns\":[],\"configuration\":{{}}}}}}\n"
-    );
-    for name in added {
-        let size = std::fs::metadata(table.join(name)).unwrap().len();
-        writeln!(
-            first,
-            "{{\"add\":{{\"path\":\"{name}\",\"partitionValues\":{{}},\"size\":{size},\"modificationTime\":0,\"dataChange\":true}}}}"
-        )
-        .unwrap();
-    }
-    std::fs::write(log.join("00000000000000000000.json"), first).unwrap();
-    let remove = |name: &&str| {
-        format!("{{\"remove\":{{\"path\":\"{name}\",\"deletionTimestamp\":0,\"dataChange\":true}}}}\n")
-    };
-    std::fs::write(log.join("00000000000000000001.json"), removed.iter().map(remove).collect::<String>())
-        .unwrap();
 }

@@ -1,4 +1,4 @@
 //! Logs: layouts that are made row by row, and logs with known gaps.
 
 mod ground_truth;
-pub(crate) mod layouts;
+mod layouts;

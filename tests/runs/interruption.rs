@@ -83,29 +83,6 @@ pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
     stored_records(&fleet.path("results")).unwrap()
 }
 
-/// Two runs at once: one works, the other names it or waits; nothing is done twice.
-#[test]
-fn two_runs_at_once_store_each_flight_once() {
-    let plain = small();
-    plain.run_ok(&["run"]);
-    let fleet = small();
-    let run = |args: &[&str]| {
-        fleet.command(args).stdout(null()).stderr(std::process::Stdio::piped()).spawn().unwrap()
-    };
-    let children = [run(&["run"]), run(&["run"]), run(&["run", "--wait", "2m"])];
-    for child in children {
-        let result = child.wait_with_output().unwrap();
-        let errors = String::from_utf8_lossy(&result.stderr).into_owned();
-        match result.status.code() {
-            Some(0) => {}
-            Some(3) => assert!(errors.contains("pid"), "{errors}"),
-            code => panic!("{code:?}: {errors}"),
-        }
-    }
-    assert_eq!(whole_flights(&fleet), 40);
-    assert_eq!(fleet.exported(), plain.exported());
-}
-
 /// A run that waits for another hears the first signal.
 #[cfg(target_os = "linux")]
 #[test]

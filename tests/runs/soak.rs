@@ -52,7 +52,7 @@ fn fly(source: &Path, to: &Path, flight: usize, first: usize) {
             _ => {}
         }
     }
-    rewrite(source, to, &labels, |_| true, |row| (first..ROWS).contains(&row));
+    rewrite(source, to, &labels, |row| (first..ROWS).contains(&row));
 }
 
 /// Runs to the end, or until it is killed; returns the largest memory seen, KiB.

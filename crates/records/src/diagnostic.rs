@@ -169,39 +169,6 @@ impl fmt::Display for Diagnostic {
 mod tests {
     use super::*;
 
-    /// A name may hold line feeds; what follows them must not look like a message of the program.
-    #[test]
-    fn a_name_with_line_feeds_cannot_forge_a_diagnostic() {
-        let name = "a\nerror[forged]: b";
-        let diagnostic = Diagnostic {
-            column: Some(name.to_owned()),
-            found: Some(name.to_owned()),
-            ..Diagnostic::new("column_missing", name).in_file(name).hint(name)
-        };
-        let shown = diagnostic.to_string();
-        assert!(shown.lines().skip(1).all(|line| !line.starts_with("error[")), "{shown}");
-        assert!(shown.contains("a[U+000A]error[forged]: b\n  file    a[U+000A]error"), "{shown}");
-    }
-
-    #[test]
-    fn credentials_in_a_quoted_line_are_masked_on_the_terminal_and_in_json() {
-        let line = "files = [\"s3://AKIA:hunter2@fleet/*.parquet\", \"az://c/a?sv=1&sig=hunter2\", \"s3://b/?.parquet\"]";
-        let diagnostic = Diagnostic {
-            line: Some((3, 1)),
-            text: Some(line.to_owned()),
-            ..Diagnostic::new("object_address", "`az://c/a?sig=hunter2` is no address")
-                .in_file("pipeline.toml")
-        };
-        for shown in [diagnostic.to_string(), serde_json::to_string(&diagnostic).unwrap()] {
-            assert!(!shown.contains("hunter2"), "{shown}");
-            assert!(
-                shown.contains("s3://***@fleet/*.parquet") && shown.contains("s3://b/?.parquet"),
-                "{shown}"
-            );
-        }
-        assert!(matches!(mask_credentials("s3://fleet/a@b.parquet"), Cow::Borrowed(_)));
-    }
-
     /// A mapped column may have any name, also of 64 MiB; its first characters identify it.
     #[test]
     fn a_long_or_hostile_name_leaves_a_short_and_harmless_message() {

@@ -208,24 +208,14 @@ mod tests {
         for (name, wanted) in names.map(|line| line.split_once("; ").unwrap()) {
             assert_eq!(inferred(name).as_deref(), Some(wanted), "{name}");
         }
-        for other in
-            ["airspeed_kt", "aileron_left_motor_torque_nm", "AIL_L_MOTOR_REF_DEG", "rudder_output_rate_deg_s"]
-        {
+        for other in [
+            "airspeed_kt",
+            "aileron_left_motor_torque_nm",
+            "aileron_left_motor_current",
+            "AIL_L_MOTOR_REF_DEG",
+            "rudder_output_rate_deg_s",
+        ] {
             assert_eq!(inferred(other), None, "{other}");
         }
-    }
-
-    #[test]
-    fn sensors_and_other_quantities_are_told_from_positions() {
-        let a = ParsedName::of("aileron_left_motor_a_deg", true).unwrap();
-        assert_eq!((a.position.as_deref(), a.sensor), (Some("aileron_left"), Some(0)));
-        assert_eq!(a.pattern, "{position}_motor_a_deg");
-        let second = ParsedName::of("motor_2_deg", false).unwrap();
-        assert_eq!(
-            (second.position.as_deref(), second.pattern.as_str()),
-            (Some("2"), "motor_{position}_deg")
-        );
-        assert_eq!(ParsedName::of("aileron_left_motor_current", true), None);
-        assert!(inferred("aileron_left_motor_temp_degc").unwrap().starts_with("temperature"));
     }
 }

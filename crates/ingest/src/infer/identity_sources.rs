@@ -313,11 +313,5 @@ mod tests {
             assert_eq!(fact_of(name), Some(fact), "{name}");
         }
         assert_eq!(["aircraft_type", "flight_phase", "dep"].map(fact_of), [None; 3]);
-        let hive =
-            folders(Path::new("l/tail=N412FP/off=2026-11-19T04%3A13%3A00Z/actuator=left/part-0.parquet"));
-        assert_eq!(hive[&IdentityField::DepartureUtc], "off");
-        assert_eq!(hive[&IdentityField::Position], "actuator");
-        let path = Path::new("l/tail=TC%2DJRA/part-0.parquet");
-        assert_eq!(folder_value(path, "tail").as_deref(), Some("TC-JRA"));
     }
 }

@@ -56,7 +56,6 @@ pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io:
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
 

@@ -300,7 +300,6 @@ pub fn zone(name: &str) -> Result<TimeZone, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mapping::TailAlias;
 
     fn mapping(format: Option<&str>, zone: Option<&str>) -> IdentityMapping {
         IdentityMapping {
@@ -310,32 +309,15 @@ mod tests {
         }
     }
 
-    /// In one name, or the date in a folder and the time in the name of the file.
     #[test]
-    fn named_groups_of_a_path_become_facts() {
-        for (path, expression, format, flight, departure) in [
-            (
-                "/logs/N412FP/0413_20261119T120409Z.parquet",
-                r"(?<tail_number>N\w+)/(?<flight_id>\d+)_(?<departure_utc>\w+)\.parquet$",
-                "%Y%m%dT%H%M%SZ",
-                "0413",
-                "2026-11-19T12:04:09Z",
-            ),
-            (
-                "/logs/N412FP/2026-11-19/0413.parquet",
-                r"(?<tail_number>N\w+)/(?<departure_date>[\d-]+)/(?<departure_time>\d{4})\.parquet$",
-                "%Y-%m-%dT%H%M",
-                "20261119T041300Z",
-                "2026-11-19T04:13:00Z",
-            ),
-        ] {
-            let facts = from_path(Path::new(path), expression).unwrap();
-            let mapping = mapping(Some(format), Some("UTC"));
-            let at = instant(&facts[&IdentityField::DepartureUtc], &mapping).unwrap();
-            let found = read(&facts, &mapping, Some(at)).unwrap().flight;
-            assert_eq!([found.tail_number.as_str(), found.flight_id.as_str()], ["N412FP", flight]);
-            assert_eq!(found.departure_utc.to_string(), departure);
-        }
+    fn a_date_in_a_folder_and_a_time_in_the_name_of_the_file_are_a_departure() {
+        let expression = r"(?<tail_number>N\w+)/(?<departure_date>[\d-]+)/(?<departure_time>\d{4})\.parquet$";
+        let facts = from_path(Path::new("/logs/N412FP/2026-11-19/0413.parquet"), expression).unwrap();
+        let mapping = mapping(Some("%Y-%m-%dT%H%M"), Some("UTC"));
+        let at = instant(&facts[&IdentityField::DepartureUtc], &mapping).unwrap();
+        let found = read(&facts, &mapping, Some(at)).unwrap().flight;
+        assert_eq!([found.tail_number.as_str(), found.flight_id.as_str()], ["N412FP", "20261119T041300Z"]);
+        assert_eq!(found.departure_utc.to_string(), "2026-11-19T04:13:00Z");
     }
 
     /// Istanbul keeps UTC+3 all year since 2016.
@@ -362,38 +344,5 @@ mod tests {
             assert!(ClockSpan { origin, earliest_s: 0.0, latest_s: 1.0 }.start(&there).is_err());
         }
         assert_eq!(instant("2026-10-25T03:30:00", &there).unwrap().to_string(), "2026-10-25T02:30:00Z");
-    }
-
-    /// One logger that flew in two aircraft, one after the other.
-    #[test]
-    fn a_loggers_own_name_is_the_registration_of_its_day() {
-        let alias = |tail: &str, from: Option<&str>, until: Option<&str>| TailAlias {
-            logged: "QAR 7".into(),
-            tail_number: tail.into(),
-            from: from.map(|day| day.parse().unwrap()),
-            until: until.map(|day| day.parse().unwrap()),
-        };
-        let first = alias("N1", None, Some("2026-03-31"));
-        let tail_aliases = vec![first, alias("N2", Some("2026-04-01"), None)];
-        let m = IdentityMapping { tail_aliases, ..mapping(None, None) };
-        for (logged, day, tail) in
-            [("QAR 7", "2026-03-31", "N1"), (" QAR 7", "2026-04-01", "N2"), ("N3", "2026-04-01", "N3")]
-        {
-            let facts = IdentityFields::from([(IdentityField::TailNumber, logged.to_owned())]);
-            let found = read(&facts, &m, format!("{day}T23:59:00Z").parse().ok()).unwrap();
-            assert_eq!(found.flight.tail_number.as_str(), tail, "{day}");
-        }
-    }
-
-    #[test]
-    fn a_log_without_a_tail_reports_where_it_was_searched() {
-        let mut m = mapping(None, None);
-        m.metadata.insert(IdentityField::TailNumber, "ac_reg".into());
-        m.path = Some("(?<flight_id>x)".into());
-        let fault = read(&IdentityFields::new(), &m, None).unwrap_err();
-        assert!(fault.0.code == "identity_missing" && fault.0.message.contains("tail_number"), "{fault:?}");
-        let looked =
-            "looked in metadata `ac_reg`, path by `(?<flight_id>x)`, which has no group `tail_number`";
-        assert_eq!(fault.0.found.as_deref(), Some(looked));
     }
 }

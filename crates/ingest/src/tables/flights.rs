@@ -240,31 +240,12 @@ fn noon(date: civil::Date) -> Result<Timestamp, String> {
 mod tests {
     use super::*;
 
-    const HEADER: &str = "tail_number,flight_id,departure_utc,flight_hours\n";
-
-    /// The flights of a table with this text.
-    fn read(text: &str, names: &ColumnAliases) -> Result<Flights, Vec<Error>> {
+    /// The flights of a table with these rows.
+    fn read(rows: &str) -> Result<Flights, Vec<Error>> {
         let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), text).unwrap();
-        Flights::read(file.path(), names, &IdentityMapping::default())
-    }
-
-    #[test]
-    fn a_log_finds_its_flight_by_path_or_by_its_identity() {
-        let text = "reg,leg,off,flight_hours,path\nN1,0413,2026-11-19T04:13:00Z,2.5,N1/a.parquet\nN1,0500,2026-11-20 05:00,,\n";
-        let names = [("tail_number", "reg"), ("flight_id", "leg"), ("departure_utc", "off")];
-        let names = names.map(|(ours, theirs)| (ours.to_owned(), theirs.to_owned())).into();
-        let flights = read(text, &names).unwrap();
-        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), None);
-        assert_eq!(
-            (by_path[&IdentityField::FlightId].as_str(), by_path[&IdentityField::FlightHours].as_str()),
-            ("0413", "2.5")
-        );
-        let said = IdentityFields::from([(IdentityField::TailNumber, "N1".into())]);
-        let departure = "2026-11-20T05:00:00Z".parse().ok();
-        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, departure);
-        assert_eq!(by_departure[&IdentityField::FlightId], "0500");
-        assert!(flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), None).is_empty());
+        std::fs::write(file.path(), format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}"))
+            .unwrap();
+        Flights::read(file.path(), &ColumnAliases::new(), &IdentityMapping::default())
     }
 
     /// The hours of the row that is found for a log of this id and departure.
@@ -280,7 +261,7 @@ mod tests {
     fn an_id_that_recurs_is_found_by_departure() {
         let row = |day: u32| format!("N1,FP100,2026-03-{day:02}T06:10:00Z,{day}.5\n");
         let rows: String = (1..=9).map(row).collect();
-        let flights = read(&format!("{HEADER}{rows}"), &ColumnAliases::new()).unwrap();
+        let flights = read(&rows).unwrap();
         for (departure, wanted) in [
             (None, None),
             (Some("2026-03-04T06:25:00Z"), Some("4.5")),
@@ -296,7 +277,6 @@ mod tests {
     /// Two legs of one day and one of the next, each with its date alone: the log's clock has the time.
     #[test]
     fn a_date_alone_is_joined_to_the_log_of_its_id_or_to_the_only_one_of_its_day() {
-        let read = |rows: &str| read(&format!("{HEADER}{rows}"), &ColumnAliases::new());
         let flights = read("N1,A,2026-03-04,2\nN1,B,2026-03-04,3\nN1,C,2026-03-05,4\n").unwrap();
         for (id, departure, wanted) in [
             (Some("A"), "2026-03-04T23:10:00Z", Some("2")),

@@ -68,32 +68,3 @@ fn removal(text: &str) -> Result<Option<Timestamp>, String> {
     }
     utc(text).map(Some)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Result<Installations, Vec<Error>> {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), text).unwrap();
-        installations(file.path(), &ColumnAliases::new())
-    }
-
-    const HEADER: &str = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n";
-
-    /// A date is its midnight; 9999-12-31 is what SAP and most SQL schemas write for "until further notice".
-    #[test]
-    fn removals_are_dates_in_utc_or_open() {
-        let removed = |text: &str| {
-            let stays = read(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,{text}\n")).ok()?;
-            let stay = stays.iter().next().unwrap();
-            assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
-            Some(stay.removed_utc.map(|at| at.to_string()))
-        };
-        assert_eq!(removed("2026-02-01 06:00"), Some(Some("2026-02-01T06:00:00Z".to_owned())));
-        for open in ["9999-12-31", "9999-12-31T23:59:59Z", "9999-12-31 00:00", "open", "NULL", "-", "N/A"] {
-            assert_eq!(removed(open), Some(None), "{open}");
-        }
-        assert_eq!(removed("later"), None);
-    }
-}

@@ -595,20 +595,6 @@ mod tests {
         assert_eq!(base.segments.len(), 1);
     }
 
-    /// A computer's clock ticks every 15.6 ms while samples come every 2.5 ms.
-    #[test]
-    fn rows_under_a_coarse_clock_are_spread_evenly() {
-        let (tick, step) = (0.015_625, 0.002_5);
-        let truth: Vec<f64> =
-            (0..8000).map(|k| f64::from(k) * step + if k < 4000 { 0.0 } else { 3.0 }).collect();
-        let mut coarse = stamps(&truth.iter().map(|t| (t / tick).floor() * tick).collect::<Vec<_>>());
-        let base = build_time_base(&mut coarse, &ClockMapping { tick_s: Some(tick), ..usual() }).unwrap();
-        assert_eq!((base.kept.is_none(), base.segments.clone()), (true, vec![0..4000, 4000..8000]));
-        assert!((base.step_s / step - 1.0).abs() < 0.01, "{} s", base.step_s);
-        let worst = coarse.seconds.iter().zip(&truth).map(|(s, t)| (s - t).abs()).fold(0.0, f64::max);
-        assert!(worst < tick, "{worst} s");
-    }
-
     #[test]
     fn rows_without_a_timestamp_get_one_from_the_rate() {
         let nan = f64::NAN;
@@ -621,19 +607,26 @@ mod tests {
         assert_eq!(base.breaks, [(4, 9.0)]);
     }
 
-    /// A recorder at 200 Hz whose stamps are off by up to 3 ms either way; it rests for a second after row 3000.
+    /// A computer's clock ticks every 15.6 ms while samples come every 2.5 ms; the stamps of a recorder at 200 Hz are off by
+    /// up to 3 ms either way. Both rest after half of their rows.
     #[test]
-    fn rows_whose_stamps_jitter_are_spread_evenly() {
-        let truth = |row: u32| 0.005 * f64::from(row) + if row < 3000 { 0.0 } else { 1.0 };
-        let jitter = |row: u32| 0.006 * ((f64::from(row).sin() * 43_758.5).rem_euclid(1.0) - 0.5);
-        let mut jittered = stamps(&(0..6000).map(|row| truth(row) + jitter(row)).collect::<Vec<_>>());
-        let base = build_time_base(&mut jittered, &usual()).unwrap();
-        assert_eq!(
-            (base.kept, base.segments, base.repairs.jittered),
-            (None, vec![0..3000, 3000..6000], 6000)
-        );
-        assert!((base.step_s / 0.005 - 1.0).abs() < 0.01, "{} s", base.step_s);
-        assert!((0..6000).all(|row| (jittered.seconds[row as usize] - truth(row)).abs() < 0.008));
+    fn rows_under_a_coarse_or_a_jittering_clock_are_spread_evenly() {
+        type Stamp<'a> = &'a dyn Fn(usize, f64) -> f64;
+        const TICK_S: f64 = 0.015_625;
+        let coarse = |_, t: f64| (t / TICK_S).floor() * TICK_S;
+        let jitter = |row: usize, t| t + 0.006 * (((row as f64).sin() * 43_758.5).rem_euclid(1.0) - 0.5);
+        for (stamp, rows, step_s, rest_s, tick_s, jittered, tolerance_s) in [
+            (&coarse as Stamp<'_>, 8000, 0.0025, 3.0, Some(TICK_S), 0, TICK_S),
+            (&jitter, 6000, 0.005, 1.0, None, 6000, 0.008),
+        ] {
+            let truth = |row: usize| step_s * row as f64 + if row < rows / 2 { 0.0 } else { rest_s };
+            let mut found = stamps(&(0..rows).map(|row| stamp(row, truth(row))).collect::<Vec<_>>());
+            let base = build_time_base(&mut found, &ClockMapping { tick_s, ..usual() }).unwrap();
+            assert_eq!((base.kept, base.repairs.jittered), (None, jittered));
+            assert_eq!(base.segments, [0..rows / 2, rows / 2..rows]);
+            assert!((base.step_s / step_s - 1.0).abs() < 0.01, "{} s", base.step_s);
+            assert!((0..rows).all(|row| (found.seconds[row] - truth(row)).abs() < tolerance_s));
+        }
     }
 
     proptest! {

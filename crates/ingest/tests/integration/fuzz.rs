@@ -7,13 +7,14 @@ use std::sync::Arc;
 use bytes::Bytes;
 use ingest::tables::ColumnAliases;
 use ingest::{ClockMapping, Error, Flights, Geometry, IdentityMapping, Log, LogFiles, SampleFilter};
-use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::properties::{WriterProperties, WriterVersion};
 
 use self::edits::{Choices, edit_text, overwrite};
+use crate::layouts::{place, write_batch};
+
 #[path = "../../../../tests/fuzz/edits.rs"]
 mod edits;
 
@@ -30,6 +31,7 @@ fn logs() -> Vec<Vec<u8>> {
     let wide = files.iter().find(|file| file.to_str().unwrap().contains("pyarrow")).unwrap();
     let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(wide).unwrap()).unwrap();
     let batch = reader.build().unwrap().next().unwrap().unwrap();
+    let (_dir, file) = place("log.parquet");
     let encodings = [(Encoding::PLAIN, false), (Encoding::BYTE_STREAM_SPLIT, false), (Encoding::PLAIN, true)];
     for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
         for (encoding, is_coded) in encodings {
@@ -43,12 +45,8 @@ fn logs() -> Vec<Vec<u8>> {
                 .set_data_page_row_count_limit(60)
                 .set_write_batch_size(20)
                 .set_max_row_group_row_count(Some(150));
-            let mut bytes = Vec::new();
-            let mut writer =
-                ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties.build())).unwrap();
-            writer.write(&batch).unwrap();
-            writer.close().unwrap();
-            all.push(bytes);
+            write_batch(&file, &batch, properties.build());
+            all.push(std::fs::read(&file).unwrap());
         }
     }
     all

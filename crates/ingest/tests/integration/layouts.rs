@@ -318,21 +318,6 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
     }
 }
 
-/// A rotary actuator by the torque and the angles that its fields note.
-#[test]
-fn units_of_the_arrow_fields_are_proposed() {
-    let field = |name: &str, unit: &str| {
-        let noted = [("unit".to_owned(), unit.to_owned())];
-        Field::new(name, DataType::Float64, true).with_metadata(noted.into())
-    };
-    let fields = [("time_s", "s"), ("rudder_motor", "deg"), ("rudder_screw", "rad"), ("rudder_load", "N·m")];
-    let (_dir, file) = place("x.parquet");
-    write_fields(&file, fields.map(|(name, unit)| field(name, unit)).to_vec(), vec![reals([0.0, 0.1]); 4]);
-    let found = ingest::infer::propose(&file).unwrap();
-    let units: Vec<_> = found.channels.values().flatten().map(|(_, unit)| *unit).collect();
-    assert_eq!(units, [Some(Unit::Degree), Some(Unit::Radian), Some(Unit::NewtonMetre)]);
-}
-
 /// The departure of a log of this name, from what the log itself says.
 pub(crate) fn identity(name: &str, m: &Mapping, columns: &[(&str, ArrayRef)]) -> Result<String, Diagnostic> {
     let (_dir, file) = place(name);

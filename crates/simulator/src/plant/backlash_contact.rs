@@ -273,29 +273,25 @@ mod tests {
         Contact { law, ..Contact::default() }
     }
 
+    /// Straight flanks add nothing to a gap of 100 µm, even when they differ. Beyond the toe, soft and exponential flanks are
+    /// `p = F/K + (1 − share) depth`. Pure Hertz, `p = (F/K)^(2/3) ref^(1/3)`: the tangent at a load meets zero load at a third
+    /// of the penetration, and the intercept of a line is near that.
     #[test]
-    fn linear_flanks_extrapolate_to_the_gap_even_when_they_differ() {
+    fn flanks_extrapolate_to_the_gap_and_the_asymptote_of_their_law() {
         let unequal = Contact { lower_stiffness_factor: 0.6, ..contact(ContactLaw::Linear) };
-        assert!((unequal.extrapolated_gap_m(2400.0, 8000.0) - 100e-6).abs() < 1e-15);
-    }
-
-    /// Beyond the toe, soft and exponential flanks are `p = F/K + (1 − share) depth`.
-    #[test]
-    fn a_toe_below_the_band_adds_its_asymptote() {
         let soft = contact(ContactLaw::Soft { share: 0.4, depth_m: 20e-6 });
         let toe = Contact { lower_law: Some(ContactLaw::Toe { share: 0.5, depth_m: 5e-6 }), ..soft };
-        assert!((soft.extrapolated_gap_m(2400.0, 8000.0) - 124e-6).abs() < 1e-12);
-        assert!((toe.extrapolated_gap_m(2400.0, 8000.0) - 114.5e-6).abs() < 1e-9);
-    }
-
-    /// Pure Hertz: `p = (F/K)^(2/3) ref^(1/3)`, here fitted by a least-squares line in R:
-    /// the tangent at a load meets zero load at a third of the penetration, so the line's intercept is near that.
-    #[test]
-    fn hertzian_flanks_extrapolate_to_about_a_third_of_their_penetration() {
         let hertz = contact(ContactLaw::Hertz { share: 1.0, reference_m: 100e-6 });
         let penetration_m = (5200.0_f64 / 5e7).powf(2.0 / 3.0) * 100e-6_f64.powf(1.0 / 3.0);
-        let extra_m = 0.5 * (hertz.extrapolated_gap_m(2400.0, 8000.0) - 100e-6);
-        assert!((extra_m / (penetration_m / 3.0) - 1.0).abs() < 0.1, "{extra_m:e}");
+        for (contact, added_m, tolerance_m) in [
+            (unequal, 0.0, 1e-15),
+            (soft, 24e-6, 1e-12),
+            (toe, 14.5e-6, 1e-9),
+            (hertz, penetration_m / 1.5, 0.1 * penetration_m / 1.5),
+        ] {
+            let found_m = contact.extrapolated_gap_m(2400.0, 8000.0) - 100e-6;
+            assert!((found_m - added_m).abs() < tolerance_m, "{found_m:e} of {contact:?}");
+        }
     }
 
     /// Force is the derivative of the potential, stiffness that of the force.

@@ -334,15 +334,6 @@ mod tests {
     }
 
     #[test]
-    fn a_periodic_error_repeats_with_the_travel() {
-        let error = PeriodicError { amplitude: 4e-6, period: 5e-3, phase_rad: 0.3 };
-        let channel = Channel { periodic: vec![error], ..Channel::default() };
-        let at = |x: f64| read(&channel, x, 1)[0] - x;
-        assert!((at(0.0) - 4e-6 * 0.3_f64.sin()).abs() < 1e-15);
-        assert!((at(7e-3) - at(2e-3)).abs() < 1e-15 && (at(2e-3) + at(4.5e-3)).abs() < 1e-15);
-    }
-
-    #[test]
     fn a_slow_channel_is_held_between_its_samples() {
         let profile = Profile { duration_s: 10.0, sample_rate_hz: 100.0, ..Profile::default() };
         let channel = Channel { rate_hz: 40.0, ..Channel::default() };
@@ -353,23 +344,28 @@ mod tests {
         assert_eq!(held.len(), 1000);
     }
 
+    /// Of eleven samples of a value, the error of one: a perfect channel has none; gain, bias and drift add up to the last
+    /// sample; a bend peaks at its stated height at 1/√3 of the stroke; a periodic error repeats with the travel.
     #[test]
-    fn a_perfect_channel_shows_the_truth() {
-        assert_eq!(read(&Channel::default(), 0.123, 50), vec![0.123; 50]);
-    }
-
-    #[test]
-    fn gain_bias_and_drift_add_up_to_the_last_sample() {
-        let channel = Channel { gain_error: 0.1, bias: 2.0, drift: 5.0, ..Channel::default() };
-        let values = read(&channel, 10.0, 11);
-        assert!((values[0] - 13.0).abs() < 1e-12 && (values[10] - 18.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn nonlinearity_peaks_at_its_stated_height() {
-        let channel = Channel { nonlinearity: 20e-6, ..Channel::default() };
-        let at = |u: f64| read(&channel, u, 1)[0] - u;
-        assert!((at(1.0 / 3f64.sqrt()) - 20e-6).abs() < 1e-12 && at(1.0).abs() < 1e-15);
+    fn errors_of_a_channel_follow_their_formulas() {
+        let sloped = Channel { gain_error: 0.1, bias: 2.0, drift: 5.0, ..Channel::default() };
+        let bent = Channel { nonlinearity: 20e-6, ..Channel::default() };
+        let error = PeriodicError { amplitude: 4e-6, period: 5e-3, phase_rad: 0.3 };
+        let periodic = Channel { periodic: vec![error], ..Channel::default() };
+        let wave = |turns: f64| 4e-6 * (TAU * turns + 0.3).sin();
+        for (channel, value, sample, error) in [
+            (Channel::default(), 0.123, 10, 0.0),
+            (sloped.clone(), 10.0, 0, 3.0),
+            (sloped, 10.0, 10, 8.0),
+            (bent.clone(), 1.0 / 3f64.sqrt(), 0, 20e-6),
+            (bent, 1.0, 0, 0.0),
+            (periodic.clone(), 0.0, 0, wave(0.0)),
+            (periodic.clone(), 7e-3, 0, wave(0.4)),
+            (periodic, 4.5e-3, 0, wave(0.9)),
+        ] {
+            let found = read(&channel, value, 11)[sample] - value;
+            assert!((found - error).abs() <= 1e-15 * value.max(1.0), "{found} for {error} of {channel:?}");
+        }
     }
 
     #[test]
