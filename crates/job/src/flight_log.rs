@@ -501,7 +501,6 @@ pub fn catch_panic<T>(
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use records::{FlightId, TailNumber};
 

@@ -40,17 +40,6 @@ fn a_stream_is_the_batch_over_whole_flights() {
     }
 }
 
-/// Before a position is measured there is no S; from there the stream is the batch of what follows.
-#[test]
-fn a_stream_starts_at_the_first_measurement() {
-    let (flight, filter) = (fly(5, 100e-6, 1.0, 100.0), filter(100.0, 10.0));
-    let (mut dx_m, load_n) = channels(&flight);
-    dx_m[..40].fill(f64::NAN);
-    let found = streamed(Stream::steady_state(&filter), &dx_m, load_n);
-    assert!(found[..40].iter().all(|s| s.is_nan()));
-    assert_eq!(found[40..], batch(&filter, &dx_m[40..], &load_n[40..]));
-}
-
 proptest! {
     /// After a restart, with any missing samples and loads after the first sample: bitwise identical.
     #[test]

@@ -18,29 +18,6 @@ fn codes(line: &str, by: &str) -> Vec<String> {
     found.into_iter().map(|diagnostic| diagnostic.code).collect()
 }
 
-#[test]
-fn a_good_configuration_is_taken_and_its_paths_start_from_its_folder() {
-    let config = parse(GOOD).unwrap();
-    assert_eq!(config.store(), Path::new("fleet/results"));
-    assert_eq!(config.parts.len(), 1);
-}
-
-#[test]
-fn all_unknown_keys_are_reported_at_once() {
-    let text = GOOD.replace("unit = \"s\"", "unitt = \"s\"").replace("bandwidth_hz", "bandwith_hz");
-    let text = format!("{text}\n[treend]\nx = 1\n");
-    let codes: Vec<_> = parse(&text).unwrap_err().into_iter().map(|c| (c.code, c.hint.unwrap())).collect();
-    let wanted = ["`unit`?", "`bandwidth_hz`?", "`trend`?"];
-    assert_eq!(codes, wanted.map(|hint| ("unknown_key".to_owned(), hint.to_owned())));
-}
-
-#[test]
-fn a_missing_channel_asks_for_its_table() {
-    let found =
-        parse(&GOOD.replace("[channel.load]\ncolumn = \"{position}_load\"\nunit = \"N\"\n", "")).unwrap_err();
-    assert!(found[0].hint.as_ref().unwrap().contains("`[channel.load]`"), "{found:?}");
-}
-
 /// Each row of `refused.json`: a line of the good text, what replaces it, and the code.
 #[test]
 fn what_cannot_be_meant_is_refused_by_a_stable_code() {
@@ -48,17 +25,6 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
     assert!(cases.len() > 40);
     for [line, by, code] in cases {
         assert_eq!(codes(&line, &by), [code], "{by}");
-    }
-}
-
-/// The page lists the ranges that are checked.
-#[test]
-fn the_documentation_lists_every_range() {
-    let page = include_str!("../../../../docs/keys.md");
-    for (key, least, most) in job::config::limits::PLAUSIBLE {
-        let range = format!(" Range {least:e}…{most:e}. |");
-        let is_listed = page.lines().any(|l| l.starts_with(&format!("| `{key}` |")) && l.ends_with(&range));
-        assert!(is_listed, "docs/keys.md lacks the range of {key}");
     }
 }
 
@@ -94,22 +60,15 @@ fn the_digest_follows_what_moves_a_number() {
     ] {
         assert_ne!(digest(line, by), base, "{by}");
     }
+    let second = GOOD[GOOD.find("[part.EMA]").unwrap()..].replace("part.EMA", "part.EMB");
     for (line, by) in [
         ("limit_m = 150e-6", "limit_m = 160e-6"),
         ("files = [\"logs/*.parquet\"]", "files = [\"elsewhere/*.parquet\"]"),
         ("[part.EMA]", "[part.EMA] # a comment"),
+        ("[part.EMA]", &format!("{second}\n[part.EMA]")),
     ] {
         assert_eq!(digest(line, by), base, "{by}");
     }
-}
-
-/// Another part's settings are not this one's.
-#[test]
-fn a_second_part_leaves_the_first_ones_digest_alone() {
-    let ema = PartNumber::new("EMA").unwrap();
-    let second = GOOD[GOOD.find("[part.EMA]").unwrap()..].replace("part.EMA", "part.EMB");
-    let both = parse(&format!("{GOOD}\n{second}")).unwrap();
-    assert_eq!(both.digest_of_part(&ema), parse(GOOD).unwrap().digest_of_part(&ema));
 }
 
 #[test]
@@ -170,41 +129,4 @@ fn every_layout_of_the_documentation_is_read() {
         let whole = text.replace("\"EMA-27-1060\"", "\"EMA\"") + &left_out + tail;
         assert!(parse(&whole).is_ok(), "{:?} in\n{whole}", parse(&whole).err());
     }
-}
-
-/// Files on disk, in a folder of their own.
-fn written(files: &[(&str, &str)]) -> (tempfile::TempDir, Vec<std::path::PathBuf>) {
-    let folder = tempfile::tempdir().unwrap();
-    let write = |(name, text): &(&str, &str)| {
-        let file = folder.path().join(name);
-        std::fs::write(&file, text).unwrap();
-        file
-    };
-    let paths = files.iter().map(write).collect();
-    (folder, paths)
-}
-
-#[test]
-fn a_second_file_is_laid_over_the_first_key_by_key() {
-    let test = "[store]\npath = \"trial\"\n[channel.load]\nsign = -1\n";
-    let (folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", test)]);
-    let (one, both) = (Config::read(&files[0]).unwrap(), Config::read_layers(&files).unwrap());
-    assert_eq!(both.store(), folder.path().join("trial"));
-    assert_eq!(both.document.channel.load.sign, -1);
-    assert_eq!(both.document.channel.load.column, one.document.channel.load.column);
-    assert_eq!(both.document.part, one.document.part);
-    assert!(both.file.display().to_string().ends_with("trial.toml"));
-}
-
-#[test]
-fn a_diagnostic_names_the_file_and_line_of_its_layer() {
-    let over = "# for the bench\n\n[store]\npaht = \"trial\"\n";
-    let (_folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", over)]);
-    let found = Config::read_layers(&files).unwrap_err();
-    assert_eq!((found[0].code.as_ref(), found[0].line), ("unknown_key", Some((4, 1))));
-    assert!(found[0].file.as_ref().unwrap().ends_with("trial.toml"));
-    let (_folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", "[channel.load]\nsign = 3\n")]);
-    let found = Config::read_layers(&files).unwrap_err();
-    assert_eq!((found[0].code.as_ref(), found[0].line), ("bad_sign", Some((2, 1))));
-    assert!(found[0].file.as_ref().unwrap().ends_with("trial.toml"));
 }

@@ -23,6 +23,9 @@ fn the_reference_of_keys_is_what_the_types_say() {
     if std::env::var_os("FREEPLAY_BLESS").is_some() {
         std::fs::write(&file, &page).unwrap();
     }
+    for (key, ..) in PLAUSIBLE {
+        assert!(page.contains(&format!("\n| `{key}` |")), "the range of {key} is that of no key");
+    }
     let found = std::fs::read_to_string(&file).unwrap();
     assert!(
         found == page,

@@ -410,26 +410,3 @@ fn log_path(config: &Config, path: &Path) -> String {
     };
     path.as_os_str().as_encoded_bytes().utf8_chunks().map(as_text).collect()
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-mod tests {
-    use super::*;
-
-    /// A link to itself cannot be listed, even by root.
-    #[cfg(unix)]
-    #[test]
-    fn what_cannot_be_listed_is_an_error_and_not_left_out() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("logs")).unwrap();
-        std::fs::write(folder.path().join("logs/a.parquet"), "").unwrap();
-        std::os::unix::fs::symlink("b.parquet", folder.path().join("logs/b.parquet")).unwrap();
-        let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
-            .replace("sample-data/logs/**/*.parquet", "logs/*.parquet");
-        let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
-        let found = discover(&config).unwrap();
-        assert_eq!(found.logs.keys().collect::<Vec<_>>(), ["logs/a.parquet"]);
-        let (path, error) = &found.faulty["logs/b.parquet"];
-        assert_eq!((error.code.as_str(), path.ends_with("b.parquet")), ("file_unreadable", true));
-    }
-}

@@ -30,31 +30,27 @@ pub(crate) fn parts_written_out(pattern: &Path) -> usize {
 mod tests {
     use super::*;
 
-    /// Names that Spark, Hadoop, Delta Lake, macOS, rsync and browsers give to files that are no logs.
+    /// Names that Spark, Hadoop, Delta Lake, macOS, rsync and browsers give to files that are no logs; a name that the
+    /// pattern writes out is meant.
     #[test]
     fn unfinished_and_hidden_files_are_no_logs() {
-        let temporary = |path: &str| is_temporary(Path::new(path), Path::new("/logs/**/*"));
-        for path in [
-            "/logs/._a.parquet",
-            "/logs/N1/.a.parquet.tmp",
-            "/logs/N1/a.parquet.tmp",
-            "/logs/_temporary/0/a.parquet",
-            "/logs/_delta_log/00000000000000000010.checkpoint.parquet",
-            "/logs/_SUCCESS",
-            "/logs/N1/_metadata",
-            "/logs/.a.parquet.crc",
+        let all = "/logs/**/*";
+        for (pattern, path, expected) in [
+            (all, "/logs/._a.parquet", true),
+            (all, "/logs/N1/.a.parquet.tmp", true),
+            (all, "/logs/N1/a.parquet.tmp", true),
+            (all, "/logs/_temporary/0/a.parquet", true),
+            (all, "/logs/_delta_log/00000000000000000010.checkpoint.parquet", true),
+            (all, "/logs/_SUCCESS", true),
+            (all, "/logs/N1/_metadata", true),
+            (all, "/logs/.a.parquet.crc", true),
+            (all, "/logs/a.parquet", false),
+            (all, "/logs/_archive/_a.parquet", false),
+            (all, "/logs/tail=N1/a.b.parquet", false),
+            ("/home/.cache/logs/*.parquet", "/home/.cache/logs/a.parquet", false),
+            ("/home/.cache/logs/*.parquet", "/home/.cache/logs/.a.parquet", true),
         ] {
-            assert!(temporary(path), "{path}");
+            assert_eq!(is_temporary(Path::new(path), Path::new(pattern)), expected, "{path}");
         }
-        for path in ["/logs/a.parquet", "/logs/_archive/_a.parquet", "/logs/tail=N1/a.b.parquet"] {
-            assert!(!temporary(path), "{path}");
-        }
-    }
-
-    #[test]
-    fn a_name_that_the_pattern_writes_out_is_meant() {
-        let pattern = Path::new("/home/.cache/logs/*.parquet");
-        assert!(!is_temporary(Path::new("/home/.cache/logs/a.parquet"), pattern));
-        assert!(is_temporary(Path::new("/home/.cache/logs/.a.parquet"), pattern));
     }
 }

@@ -408,29 +408,8 @@ fn compared(inspection: &InspectionRow, row: &TrendRow, records: &[FlownRow]) ->
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_log_in_error_belongs_to_the_one_tail_that_its_path_names() {
-        let tails = ["N412FP", "N4", "D-ABCD"].map(|name| (name.to_owned(), ReportTailRow::default())).into();
-        let of = |path: &str| {
-            let processed_utc = "2026-11-12T00:00:00Z".parse().unwrap();
-            let error_code = "not_parquet".to_owned();
-            let (log_path, tail_number) = (path.to_owned(), None);
-            let mut fault = [ReportLogErrorRow { log_path, tail_number, error_code, processed_utc }];
-            attribute_by_path(&mut fault, &tails, &Installations::default());
-            fault[0].tail_number.clone()
-        };
-        assert_eq!(of("logs/N412FP/20261114.parquet").as_deref(), Some("N412FP"));
-        assert_eq!(of("logs/20261114_N412FP-0330.parquet").as_deref(), Some("N412FP"));
-        assert_eq!(of("logs/D-ABCD_17.parquet").as_deref(), Some("D-ABCD"));
-        // A part of a name, two tails, or none.
-        assert_eq!(of("logs/XN412FP/1.parquet"), None);
-        assert_eq!(of("logs/N412FP/N4.parquet"), None);
-        assert_eq!(of("logs/1.parquet"), None);
-    }
 
     /// The re-shim of a table and the fall that it explains, and another fall a month later.
     #[test]

@@ -280,7 +280,6 @@ impl Drop for WorkerPool<'_> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
     use crate::logs::plan::WorkReason;

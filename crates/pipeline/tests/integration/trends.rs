@@ -1,11 +1,8 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 
-use std::collections::BTreeSet;
-
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::backtest;
-use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
@@ -80,27 +77,20 @@ fn any_number_of_threads_gives_bitwise_identical_assessments() {
     assert_eq!(on(1), on(3));
 }
 
-#[test]
-fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
-    for row in assess(&flown(300), day(299)) {
-        let hours = row.crossing_hours_p50.unwrap();
-        assert!((row.crossing_flights_p50.unwrap() - hours / HOURS_A_DAY).abs() < 1e-6, "{row:?}");
-        let days = (row.likely_utc.unwrap() - day(299)).total(jiff::Unit::Hour).unwrap() / 24.0;
-        assert!((days - hours / HOURS_A_DAY).abs() < 1e-3, "{days} days for {hours} h");
-        assert!(row.not_before_utc < row.likely_utc, "{row:?}");
-    }
-}
-
-/// Silent for sixty days or four hundred: usage has gone on at the unit's own rate, so dates count from the last flight and
+/// One flight a day. Silent for sixty days or four hundred: usage has gone on at the unit's own rate, so dates count from the last flight and
 /// stay when they have passed.
 #[test]
 fn dates_count_from_the_last_flight_at_the_units_own_rate() {
-    let later = assess(&flown(200), day(599));
-    for (row, later) in assess(&flown(200), day(259)).iter().zip(later) {
-        let hours = row.likely_utc.unwrap().duration_since(day(199)).as_secs_f64() / 3600.0;
-        let expected = row.crossing_hours_p50.unwrap() / HOURS_A_DAY * 24.0;
-        assert!((hours / expected - 1.0).abs() < 0.01, "{hours} h, {expected} h");
-        let moved = later.likely_utc.unwrap().duration_since(row.likely_utc.unwrap());
+    let [now, silent, later] = [199, 259, 599].map(|at| assess(&flown(200), day(at)));
+    for (row, tolerance) in now.iter().map(|row| (row, 1e-6)).chain(silent.iter().map(|row| (row, 0.01))) {
+        let flights = row.crossing_hours_p50.unwrap() / HOURS_A_DAY;
+        assert!((row.crossing_flights_p50.unwrap() - flights).abs() < 1e-6, "{row:?}");
+        let days = row.likely_utc.unwrap().duration_since(day(199)).as_secs_f64() / 86_400.0;
+        assert!((days / flights - 1.0).abs() < tolerance, "{days} days for {flights} flights");
+        assert!(row.not_before_utc < row.likely_utc, "{row:?}");
+    }
+    for (silent, later) in silent.iter().zip(later) {
+        let moved = later.likely_utc.unwrap().duration_since(silent.likely_utc.unwrap());
         assert!(moved.abs() <= DAY, "{moved}");
     }
 }
@@ -160,33 +150,6 @@ fn a_fleet_without_a_failure_is_compared_with_the_levels_that_it_has_reached() {
     assert!(held > 0.8 && error < 0.15, "held {held}, median error {error}");
 }
 
-#[test]
-fn recorded_maintenance_is_a_change_point_from_its_date_on() {
-    let booked = fleet::config_with("[logs]", "[logs]\nmaintenance = \"tests/data/maintenance.csv\"");
-    let rows = assess_with(&booked, &flown(200), Some(day(199)));
-    let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
-    let units: Vec<&str> =
-        rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
-    // The re-shim of S05 is of a later year.
-    assert_eq!(units, ["S03"]);
-    let change = &rows[3].change_points[0];
-    assert_eq!((change.departure_utc, change.flight_id.as_deref()), (day(101), Some("3-101")));
-}
-
-#[test]
-fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
-    let axes = |config: &Config| {
-        let rows = assess_with(config, &flown(60), None);
-        rows.into_iter().map(|row| row.usage_axis).collect::<BTreeSet<_>>()
-    };
-    let of_all = "[trend]\naxis = \"flights\"";
-    assert_eq!(axes(&fleet::config_with("[trend]", of_all)), [Some("flights".to_owned())].into());
-    let own = "[part.\"EMA-27-1040\"]";
-    let mut config = fleet::config_with(own, &format!("{own}\naxis = \"reversals\""));
-    config.document.trend.axis = fleet::config_with("[trend]", of_all).document.trend.axis;
-    assert_eq!(axes(&config), [Some("load_reversals".to_owned())].into());
-}
-
 /// The fleet of [`flown`], of which every second flight left no log and no hour meter is read: the flights
 /// table alone has it. Each flight takes two hours in both tables.
 #[test]
@@ -231,44 +194,6 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     // Some of them lie high and some low, by what their scatter allows: 3 % of the mean of all.
     let mean = ratios / f64::from(UNITS);
     assert!((mean - 1.0).abs() < 0.06, "{mean} of the true rates");
-}
-
-/// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
-#[test]
-fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
-    let mut rows = flown(228);
-    for row in rows.iter_mut().filter(|row| unit(row) == 5 && row.flight.departure_utc >= day(200)) {
-        row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap - 12e-6);
-    }
-    let known: Vec<GapRecord> =
-        rows.iter().filter(|row| row.flight.departure_utc < day(200)).cloned().collect();
-    let assess = |rows: &[GapRecord]| assess_with(&config(), rows, None);
-    let states = |rows: &[GapRecord]| -> Vec<records::UnitState> {
-        assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
-    };
-    let nothing = BTreeSet::new();
-    let with_records = [(Some("EMA-27-1040".to_owned()), "S05".to_owned())].into();
-    let night = |before: &[records::UnitState], with_records, config: &Config| {
-        changes(config, before, &assess(&rows), RunFacts { run_id: "now", with_records, moved: &[] })
-    };
-    let found = night(&states(&known), &with_records, &config());
-    let [change] = &found.changed[..] else { panic!("{:?}", found.changed) };
-    assert_eq!(change.serial_number, "S05");
-    assert_eq!(change.new_events.len(), 1, "{change:?}");
-    assert_eq!(change.new_events[0].departure_utc, day(200));
-    assert!(change.cleared_events.is_empty());
-    assert_eq!(
-        (change.from.as_deref(), change.to, change.cause),
-        (Some("normal"), Some("watch"), Cause::Records)
-    );
-    // What is stored is what the next run compares with: it finds nothing.
-    let stored: Vec<_> = found.states.iter().chain(&states(&known)).cloned().collect();
-    let stored: std::collections::BTreeMap<_, _> = stored.into_iter().rev().map(|s| (s.unit(), s)).collect();
-    let stored: Vec<records::UnitState> = stored.into_values().collect();
-    assert!(night(&stored, &nothing, &config()).changed.is_empty());
-    // A first night stores states and tells nothing.
-    let first = night(&[], &with_records, &config());
-    assert_eq!((first.changed.len(), first.states.len()), (0, 14));
 }
 
 /// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.

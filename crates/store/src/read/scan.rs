@@ -268,23 +268,6 @@ mod tests {
         assert!(read_file(&file, &schema(&["serial_number"]), &[]).is_err());
     }
 
-    /// Files of an earlier release lack a column.
-    #[test]
-    fn files_without_a_later_column_are_read_by_time_with_empty_values() {
-        let dir = tempfile::tempdir().unwrap();
-        let times: ArrayRef = Arc::new(TimestampMicrosecondArray::from(vec![10, 20]).with_timezone("UTC"));
-        let later: ArrayRef = Arc::new(Float64Array::from(vec![Some(1.0), Some(2.0)]));
-        let fields = [("departure_utc", times, false), ("later", later, true)];
-        let batch = RecordBatch::try_from_iter_with_nullable(fields).unwrap();
-        let (new, old) =
-            (written(dir.path(), "new", &batch), written(dir.path(), "old", &batch.project(&[0]).unwrap()));
-        let since = Condition::times("departure_utc", 15, i64::MAX);
-        for (file, wanted) in [(old, None), (new, Some(2.0))] {
-            let found = read_file(&file, &batch.schema(), std::slice::from_ref(&since)).unwrap().remove(0);
-            assert_eq!(found.column(1).as_primitive::<Float64Type>().iter().collect::<Vec<_>>(), [wanted]);
-        }
-    }
-
     /// A NIS that overflowed, of a log with samples of 1e300, was stored as infinity: every trend ended with exit code 2.
     #[test]
     fn an_infinite_number_is_read_as_missing() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 use records::GapRecord;
-use store::{LogOutcome, LogResult, Query, RecordKey, Store};
+use store::{LogResult, Query, RecordKey, Store};
 
 use crate::fixtures::{POSITIONS, account, fresh, record, result, time};
 
@@ -19,19 +19,6 @@ fn files_that_hold_no_superseded_record_are_not_touched() {
     let after = writer.store().table_files("gaps").unwrap();
     assert_eq!(before.iter().filter(|file| after.contains(file)).count(), 4);
     assert_eq!(after.len(), 5);
-}
-
-#[test]
-fn a_log_in_error_leaves_an_account_and_no_record() {
-    let (_dir, mut writer) = fresh();
-    let mut failed = result(1, 0, 30e-6);
-    failed.records.clear();
-    failed.account.outcome = LogOutcome::Error;
-    failed.account.error_code = Some("time_goes_back".into());
-    writer.commit(std::slice::from_ref(&failed)).unwrap();
-    assert_eq!(writer.store().accounts().unwrap(), [failed.account]);
-    assert_eq!(writer.store().records(&Query::default()).unwrap(), []);
-    assert_eq!(writer.store().info().unwrap().version, 0);
 }
 
 #[test]

@@ -41,23 +41,6 @@ fn outcomes(store: &Store, run_id: &str) -> Vec<LogOutcome> {
     store.run_logs(run_id).unwrap().iter().map(|log| log.outcome).collect()
 }
 
-/// The commit of records comes before that of their accounts: a kill between them leaves such a store.
-#[test]
-fn records_without_an_account_are_counted_and_their_log_is_done_again() {
-    let (dir, mut writer) = fresh();
-    let to_do: Vec<LogRecord> = (0..2).map(|flight| not_reached(flight, "run")).collect();
-    writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
-    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
-    let logs = dir.path().join("logs/_delta_log");
-    let last = |n: u64| logs.join(format!("{n:020}.json"));
-    assert!(last(2).exists() && !last(3).exists());
-    std::fs::remove_file(last(2)).unwrap();
-
-    assert_eq!(outcomes(writer.store(), "run"), [LogOutcome::Unaccounted, LogOutcome::NotReached]);
-    assert_eq!(figures(&writer.store().runs().unwrap()[0]), [1, 3, 0, 0, 1]);
-    assert_eq!(writer.store().accounts().unwrap(), [], "the next run must do both");
-}
-
 #[test]
 fn a_killed_run_is_accounted_for_log_by_log_and_the_next_run_closes_its_account_for_good() {
     let (_dir, mut writer) = fresh();

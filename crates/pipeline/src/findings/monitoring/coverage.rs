@@ -284,21 +284,3 @@ pub(crate) fn unknown_tails<'a>(
     }
     found.into_iter().collect()
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn serial_numbers_that_differ_by_dashes_capitals_or_o_and_zero_look_alike() {
-        let row = |part: &str, serial: &str| TrendRow {
-            part_number: Some(part.into()),
-            serial_number: serial.into(),
-            ..TrendRow::default()
-        };
-        let rows = [row("P", "SN-0O1"), row("P", "sn001"), row("P", "SN-002"), row("Q", "SN-00I")];
-        let expected = "part P: serial numbers `SN-0O1` and `sn001` look alike; if they are one unit, name it in `logs.aliases`";
-        assert_eq!(look_alikes(&rows), [expected]);
-    }
-}

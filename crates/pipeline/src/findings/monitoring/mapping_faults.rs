@@ -133,78 +133,59 @@ mod tests {
 
     use super::*;
 
-    fn key(
-        tail_number: &'static str,
-        position: &'static str,
-        part_number: &'static str,
-    ) -> PositionKey<'static> {
-        PositionKey { tail_number, position, part_number, serial_number: "" }
-    }
+    const SIGN: Option<&str> = Some("load_sign_flipped");
 
-    fn flights(rejections: [Option<&'static str>; 5]) -> Vec<RecentFlight<'static>> {
-        let flight = |(k, rejection): (usize, Option<&'static str>)| RecentFlight {
-            departure_utc: Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k as i64),
-            rejection,
-            ..RecentFlight::default()
+    /// Tail, position and part number of a unit, rejections of its flights, and their stiffness, N/m.
+    type Unit = (&'static str, [Option<&'static str>; 5], Option<f64>);
+
+    fn faults(units: &[Unit]) -> Vec<MappingFault> {
+        let unit = |(name, rejections, stiffness_n_per_m): &Unit| {
+            let flight = |(k, rejection)| RecentFlight {
+                departure_utc: Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k),
+                rejection,
+                stiffness_n_per_m: *stiffness_n_per_m,
+                ..RecentFlight::default()
+            };
+            let [tail_number, position, part_number] =
+                name.split(' ').collect::<Vec<_>>().try_into().unwrap();
+            let key = PositionKey { tail_number, position, part_number, serial_number: "" };
+            (key, (0..).zip(*rejections).map(flight).collect())
         };
-        rejections.into_iter().enumerate().map(flight).collect()
-    }
-
-    const SIGN: Option<&'static str> = Some("load_sign_flipped");
-
-    fn scopes(latest: &RecentFlights<'_>) -> Vec<String> {
-        detect(latest, |_| Some(5e7)).iter().map(MappingFault::scope).collect()
+        detect(&units.iter().map(unit).collect(), |_| Some(5e7))
     }
 
     #[test]
     fn most_flights_of_a_part_a_tail_or_an_actuator_name_the_widest_scope() {
-        let bad = || flights([None, None, SIGN, SIGN, SIGN]);
-        let good = || flights([SIGN, None, None, None, SIGN]);
-        let part =
-            [(key("A", "left", "P"), bad()), (key("B", "left", "P"), bad()), (key("B", "nose", "Q"), good())];
-        assert_eq!(scopes(&part.into()), ["all actuators of part P"]);
-        let tail = [
-            (key("A", "left", "P"), bad()),
-            (key("A", "nose", "Q"), bad()),
-            (key("B", "left", "P"), good()),
-            (key("B", "nose", "Q"), good()),
-            (key("C", "left", "P"), good()),
-            (key("C", "nose", "Q"), good()),
-        ];
-        assert_eq!(scopes(&tail.into()), ["all actuators of A"]);
-        let one = [
-            (key("A", "left", "P"), bad()),
-            (key("A", "right", "P"), good()),
-            (key("B", "left", "P"), good()),
-        ];
-        assert_eq!(scopes(&one.into()), ["left of A"]);
+        let bad = |name| (name, [None, None, SIGN, SIGN, SIGN], None);
+        let good = |name| (name, [SIGN, None, None, None, SIGN], None);
+        // Flights that cannot show a gap are no fault.
+        let quiet = |name| (name, [Some("no_load_reversal"); 5], None);
+        // A unit of measure is at fault only where all of a part number is.
+        let small = |name| (name, [Some("travel_too_small"); 5], None);
+        let others = ["B left P", "B nose Q", "C left P", "C nose Q"].map(good);
+        for (units, scope) in [
+            (vec![bad("A left P"), bad("B left P"), good("B nose Q")], Some("all actuators of part P")),
+            (
+                [bad("A left P"), bad("A nose Q")].into_iter().chain(others).collect(),
+                Some("all actuators of A"),
+            ),
+            (vec![bad("A left P"), good("A right P"), good("B left P")], Some("left of A")),
+            (vec![quiet("A left P"), quiet("B left P")], None),
+            (vec![small("A left P")], None),
+            (vec![small("A left P"), small("B left P")], Some("all actuators of part P")),
+        ] {
+            let scopes: Vec<String> = faults(&units).iter().map(MappingFault::scope).collect();
+            assert_eq!(scopes, scope.into_iter().collect::<Vec<_>>(), "{units:?}");
+        }
     }
 
     /// A stiffness in N/µm, or of another part, is stated for the part; one actuator that softens is no wrong setting.
     #[test]
     fn a_configured_stiffness_that_no_flight_shows_is_a_fault_of_the_part() {
-        let fitted = |n_per_m: f64| {
-            let mut flights = flights([None; 5]);
-            flights.iter_mut().for_each(|flight| flight.stiffness_n_per_m = Some(n_per_m));
-            flights
-        };
-        let all = |second| [(key("A", "left", "P"), fitted(2e7)), (key("B", "left", "P"), fitted(second))];
-        let found = detect(&all(1.9e7).into(), |_| Some(5e7));
+        let fitted =
+            |second| faults(&[("A left P", [None; 5], Some(2e7)), ("B left P", [None; 5], Some(second))]);
+        let found = fitted(1.9e7);
         assert_eq!((found.len(), &*found[0].reason, found[0].refused), (1, "stiffness_unlike", 10));
-        assert!(scopes(&all(4e7).into()).is_empty());
-    }
-
-    /// Flights that cannot show a gap are no fault; a unit of measure is at fault only where all of a part number is.
-    #[test]
-    fn causes_of_single_flights_are_no_fault_of_the_mapping() {
-        let quiet = || flights([Some("no_load_reversal"); 5]);
-        let small = || flights([Some("travel_too_small"); 5]);
-        assert_eq!(
-            scopes(&[(key("A", "left", "P"), quiet()), (key("B", "left", "P"), quiet())].into()),
-            [""; 0]
-        );
-        assert_eq!(scopes(&[(key("A", "left", "P"), small())].into()), [""; 0]);
-        let both = [(key("A", "left", "P"), small()), (key("B", "left", "P"), small())];
-        assert_eq!(scopes(&both.into()), ["all actuators of part P"]);
+        assert!(fitted(4e7).is_empty());
     }
 }

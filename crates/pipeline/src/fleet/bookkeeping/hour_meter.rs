@@ -101,49 +101,43 @@ fn agreeing(readings: &[Reading]) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// Flights every twelve hours of two hours each, with the readings of their meter.
-    fn rows(meters_h: impl IntoIterator<Item = f64>) -> Vec<Observation> {
-        let row = |(at, meter_h): (i64, f64)| Observation {
+    /// How many of a meter's readings at twenty flights of two hours, twelve hours apart, contradict, and which are dropped.
+    fn dropped(meter_h: impl Fn(i64) -> f64) -> (usize, Vec<i64>) {
+        let row = |at: i64| Observation {
             departure_us: at * 12 * 3_600_000_000,
             flight_hours: Some(2.0),
-            tail_hours_end: Some(meter_h),
+            tail_hours_end: Some(meter_h(at)),
             ..Observation::default()
         };
-        (0..).zip(meters_h).map(row).collect()
+        let mut rows: Vec<Observation> = (0..20).map(row).collect();
+        let count = drop_contradicting(&mut rows);
+        (count, (0..20).filter(|at| rows[*at as usize].tail_hours_end.is_none()).collect())
     }
 
-    fn kept(mut rows: Vec<Observation>) -> (usize, Vec<bool>) {
-        let dropped = drop_contradicting(&mut rows);
-        (dropped, rows.iter().map(|row| row.tail_hours_end.is_some()).collect())
+    fn sound_h(at: i64) -> f64 {
+        2_000.0 + 2.0 * at as f64
     }
 
     #[test]
     fn a_misread_digit_up_or_down_is_dropped_and_the_rest_stays() {
-        let sound = |at: usize| 2_000.0 + 2.0 * at as f64;
         for wrong_h in [38_095.0, 205.2, 2_900.0, 0.0] {
             for wrong in [0, 7, 19] {
-                let meters = (0..20).map(|at| if at == wrong { wrong_h } else { sound(at) });
-                let (dropped, kept) = kept(rows(meters));
-                assert_eq!((dropped, kept[wrong]), (1, false), "{wrong_h} at {wrong}");
+                let found = dropped(|at| if at == wrong { wrong_h } else { sound_h(at) });
+                assert_eq!(found, (1, vec![wrong]), "{wrong_h} at {wrong}");
             }
         }
-        assert_eq!(kept(rows((0..20).map(sound))).0, 0);
+        assert_eq!(dropped(sound_h).0, 0);
     }
 
-    /// The meter stands still for five flights, and counts on as if it had not.
+    /// A meter stands still for five flights, and counts on as if it had not: the first one may be a rounded reading.
+    /// One counts minutes, and one was exchanged.
     #[test]
-    fn a_meter_that_stands_still_counts_only_while_it_moves() {
-        let sound = |at: usize| 2_000.0 + 2.0 * at as f64;
-        let (dropped, kept) = kept(rows((0..20).map(|at| sound(if (8..13).contains(&at) { 7 } else { at }))));
-        // The first one may be a rounded reading.
-        assert_eq!((dropped, kept), (4, (0..20).map(|at| !(8..13).contains(&at)).collect()));
-    }
-
-    #[test]
-    fn a_meter_in_minutes_is_no_hour_meter_and_one_that_was_exchanged_keeps_its_longer_side() {
-        assert_eq!(kept(rows((0..20).map(|at| 60.0 * (2_000.0 + 2.0 * f64::from(at))))).0, 20);
-        let exchanged = (0..20).map(|at| if at < 6 { 9_000.0 } else { 0.0 } + 2.0 * f64::from(at));
-        let (dropped, kept) = kept(rows(exchanged));
-        assert_eq!((dropped, &kept[..7]), (6, &[false, false, false, false, false, false, true][..]));
+    fn a_meter_that_stands_still_or_counts_minutes_is_dropped_and_one_that_was_exchanged_keeps_its_longer_side()
+     {
+        let still = dropped(|at| sound_h(if (8..13).contains(&at) { 7 } else { at }));
+        assert_eq!(still, (4, (8..13).collect()));
+        assert_eq!(dropped(|at| 60.0 * sound_h(at)).0, 20);
+        let exchanged = dropped(|at| if at < 6 { 9_000.0 } else { 0.0 } + 2.0 * at as f64);
+        assert_eq!(exchanged, (6, (0..6).collect()));
     }
 }
