@@ -64,7 +64,8 @@ struct Normalization<'a> {
     installations: &'a Installations,
     folder: &'a Path,
     encoding: Encoding,
-    claims: Mutex<BTreeMap<PathBuf, String>>,
+    /// Name and digest of the log of each file.
+    claims: Mutex<BTreeMap<PathBuf, (String, String)>>,
 }
 
 impl Normalization<'_> {
@@ -72,14 +73,15 @@ impl Normalization<'_> {
         let opened = FlightLog::open(files, log_path, self.config, self.installations)?;
         for at in opened.actuators().filter(|at| at.columns.lacking.is_empty()) {
             match self.write(&opened, at) {
-                Ok(file) => done.written.push(file),
+                Ok(file) => done.written.extend(file),
                 Err(diagnostic) => done.diagnostics.push(diagnostic.in_file(log_path)),
             }
         }
         Ok(())
     }
 
-    fn write(&self, opened: &FlightLog<'_>, at: &Actuator) -> Result<PathBuf, Diagnostic> {
+    /// Writes the normalized log of an actuator; nothing for a copy of a log that has been written.
+    fn write(&self, opened: &FlightLog<'_>, at: &Actuator) -> Result<Option<PathBuf>, Diagnostic> {
         let id = &opened.identity;
         let (installation, part) = opened.unit(at)?;
         let channels = opened.channels(at, part)?;
@@ -87,7 +89,9 @@ impl Normalization<'_> {
             format!("{}_{}", id.flight.departure_utc.strftime("%Y%m%dT%H%M%SZ"), id.flight.flight_id);
         let names = [id.flight.tail_number.as_str(), &flight, at.columns.position.as_str()].map(file_name);
         let file = self.folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
-        self.claim(&file, opened)?;
+        if !self.claim(&file, opened)? {
+            return Ok(None);
+        }
         let provenance = BTreeMap::from([
             ("source_log".to_owned(), opened.display_name().to_owned()),
             ("source_digest".to_owned(), opened.digest.clone()),
@@ -97,15 +101,17 @@ impl Normalization<'_> {
         ]);
         ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, self.encoding)
             .map_err(|e| e.diagnostic())?;
-        Ok(file)
+        Ok(Some(file))
     }
 
-    /// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log.
-    fn claim(&self, file: &Path, opened: &FlightLog<'_>) -> Result<(), Diagnostic> {
+    /// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log. False if a
+    /// copy of the log has the file.
+    fn claim(&self, file: &Path, opened: &FlightLog<'_>) -> Result<bool, Diagnostic> {
         let log_path = opened.display_name();
         let mut claims = self.claims.lock().unwrap_or_else(PoisonError::into_inner);
         let owner = match claims.get(file) {
-            Some(other) => Some(format!("the normalized log of {other}")),
+            Some((_, digest)) if *digest == opened.digest => return Ok(false),
+            Some((other, _)) => Some(format!("the normalized log of {other}")),
             None if file.symlink_metadata().is_err() => None,
             None => match ingest::log::normalized::source(file) {
                 Some((log, digest)) if log == log_path || digest == opened.digest => None,
@@ -118,8 +124,8 @@ impl Normalization<'_> {
             let hint = "remove one of the logs or the file, or name another folder";
             return Err(Diagnostic::new("would_overwrite", what).hint(hint));
         }
-        claims.insert(file.to_owned(), log_path.to_owned());
-        Ok(())
+        claims.insert(file.to_owned(), (log_path.to_owned(), opened.digest.clone()));
+        Ok(true)
     }
 }
 
