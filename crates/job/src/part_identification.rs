@@ -70,7 +70,7 @@ impl IdentifiedParams {
         }))
     }
 
-    /// The facts under the keys and in the units in which a part of this kind is configured.
+    /// The parameters under the keys and in the units in which a part of this kind is configured.
     pub fn comparisons(&self, part: &Part) -> Vec<ParamComparison> {
         let settings = &part.settings;
         let [(stiffness, configured), ..] = settings.keys_of(settings.kind);
@@ -78,7 +78,7 @@ impl IdentifiedParams {
         let is_of_sensors = noise.model == NoiseModel::Sensors;
         let levels = noise.levels(settings.kind);
         let levels = levels.map(|(key, level)| (format!("noise.{key}"), level.filter(|_| is_of_sensors)));
-        // What the reference radius makes of the units.
+        // Factors from SI at the screw axis to the units of the keys.
         let scales = match part.geometry {
             Geometry::Linear { .. } => [1.0; 6],
             Geometry::Rotary { reference_radius_m: r } => [r * r, 1.0 / r, 1.0 / r, 1.0 / r, 1.0 / r, r],

@@ -88,7 +88,7 @@ impl Config {
         Ok(Self { inner, files: self.files.clone(), installations: self.installations.clone() })
     }
 
-    /// BLAKE3 digest of program version, configuration and tables, which driver and workers must share.
+    /// BLAKE3 digest of program version, configuration files and tables; workers must have the same.
     fn digest(&self) -> PyResult<String> {
         let mut hash = blake3::Hasher::new();
         let logs = &self.inner.document.logs;

@@ -249,7 +249,7 @@ fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<&'a ArrayRef, Ro
     let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
     let is_alike = match (array.data_type(), &column.data_type) {
         // Other programs name the elements of lists, and the zone of times, otherwise.
-        (DataType::List(_), DataType::List(_)) => true,
+        (DataType::List(found), DataType::List(wanted)) => found.data_type() == wanted.data_type(),
         (DataType::Timestamp(found, _), DataType::Timestamp(wanted, _)) => found == wanted,
         (found, wanted) => found == wanted,
     };
@@ -294,7 +294,7 @@ impl<'a> CellReader<'a> {
         parse(self.required(text)?).map_err(|problem| self.problem(problem.to_string()))
     }
 
-    /// The elements of a list; none of a cell that is empty.
+    /// The elements of a list; `None` for an empty cell.
     fn list(&mut self) -> Option<ArrayRef> {
         Some(self.take()?.as_list::<i32>().value(self.row))
     }
@@ -353,7 +353,7 @@ pub(crate) fn word<T: std::str::FromStr>(text: &str) -> Result<T, String> {
     text.parse().map_err(|_| format!("`{text}` is none of its words"))
 }
 
-/// Implements both for a type that is a text: `as_str`, and a function that parses it.
+/// Implements [`Cells`] and [`FromCells`] for a text type by `as_str` and a function that parses it.
 macro_rules! text_cell {
     ($type:ty, $parse:path) => {
         impl $crate::row_schema::Cells for $type {

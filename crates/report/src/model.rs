@@ -77,7 +77,7 @@ pub struct UnitView {
     #[serde(flatten, serialize_with = "statement")]
     pub row: TrendRow,
     pub watch_m: Option<f64>,
-    /// State one day earlier; `None` where the unit was not assessed then, the inner `None` of a removed unit.
+    /// State one day earlier; `None` where the unit was not assessed then, `Some(None)` where it was removed.
     pub state_day_before: Option<Option<String>>,
     pub quality: Quality,
     pub events: Vec<Event>,

@@ -71,7 +71,7 @@ impl Store {
         [&self.gaps, &self.logs, &self.runs]
     }
 
-    /// The tables of this store: those of every store, and those of alerts and work requests where they exist.
+    /// The tables of this store: those of every store, and those of alerts, work and states where they exist.
     pub(crate) fn existing_tables(&self) -> Vec<&Table> {
         // A table that cannot be read is kept: its reader reports why.
         let later = [&self.alerts, &self.work, &self.states]
@@ -80,7 +80,7 @@ impl Store {
         self.tables().into_iter().chain(later).collect()
     }
 
-    /// Verifies the digest of a data file, once per store handle.
+    /// Verifies the digest of a data file, once per store handle and its clones.
     ///
     /// Neither Delta Lake nor Polars detects a changed byte of a data file.
     ///

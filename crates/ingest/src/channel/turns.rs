@@ -82,7 +82,7 @@ pub(crate) fn restore_turns(position_m: &mut [f64], evidence: TurnEvidence<'_>) 
 }
 
 /// Stretches without a hole or a break in which each step shows which way the sensor turned: it is short, and the other
-/// position does not run away from it in two steps of one direction. (In one step, it is an outlier of the other.)
+/// position does not run away from it in two steps of one direction. (A single such step is an outlier of the other.)
 fn continuous_runs(position_m: &[f64], evidence: TurnEvidence<'_>) -> Vec<Range<usize>> {
     let longest = (BREAK_STEPS * median_sample_interval(position_m) as f64) as usize;
     let clear_m = CLEAR_STEP * evidence.turn_m;
@@ -159,7 +159,11 @@ fn lag_of_load_and_speed(
     if determinant > 1e-3 * ff * vv {
         return [(vv * fa - fv * va) / determinant, (ff * va - fv * fa) / determinant];
     }
-    [if ff > 0.0 { fa / ff } else { 0.0 }, 0.0]
+    match (ff > 0.0, vv > 0.0) {
+        (true, _) => [fa / ff, 0.0],
+        (false, true) => [0.0, va / vv],
+        (false, false) => [0.0; 2],
+    }
 }
 
 #[cfg(test)]

@@ -116,7 +116,6 @@ pub fn decide(
         by: decision.by,
         reason: decision.reason,
         until_utc: decision.until_utc,
-        as_of_utc: now,
         ..event_of(request, now)
     })
 }

@@ -36,17 +36,18 @@ impl FileStat {
         })
     }
 
-    /// Of all files of a log: one that differs makes the whole differ.
+    /// Of all files of a log: their sizes added up, the latest time, and identity and time of each.
     pub(crate) fn of_log(files: &LogFiles, seen: &SeenObjects, identity: &IdentityMapping) -> Option<Self> {
-        let mut stats = files.all().map(|path| Self::of(&split_path(path, identity).0, seen));
-        let first = stats.next()??;
-        stats.try_fold(first, |whole, next| {
-            let next = next?;
-            Some(Self {
-                size_bytes: whole.size_bytes + next.size_bytes,
-                modified_utc_ns: whole.modified_utc_ns.max(next.modified_utc_ns),
-                file_id: format!("{} {}", whole.file_id, next.file_id),
-            })
+        let stats = files.all().map(|path| Self::of(&split_path(path, identity).0, seen));
+        let stats = stats.collect::<Option<Vec<Self>>>()?;
+        if let [one] = &stats[..] {
+            return Some(one.clone());
+        }
+        let id = |stat: &Self| format!("{}@{}", stat.file_id, stat.modified_utc_ns);
+        Some(Self {
+            size_bytes: stats.iter().map(|stat| stat.size_bytes).sum(),
+            modified_utc_ns: stats.iter().map(|stat| stat.modified_utc_ns).max()?,
+            file_id: stats.iter().map(id).collect::<Vec<_>>().join(" "),
         })
     }
 

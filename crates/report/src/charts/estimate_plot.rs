@@ -159,7 +159,8 @@ fn over_time(plot: &EstimatePlot) -> String {
 
 /// Draws δX, S(t) with both means, and the contact intervals as marks at the lower edge.
 fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
-    let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
+    let origin_m = origin_m(plot);
+    let to_um = |v: f64| (v - origin_m) * 1e6;
     let (low, high) = span(plot.dx_m.iter().chain(&plot.s_m).map(|v| to_um(*v)));
     let floor = low - 0.06 * (high - low);
     let mut frame = axes(size, (0.0, end_s), (floor - 0.04 * (high - low), high));
@@ -210,7 +211,8 @@ fn load(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
 
 /// Draws δX against the coupling force with the fitted flanks; samples that the fit did not use are faint.
 fn flanks(plot: &EstimatePlot) -> String {
-    let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
+    let origin_m = origin_m(plot);
+    let to_um = |v: f64| (v - origin_m) * 1e6;
     let (low, high) = span(touches(plot).iter().map(|s| to_um(s.dx_m)));
     let (left, right) = span(touches(plot).iter().map(|s| s.force_n / 1e3));
     let mut frame = axes([SIZE[0] - TIME_PLOTS_WIDTH, SIZE[1] - HEADING], (left, right), (low, high));
@@ -281,7 +283,7 @@ fn buckets(samples: usize) -> usize {
     (MAX_POINTS / 2).min(samples.max(1))
 }
 
-/// Minimum and maximum of each bucket with their sample positions, in time order, so that no excursion is lost.
+/// Minimum and maximum of each bucket in time order, at 1/4 and 3/4 of it, so that no excursion is lost.
 /// NaN for a bucket without a value.
 pub fn min_max_buckets(values: &[f64], buckets: usize) -> Vec<(f64, f64)> {
     let mut points = Vec::with_capacity(2 * buckets);

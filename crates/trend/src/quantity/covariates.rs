@@ -13,7 +13,7 @@ const SIGNIFICANT: f64 = 4.0;
 const MIN_DIFFERENCES: usize = 30;
 /// Huber's bound, in standard deviations: 95 % efficient for normal errors (Huber 1981).
 const HUBER: f64 = 1.345;
-/// Reweightings.
+/// Number of reweightings.
 const ITERATIONS: usize = 8;
 
 /// Slopes of a quantity.
@@ -87,7 +87,7 @@ fn huber(rows: &[(f64, Vector2<f64>)]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         }
         let inverse = normal.cholesky()?.inverse();
         beta = inverse * right;
-        // Neighbouring differences share a flight.
+        // Doubled: neighbouring differences share a flight's error.
         covariance = 2.0 * scale * scale * inverse;
     }
     Some((beta, covariance))

@@ -10,7 +10,7 @@ use crate::contact::stats::spread;
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
-/// Residuals beyond this many lose all of it: a frozen channel is no noise.
+/// Residuals beyond this many spreads weigh zero: they are faults, and not noise.
 const WILD: f64 = 10.0;
 /// Rounds of reweighting of a fit of the whole flight.
 pub(crate) const REWEIGHTINGS: usize = 3;
@@ -34,7 +34,7 @@ impl GaussianPrior {
     }
 }
 
-/// Coefficients of the first N columns, m.
+/// A fit: coefficients, m, weights of the rows, and priors.
 #[derive(Debug, Clone)]
 pub(crate) struct RobustFit<const N: usize> {
     pub(crate) beta: [f64; N],
@@ -228,7 +228,7 @@ impl<const N: usize> RobustFit<N> {
             rows.iter().zip(&self.weights).map(|(row, w)| w * row.x[column].powi(power)).sum()
         };
         let variance = moment(2) - moment(1).powi(2) / moment(0);
-        (self.inverse[(column, column)] * variance).recip().min(1.0)
+        (self.inverse[(column, column)] * variance).recip().clamp(0.0, 1.0)
     }
 
     /// Standard error of a weighted sum of coefficients, m: the sandwich estimate over stretches, and the share of

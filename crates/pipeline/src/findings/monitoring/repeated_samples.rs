@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::findings::monitoring::recent::RecentFlights;
 
-/// Two flights with the samples of one, by their normalised innovations, fitted stiffness and all other quantities.
+/// Two flights with the same samples, by their normalised innovations, fitted stiffness and all other quantities.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct RepeatedSamples {
@@ -21,7 +21,7 @@ pub struct RepeatedSamples {
     pub other_positions: Vec<String>,
 }
 
-/// Tail, departure, and the flight's name, which may fly again.
+/// Tail, departure, and the flight's name, which may recur.
 type Flown<'a> = (&'a str, Timestamp, &'a str);
 
 /// The pairs of flights with equal estimates. Noise makes two records of one motion differ.
