@@ -8,7 +8,7 @@ use jiff::{Timestamp, civil, tz::TimeZone};
 use crate::error::{Error, Fault};
 use crate::mapping::column_pattern::nearest;
 
-/// Names that tables use for what they mean: none of them is another one misspelled.
+/// Standard names of columns: none of them is a misspelling of another.
 const KNOWN: [&str; 12] = [
     "tail_number",
     "position",
@@ -71,7 +71,7 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
         .and_then(|value| if value < 0.0 { Err(format!("`{text}` is below zero")) } else { Ok(value) })
 }
 
-/// Parses an instant. In a column whose name holds UTC, a date or a time without zone is UTC.
+/// Parses an instant. A date, or a time without a zone, is UTC.
 ///
 /// # Errors
 /// When it is neither a date nor a time.

@@ -14,7 +14,7 @@ use crate::fleet::places::{TailPosition, UnitKey, place_number};
 use crate::fleet::row_keys::KeyColumns;
 use crate::fleet::settings_counts::SettingsCounts;
 
-/// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
+/// Shares of a table for each worker: several, so that faster workers take more.
 const SHARES: usize = 4;
 
 /// Flights of one unit, in the order of arrival, each with what else `R` holds of it.

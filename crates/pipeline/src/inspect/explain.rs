@@ -23,7 +23,7 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Whether the stored number is that of its log and settings, as far as both still exist.
+    /// Whether the record is reproduced, or its settings changed, so that it cannot be compared.
     pub fn is_sound(&self) -> bool {
         matches!(self.verdict, ReplayVerdict::Same | ReplayVerdict::OtherSettings)
     }
@@ -86,9 +86,12 @@ fn find(query: &Query, store: &Store) -> Result<GapRecord, Error> {
         }
         [.., last] => {
             let (count, last) = (found.len(), &last.flight);
-            let (tail, day) = (&last.tail_number, last.departure_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
-            let what = format!("{count} flights are named {flight}; the latest is of {tail}, {day}");
-            (what, format!("select one with `--tail {tail} --since {day}`, and `--until` for an earlier one"))
+            let (tail, time) = (&last.tail_number, last.departure_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
+            let what = format!("{count} flights are named {flight}; the latest is of {tail}, {time}");
+            (
+                what,
+                format!("select one with `--tail {tail} --since {time}`, and `--until` for an earlier one"),
+            )
         }
     };
     Err(Error::refused(Diagnostic::new("no_such_record", what).hint(hint)))
@@ -131,7 +134,7 @@ pub enum ReplayVerdict {
     OtherLog,
     /// Same log and settings, but another number.
     OtherNumber,
-    /// The log cannot be read.
+    /// The recomputation failed.
     NotReplayed,
 }
 

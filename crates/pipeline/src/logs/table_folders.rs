@@ -47,10 +47,10 @@ impl TableFolders {
         }
     }
 
-    /// Whether a file that fits a pattern is a log: of no table, or of one that has it.
+    /// Whether a file that fits a pattern is a log: in no table, or live in its table.
     ///
     /// # Errors
-    /// Once for each table that cannot be used, and for each file of a table that cannot.
+    /// A table that cannot be used, once, or a file with deleted rows.
     pub(crate) fn is_log(&mut self, file: &Path, pattern: &Path) -> Result<bool, TableFault> {
         for folder in file.ancestors().skip(1) {
             let format = match self.folders.get(folder) {

@@ -77,8 +77,8 @@ fn any_number_of_threads_gives_bitwise_identical_assessments() {
     assert_eq!(on(1), on(3));
 }
 
-/// One flight a day. Silent for sixty days or four hundred: usage has gone on at the unit's own rate, so dates count from the last flight and
-/// stay when they have passed.
+/// One flight a day. Silent for sixty days or four hundred: usage has gone on at the unit's own rate, so dates count from
+/// the last flight and stay when they have passed.
 #[test]
 fn dates_count_from_the_last_flight_at_the_units_own_rate() {
     let [now, silent, later] = [199, 259, 599].map(|at| assess(&flown(200), day(at)));

@@ -26,7 +26,7 @@ struct View<'a> {
     axes: Axes,
     units: &'a [&'a UnitView],
     peers: &'a Peers<'a>,
-    /// Paths of all pages of the part, relative to this one.
+    /// Paths of the pages of the part, relative to this one; none if the part has one page.
     pages: Vec<String>,
 }
 

@@ -133,7 +133,7 @@ impl Location {
         Ok(self.length(&self.dir.join(name))?.is_some())
     }
 
-    /// A file's bytes as it is there; nothing when it is not.
+    /// Size of a file, bytes; `None` if it is absent.
     pub(crate) fn length(&self, path: &Path) -> Result<Option<u64>, Error> {
         let Some(bucket) = &self.bucket else {
             return match std::fs::metadata(path) {
@@ -176,7 +176,7 @@ impl Location {
 
     /// Writes a file whose name contains the digest of its content.
     ///
-    /// A file of that name with other content is damaged and is replaced: no commit can mean it.
+    /// A file of that name with other content is damaged and is replaced: no commit names it.
     pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
         if !self.put(path, content, PutMode::Create)? {
             self.put(path, content, PutMode::Overwrite)?;

@@ -9,7 +9,7 @@
 //! The digest is written before the log file, so a log file never lacks it. Two writers that race for one version leave
 //! two digests, of which one matches. Commits of earlier releases and of other programs have none.
 //!
-//! `object_store` 0.13 does not sync, so a power cut can leave the name of a commit on an empty file.
+//! `object_store` 0.13 does not sync: a power cut could leave the name of a commit on an empty file. `durable_fs` syncs.
 
 use std::ffi::OsStr;
 use std::fmt;

@@ -18,7 +18,7 @@ const PSEUDO_UNITS: f64 = 4.0;
 /// Spread of the units' amplitudes while their mean is sought, a share of the limit.
 const UNIT_SPREAD: f64 = 0.005;
 
-/// Standard errors beyond which the fleet's mean amplitude is used.
+/// Standard errors (root mean square of both components) from which the mean amplitude of a fleet is used.
 const BELIEVED: f64 = 3.0;
 
 /// One unit's cosine and sine amplitudes, and their covariance (xx, xy, yy).

@@ -15,8 +15,8 @@ use crate::commands::context::load_trend_context;
 const SHARES: [(f64, f64, &str); 4] = [
     (0.0, 0.35, "below 35 %"),
     (0.35, 0.65, "35 to 65 %"),
-    (0.65, 1.01, "65 % and more"),
-    (0.0, 1.01, "all"),
+    (0.65, f64::INFINITY, "65 % and more"),
+    (0.0, f64::INFINITY, "all"),
 ];
 
 /// Prints a summary table, or one row per past forecast in the machine-readable formats.

@@ -15,7 +15,7 @@ use crate::table::count;
 
 use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, note_future};
 
-/// Writes the pages and prints the path of the first one.
+/// Writes the pages; prints the path of the first one, their number and size.
 ///
 /// # Errors
 /// If configuration, tables or store cannot be read, or the folder cannot be written. Logs that cannot be drawn make the

@@ -42,7 +42,7 @@ pub(crate) fn notes(
     notes
 }
 
-/// Age of the newest log from the first day on, and what that means for dates.
+/// Age of the newest log, if a day or more, and what it means for dates.
 fn age_of(newest_log: Timestamp, as_of: Timestamp, today: Timestamp) -> Option<String> {
     let age = days_between(newest_log, today) as i64;
     let age = match age {

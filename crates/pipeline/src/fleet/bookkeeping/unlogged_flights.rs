@@ -7,13 +7,13 @@ use records::{Flight, Installation};
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::History;
 
-/// Longest distance between the departures of a flight and a record of the same name: names are reused.
+/// Longest time between the departures of a flight and of its record: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
 /// Microseconds of a day.
 pub(crate) const DAY_US: i64 = 86_400_000_000;
 
-/// Whether a time is that of a day alone.
+/// Whether a time is midnight UTC, as of a date without a time.
 pub(crate) fn is_day(utc_us: i64) -> bool {
     utc_us % DAY_US == 0
 }
@@ -41,19 +41,21 @@ pub(crate) fn unlogged_flights<'a>(
             let (place, at) = (history.place(flown).tail_number.as_deref(), flown.departure_utc());
             place == Some(tail) && installation.covers(at) && is_in_period(at)
         });
-        let records: Vec<Timestamp> = records.map(FlightRow::departure_utc).collect();
+        let records: Vec<&FlightRow> = records.collect();
         // By other names, or in another time zone, a table would count most flights twice.
         if 2 * logged.len() < records.len() {
-            leave_out_nearest(&mut missing, records);
+            let is_unmatched =
+                |flown: &&&FlightRow| !logged.iter().any(|flight| is_of(flight, flown, history));
+            leave_out_nearest(&mut missing, records.iter().filter(is_unmatched));
         }
         missing.into_iter().map(move |flight| (index, flight)).collect::<Vec<_>>()
     });
     missing.collect()
 }
 
-/// Leaves out one of the flights, which are by departure, within 12 hours of each record, as far as there is one.
-fn leave_out_nearest(flights: &mut Vec<&Flight>, records: Vec<Timestamp>) {
-    for departure_utc in records {
+/// Removes, for each record, the nearest flight within 12 hours; the flights are by departure.
+fn leave_out_nearest<'a>(flights: &mut Vec<&Flight>, records: impl Iterator<Item = &'a &'a FlightRow>) {
+    for departure_utc in records.map(|flown| flown.departure_utc()) {
         let apart = |at: &usize| flights[*at].departure_utc.duration_since(departure_utc).abs();
         let next = flights.partition_point(|flight| flight.departure_utc < departure_utc);
         let near = next.saturating_sub(1)..flights.len().min(next + 1);
@@ -62,17 +64,19 @@ fn leave_out_nearest(flights: &mut Vec<&Flight>, records: Vec<Timestamp>) {
     }
 }
 
-/// Whether a unit has a row of a flight: one of its tail with its departure, or with its name and a departure within
-/// 12 hours of it.
+/// Whether a unit has a row of a flight.
 fn is_logged(flight: &Flight, history: &History) -> bool {
     let at = flight.departure_utc;
     let since = |flown: &FlightRow| flown.departure_utc().duration_since(at);
     let first = history.flights().partition_point(|flown| since(flown) < -SAME_FLIGHT);
     let mut near = history.flights()[first..].iter().take_while(|flown| since(flown) <= SAME_FLIGHT);
-    let is_same = |flown: &FlightRow| {
-        flown.departure_utc() == at || history.flight_id(flown) == Some(flight.flight_id.as_str())
-    };
-    let is_on_tail =
-        |flown: &FlightRow| history.place(flown).tail_number.as_deref() == Some(flight.tail_number.as_str());
-    near.any(|flown| is_same(flown) && is_on_tail(flown))
+    near.any(|flown| is_of(flight, flown, history))
+}
+
+/// Whether a row is of a flight: it has its tail and its departure, or its tail, its name and a departure within 12 hours.
+fn is_of(flight: &Flight, flown: &FlightRow, history: &History) -> bool {
+    let apart = flown.departure_utc().duration_since(flight.departure_utc).abs();
+    let is_named = history.flight_id(flown) == Some(flight.flight_id.as_str());
+    (apart.is_zero() || (is_named && apart <= SAME_FLIGHT))
+        && history.place(flown).tail_number.as_deref() == Some(flight.tail_number.as_str())
 }
