@@ -130,6 +130,11 @@ impl BlockMeans {
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 
+    /// Whether loads pile up at the largest value of a side.
+    pub(crate) fn is_clipped(&self) -> bool {
+        self.in_range_n.start.is_finite() || self.in_range_n.end.is_finite()
+    }
+
     /// What drives the coupling at a block.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]

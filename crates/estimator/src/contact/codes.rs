@@ -12,6 +12,12 @@ pub enum Rejection {
     /// One flank is touched for less than a second.
     #[strum(message = "use a longer flight, or one with more manoeuvres, so that both flanks are pressed")]
     OneSideBrief,
+    /// The load has one size: gap and wind-up are not distinguishable.
+    #[strum(
+        message = "use a flight, or a ground check, in which the load changes its size as well as its side, within the \
+        range of the load cell"
+    )]
+    LoadHeld,
     /// The load stays below the expected friction, or is zero.
     #[strum(message = "check the load channel and its unit; a surface without airload shows no gap")]
     LoadTooSmall,
@@ -29,7 +35,8 @@ pub enum Rejection {
     /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap. Or gap or stiffness
     /// would be negative.
     #[strum(
-        message = "check that the load is this actuator's, and not late (`latency_s`); else use a flight with more \
+        message = "check that the load is this actuator's, and not late (`latency_s`), and that an output declared as \
+        `output = \"locked\"` is fixed; else use a flight with more \
         load, or more travel, so that friction does not hold the screw within its gap; inspect a unit whose flights \
         were estimated before"
     )]

@@ -24,6 +24,7 @@ use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::FrictionState;
 use crate::contact::load_jump::load_jump_n;
 use crate::contact::stats::{LOOKS, second_differences};
+use crate::gap::load_band::reversals;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -39,6 +40,8 @@ const SHORT_BLOCKS: usize = 10 * EXCERPT_BLOCKS;
 const STIFF_SHARE: f64 = 0.3;
 /// Rms of a position sensor's error along the stroke that no column describes, over the scatter about the fit.
 const OWN_ERROR: f64 = 2.0;
+/// Scatter about the fit, over half of the motor's travel and over the wind-up, beyond both of which an output is not locked.
+const MOVES: (f64, f64) = (0.1, 5.0);
 /// Groups of rows that the jackknife leaves out in turn.
 const GROUPS: usize = 10;
 
@@ -95,6 +98,10 @@ pub(crate) fn fit(
     if vibration_n > 0.3 * scaling.load_n && search.scale_m > 0.16 * windup_m {
         return Err(Rejection::RateTooLow);
     }
+    // Positions of a locked output are explained by its load, or the output moves.
+    if scaling.is_locked() && search.scale_m > (MOVES.0 * scaling.place_m.1).max(MOVES.1 * windup_m) {
+        return Err(Rejection::MotionUnexplained);
+    }
     let profile = stroke_profile(&search.line, &workspace.whole, scaling);
     let (gap_m, sigma) = gap_and_error_m(&search, profile.as_ref(), vibration_n, scaling, &workspace.whole);
     let mut fit = FlankFit {
@@ -134,11 +141,14 @@ pub(crate) fn check_both_sides(
     shows_gap: bool,
 ) -> Result<(), Rejection> {
     let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
-    let beyond_s = |side: f64| {
-        let is_beyond = |load_n: &&f64| side * **load_n > share * scaling.load_n;
-        blocks.load_n.iter().filter(is_beyond).count() as f64 * blocks.period_s
-    };
-    rejection_of_contact(beyond_s(1.0).min(beyond_s(-1.0)))
+    let beyond = less_pressed_blocks(blocks.load_n.iter().copied(), share * scaling.load_n);
+    rejection_of_contact(beyond * blocks.period_s)
+}
+
+/// Number of blocks whose force presses the less pressed flank by more than `least_n`.
+fn less_pressed_blocks(forces_n: impl Iterator<Item = f64> + Clone, least_n: f64) -> f64 {
+    let count = |side: f64| forces_n.clone().filter(|force_n| side * force_n > least_n).count();
+    count(1.0).min(count(-1.0)) as f64
 }
 
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
@@ -199,7 +209,9 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         excerpt.find_phases(scaling.per_period);
         match ParameterSearch::new(excerpt, &coarse).run() {
             Ok(best) => break best,
-            Err(why) if !whole.is_longer(blocks) => return Err(why),
+            Err(why) if !whole.is_longer(blocks) => {
+                return Err(rejection_without_rows(excerpt, scaling, why));
+            }
             // Too little contact: a longer excerpt may show more.
             Err(_) => blocks *= 4,
         }
@@ -210,6 +222,20 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let iterations = if whole.len() < SHORT_BLOCKS { 2 } else { 1 };
     let line = search(whole, scaling, best.line.state, iterations, REWEIGHTINGS)?;
     Ok(SearchResult { line, ..best })
+}
+
+/// Why the rows of an excerpt do not show both flanks although both are pressed for two seconds: touches shorter than four
+/// blocks give no row, nor do loads that pile up.
+fn rejection_without_rows(blocks: &BlockMeans, scaling: &Scaling, why: Rejection) -> Rejection {
+    let forces_n: Vec<f64> = blocks.couplings.iter().map(|coupling| coupling.force_n).collect();
+    let least_n = FIRM_SHARE * scaling.load_n;
+    let pressed = less_pressed_blocks(forces_n.iter().copied(), least_n);
+    match pressed * blocks.period_s > 2.0 {
+        // Each reversal ends a touch; every other touch is of the less pressed flank.
+        true if pressed < 2.0 * reversals(&forces_n, least_n) as f64 => Rejection::RateTooLow,
+        true if blocks.is_clipped() => Rejection::LoadHeld,
+        _ => why,
+    }
 }
 
 /// Whether errors that repeat with the position are significant and larger than 0.2 µm.
@@ -270,8 +296,7 @@ fn gap_and_error_m(
     let friction_share = (friction.at_n(scaling.load_n) / scaling.load_n).min(0.6);
     let growth = 1.5 / (changes.max(1) as f64).sqrt() + 0.8 * friction_share;
     // The friction model is driven by the reading of the load cell, also where that is at its end.
-    let is_clipped = whole.in_range_n.start.is_finite() || whole.in_range_n.end.is_finite();
-    let growth = growth.exp() * if is_clipped { 1.5 } else { 1.0 };
+    let growth = growth.exp() * if whole.is_clipped() { 1.5 } else { 1.0 };
     let floor_m = (4.5e-4 * windup_m).hypot(0.4 * vibration_m);
     let (gap_m, jackknife_m, candidates_m) = profile.map_or_else(
         || {
