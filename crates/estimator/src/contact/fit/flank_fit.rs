@@ -141,12 +141,12 @@ pub(crate) fn check_both_sides(
     shows_gap: bool,
 ) -> Result<(), Rejection> {
     let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
-    let beyond = less_pressed_blocks(blocks.load_n.iter().copied(), share * scaling.load_n);
+    let beyond = less_pressed_blocks(&blocks.load_n.iter().copied(), share * scaling.load_n);
     rejection_of_contact(beyond * blocks.period_s)
 }
 
 /// Number of blocks whose force presses the less pressed flank by more than `least_n`.
-fn less_pressed_blocks(forces_n: impl Iterator<Item = f64> + Clone, least_n: f64) -> f64 {
+fn less_pressed_blocks(forces_n: &(impl Iterator<Item = f64> + Clone), least_n: f64) -> f64 {
     let count = |side: f64| forces_n.clone().filter(|force_n| side * force_n > least_n).count();
     count(1.0).min(count(-1.0)) as f64
 }
@@ -229,7 +229,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 fn rejection_without_rows(blocks: &BlockMeans, scaling: &Scaling, why: Rejection) -> Rejection {
     let forces_n: Vec<f64> = blocks.couplings.iter().map(|coupling| coupling.force_n).collect();
     let least_n = FIRM_SHARE * scaling.load_n;
-    let pressed = less_pressed_blocks(forces_n.iter().copied(), least_n);
+    let pressed = less_pressed_blocks(&forces_n.iter().copied(), least_n);
     match pressed * blocks.period_s > 2.0 {
         // Each reversal ends a touch; every other touch is of the less pressed flank.
         true if pressed < 2.0 * reversals(&forces_n, least_n) as f64 => Rejection::RateTooLow,
