@@ -1,5 +1,7 @@
 //! Flights of the flights table that left no record: an actuator wears in them all the same.
 
+use std::collections::BTreeSet;
+
 use ingest::tables::flights::Flights;
 use jiff::{SignedDuration, Timestamp};
 use records::{Flight, Installation};
@@ -32,7 +34,9 @@ pub(crate) fn unlogged_flights<'a>(
     let missing = installations.iter().enumerate().flat_map(|(index, installation)| {
         let tail = installation.tail_number.as_str();
         let flights = table.of_tail(tail).filter(|f| installation.covers(f.departure_utc));
-        let (logged, mut missing): (Vec<_>, Vec<_>) = flights.partition(|flight| is_logged(flight, history));
+        let rows = flights.map(|flight| (flight, row_of(flight, history)));
+        let (logged, missing): (Vec<_>, Vec<_>) = rows.partition(|(_, row)| row.is_some());
+        let mut missing: Vec<&Flight> = missing.into_iter().map(|(flight, _)| flight).collect();
         let period = table.of_tail(tail).next().zip(table.of_tail(tail).last());
         let is_in_period = |at: Timestamp| {
             period.is_some_and(|(first, last)| (first.departure_utc..=last.departure_utc).contains(&at))
@@ -41,12 +45,13 @@ pub(crate) fn unlogged_flights<'a>(
             let (place, at) = (history.place(flown).tail_number.as_deref(), flown.departure_utc());
             place == Some(tail) && installation.covers(at) && is_in_period(at)
         });
-        let records: Vec<&FlightRow> = records.collect();
+        let records: Vec<Timestamp> = records.map(FlightRow::departure_utc).collect();
         // By other names, or in another time zone, a table would count most flights twice.
         if 2 * logged.len() < records.len() {
-            let is_unmatched =
-                |flown: &&&FlightRow| !logged.iter().any(|flight| is_of(flight, flown, history));
-            leave_out_nearest(&mut missing, records.iter().filter(is_unmatched));
+            let matched: BTreeSet<Timestamp> =
+                logged.iter().filter_map(|(_, row)| Some((*row)?.departure_utc())).collect();
+            let unmatched = records.into_iter().filter(|departure_utc| !matched.contains(departure_utc));
+            leave_out_nearest(&mut missing, unmatched);
         }
         missing.into_iter().map(move |flight| (index, flight)).collect::<Vec<_>>()
     });
@@ -54,8 +59,8 @@ pub(crate) fn unlogged_flights<'a>(
 }
 
 /// Removes, for each record, the nearest flight within 12 hours; the flights are by departure.
-fn leave_out_nearest<'a>(flights: &mut Vec<&Flight>, records: impl Iterator<Item = &'a &'a FlightRow>) {
-    for departure_utc in records.map(|flown| flown.departure_utc()) {
+fn leave_out_nearest(flights: &mut Vec<&Flight>, records: impl Iterator<Item = Timestamp>) {
+    for departure_utc in records {
         let apart = |at: &usize| flights[*at].departure_utc.duration_since(departure_utc).abs();
         let next = flights.partition_point(|flight| flight.departure_utc < departure_utc);
         let near = next.saturating_sub(1)..flights.len().min(next + 1);
@@ -64,19 +69,16 @@ fn leave_out_nearest<'a>(flights: &mut Vec<&Flight>, records: impl Iterator<Item
     }
 }
 
-/// Whether a unit has a row of a flight.
-fn is_logged(flight: &Flight, history: &History) -> bool {
+/// A unit's row of a flight: one of its tail with its departure, or with its name and a departure within 12 hours of it.
+fn row_of<'h>(flight: &Flight, history: &'h History) -> Option<&'h FlightRow> {
     let at = flight.departure_utc;
     let since = |flown: &FlightRow| flown.departure_utc().duration_since(at);
     let first = history.flights().partition_point(|flown| since(flown) < -SAME_FLIGHT);
     let mut near = history.flights()[first..].iter().take_while(|flown| since(flown) <= SAME_FLIGHT);
-    near.any(|flown| is_of(flight, flown, history))
-}
-
-/// Whether a row is of a flight: it has its tail and its departure, or its tail, its name and a departure within 12 hours.
-fn is_of(flight: &Flight, flown: &FlightRow, history: &History) -> bool {
-    let apart = flown.departure_utc().duration_since(flight.departure_utc).abs();
-    let is_named = history.flight_id(flown) == Some(flight.flight_id.as_str());
-    (apart.is_zero() || (is_named && apart <= SAME_FLIGHT))
-        && history.place(flown).tail_number.as_deref() == Some(flight.tail_number.as_str())
+    let is_same = |flown: &FlightRow| {
+        flown.departure_utc() == at || history.flight_id(flown) == Some(flight.flight_id.as_str())
+    };
+    let is_on_tail =
+        |flown: &FlightRow| history.place(flown).tail_number.as_deref() == Some(flight.tail_number.as_str());
+    near.find(|flown| is_same(flown) && is_on_tail(flown))
 }
