@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use estimator::SensorNoise;
-use estimator::contact::{ContactEstimate, ContactOutcome, PartPrior, QualityFlag};
+use estimator::contact::{ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use serde_json::Value;
 
@@ -104,6 +104,11 @@ fn contact_regression_finds_the_true_gap() {
         assert!((stiffness - 1.0).abs() < 3e-3, "{name}: stiffness {stiffness} times the true one");
         assert!(found.flags.is_empty(), "{name}: {found:?}");
     }
+}
+
+#[test]
+fn a_load_that_never_reverses_is_refused() {
+    assert_eq!(Log::load("D_no_reversal").contact(), Err(Rejection::NoLoadReversal));
 }
 
 /// The stiffness of B is assumed 15 % high, which leaks 10 % into the published gap; with the stiffness that the

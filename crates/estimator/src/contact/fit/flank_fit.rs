@@ -141,13 +141,13 @@ pub(crate) fn check_both_sides(
     shows_gap: bool,
 ) -> Result<(), Rejection> {
     let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
-    let beyond = less_pressed_blocks(&blocks.load_n.iter().copied(), share * scaling.load_n);
+    let beyond = less_pressed_blocks(&blocks.load_n, share * scaling.load_n);
     rejection_of_contact(beyond * blocks.period_s)
 }
 
 /// Number of blocks whose force presses the less pressed flank by more than `least_n`.
-fn less_pressed_blocks(forces_n: &(impl Iterator<Item = f64> + Clone), least_n: f64) -> f64 {
-    let count = |side: f64| forces_n.clone().filter(|force_n| side * force_n > least_n).count();
+fn less_pressed_blocks(forces_n: &[f64], least_n: f64) -> f64 {
+    let count = |side: f64| forces_n.iter().filter(|force_n| side * **force_n > least_n).count();
     count(1.0).min(count(-1.0)) as f64
 }
 
@@ -229,13 +229,15 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 fn rejection_without_rows(blocks: &BlockMeans, scaling: &Scaling, why: Rejection) -> Rejection {
     let forces_n: Vec<f64> = blocks.couplings.iter().map(|coupling| coupling.force_n).collect();
     let least_n = FIRM_SHARE * scaling.load_n;
-    let pressed = less_pressed_blocks(&forces_n.iter().copied(), least_n);
-    match pressed * blocks.period_s > 2.0 {
-        // Each reversal ends a touch; every other touch is of the less pressed flank.
-        true if pressed < 2.0 * reversals(&forces_n, least_n) as f64 => Rejection::RateTooLow,
-        true if blocks.is_clipped() => Rejection::LoadHeld,
-        _ => why,
+    let pressed = less_pressed_blocks(&forces_n, least_n);
+    if pressed * blocks.period_s <= 2.0 {
+        return why;
     }
+    // Each reversal ends a touch; every other touch is of the less pressed flank.
+    if pressed < 2.0 * reversals(&forces_n, least_n) as f64 {
+        return Rejection::RateTooLow;
+    }
+    if blocks.is_clipped() { Rejection::LoadHeld } else { why }
 }
 
 /// Whether errors that repeat with the position are significant and larger than 0.2 µm.
