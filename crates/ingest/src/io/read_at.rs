@@ -39,3 +39,31 @@ fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
 fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, buffer, at)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    /// Each byte encodes its offset; eight readers read one file at random offsets.
+    #[test]
+    fn readers_of_one_file_do_not_move_each_other() {
+        let mut file = tempfile::tempfile().unwrap();
+        let content: Vec<u8> = (0..251_u8).cycle().take(100_000).collect();
+        file.write_all(&content).unwrap();
+        std::thread::scope(|scope| {
+            for reader in 0..8_usize {
+                let (file, content) = (&file, &content);
+                scope.spawn(move || {
+                    for step in 0..500_usize {
+                        let start = (reader * 7_919 + step * 104_729) % 99_000;
+                        let mut bytes = [0; 900];
+                        read_exact(file, &mut bytes, start as u64).unwrap();
+                        assert_eq!(bytes, content[start..start + 900]);
+                    }
+                });
+            }
+        });
+    }
+}

@@ -78,3 +78,32 @@ impl From<ListEntry> for FileStat {
         }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::fs::File;
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use super::*;
+
+    /// The second file is the newer one; the first is written again with the same size, before the second one's time.
+    #[test]
+    fn a_log_differs_when_one_of_its_files_is_written_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let main = ["a", "b"].map(|name| dir.path().join(name)).to_vec();
+        let write = |file: usize, at_s: u64| {
+            let written = File::create(&main[file]).unwrap();
+            written.set_modified(UNIX_EPOCH + Duration::from_secs(at_s)).unwrap();
+        };
+        let files = LogFiles { main: main.clone(), groups: BTreeMap::new() };
+        let stat = || FileStat::of_log(&files, &SeenObjects::default(), &IdentityMapping::default()).unwrap();
+        write(0, 10);
+        write(1, 20);
+        let before = stat();
+        assert_eq!(stat(), before);
+        write(0, 15);
+        assert_ne!(stat(), before);
+    }
+}

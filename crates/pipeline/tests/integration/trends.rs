@@ -1,8 +1,11 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 
+use std::collections::BTreeSet;
+
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::backtest;
+use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
 use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
@@ -156,17 +159,17 @@ fn a_fleet_without_a_failure_is_compared_with_the_levels_that_it_has_reached() {
 fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     const UNITS: i32 = 14;
     const DAYS: i32 = 300;
-    // The table from a day on, with a prefix of its names, and how many hours later flights with and without a log depart.
-    let table = |first: i32, prefix: &str, late_h: [i64; 2]| {
+    // The table from a day on, with a prefix of each name, and how many hours later flights with and without a log depart.
+    let table = |first: i32, prefix: fn(i32) -> &'static str, late_h: [i64; 2]| {
         let row = |(unit, at): (i32, i32)| {
             let departs = day(at) + SignedDuration::from_hours(late_h[usize::from(at % 2 == 0)]);
-            format!("T{unit:02},{prefix}{unit}-{at},{departs},2.0\n")
+            format!("T{unit:02},{}{unit}-{at},{departs},2.0\n", prefix(at))
         };
         let flights = (0..UNITS).flat_map(|unit| (first..DAYS + 50).map(move |at| (unit, at)));
         let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
         fleet::with_flights(config(), &flights.map(row).fold(head, |all, row| all + &row))
     };
-    let config_with = table(0, "", [0, 0]);
+    let config_with = table(0, |_| "", [0, 0]);
     let installed = |unit| Installation { unit_hours_at_install: Some(100.0), ..installation(unit, None) };
     let installations = Installations::new((0..UNITS).map(installed).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
@@ -188,12 +191,53 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         assert!(without.rate_m_per_hour.unwrap() > 1.5 * truth);
     }
     // By other names, and in another time zone: each log is one of the flights all the same.
-    assert!(assess(&table(0, "TK", [3, 3])).iter().all(|row| row.flights == 300));
+    assert!(assess(&table(0, |_| "TK", [3, 3])).iter().all(|row| row.flights == 300));
+    // So it is where a fifth of them has the names of the logs.
+    let mixed = table(0, |at| if at % 10 == 1 { "" } else { "TK" }, [3, 3]);
+    assert!(assess(&mixed).iter().all(|row| row.flights == 300));
     // A table of the last fifty days, with flights ten hours after a log: these are others.
-    assert!(assess(&table(250, "", [0, -14])).iter().all(|row| row.flights == 150 + 25));
+    assert!(assess(&table(250, |_| "", [0, -14])).iter().all(|row| row.flights == 150 + 25));
     // Some of them lie high and some low, by what their scatter allows: 3 % of the mean of all.
     let mean = ratios / f64::from(UNITS);
     assert!((mean - 1.0).abs() < 0.06, "{mean} of the true rates");
+}
+
+/// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
+#[test]
+fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
+    let mut rows = flown(228);
+    for row in rows.iter_mut().filter(|row| unit(row) == 5 && row.flight.departure_utc >= day(200)) {
+        row.estimate.gap_m = row.estimate.gap_m.map(|gap| gap - 12e-6);
+    }
+    let known: Vec<GapRecord> =
+        rows.iter().filter(|row| row.flight.departure_utc < day(200)).cloned().collect();
+    let assess = |rows: &[GapRecord]| assess_with(&config(), rows, None);
+    let states = |rows: &[GapRecord]| -> Vec<records::UnitState> {
+        assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
+    };
+    let nothing = BTreeSet::new();
+    let with_records = [(Some("EMA-27-1040".to_owned()), "S05".to_owned())].into();
+    let night = |before: &[records::UnitState], with_records, config: &Config| {
+        changes(config, before, &assess(&rows), RunFacts { run_id: "now", with_records, moved: &[] })
+    };
+    let found = night(&states(&known), &with_records, &config());
+    let [change] = &found.changed[..] else { panic!("{:?}", found.changed) };
+    assert_eq!(change.serial_number, "S05");
+    assert_eq!(change.new_events.len(), 1, "{change:?}");
+    assert_eq!(change.new_events[0].departure_utc, day(200));
+    assert!(change.cleared_events.is_empty());
+    assert_eq!(
+        (change.from.as_deref(), change.to, change.cause),
+        (Some("normal"), Some("watch"), Cause::Records)
+    );
+    // What is stored is what the next run compares with: it finds nothing.
+    let stored: Vec<_> = found.states.iter().chain(&states(&known)).cloned().collect();
+    let stored: std::collections::BTreeMap<_, _> = stored.into_iter().rev().map(|s| (s.unit(), s)).collect();
+    let stored: Vec<records::UnitState> = stored.into_values().collect();
+    assert!(night(&stored, &nothing, &config()).changed.is_empty());
+    // A first night stores states and tells nothing.
+    let first = night(&[], &with_records, &config());
+    assert_eq!((first.changed.len(), first.states.len()), (0, 14));
 }
 
 /// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.

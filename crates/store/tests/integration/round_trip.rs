@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray};
-use arrow::datatypes::{DataType, Field};
+use arrow::array::{
+    Array, ArrayRef, Float64Array, Int64Array, ListArray, RecordBatch, StringArray, TimestampMicrosecondArray,
+};
+use arrow::datatypes::{DataType, Field, Int64Type, Schema};
 use jiff::Timestamp;
 use proptest::prelude::*;
 use records::row_schema::{from_batch, to_batch};
@@ -135,4 +137,19 @@ fn a_missing_column_is_named() {
     batch.remove_column(2);
     let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
     assert_eq!(error, "column `part_number` is missing");
+}
+
+/// Flags of numbers, which no release has written: an error, and no empty list.
+#[test]
+fn a_list_of_other_elements_is_refused() {
+    let batch = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
+    let at = batch.schema().index_of("flags").unwrap();
+    let numbers = ListArray::from_iter_primitive::<Int64Type, _, _>([Some([Some(1)])]);
+    let mut fields = batch.schema().fields().to_vec();
+    fields[at] = Arc::new(Field::new("flags", numbers.data_type().clone(), false));
+    let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
+    arrays[at] = Arc::new(numbers);
+    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
+    let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
+    assert!(error.starts_with("column `flags` holds List"), "{error}");
 }
