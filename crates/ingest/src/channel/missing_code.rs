@@ -16,8 +16,8 @@ const FAR: f64 = 10.0;
 /// Least share of the samples with a value that lie far from both neighbours, and of those far samples that have this value.
 const MOSTLY: f64 = 0.75;
 
-/// Where a channel holds a missing-value code, and the share of the samples that do: one value that lies, nearly wherever it
-/// comes, far to the same side of the sample before and of the one after.
+/// Where a channel holds a missing-value code, and the share of its changes that lead to it: one value that lies, nearly
+/// wherever it comes, far to the same side of the value before and of the one after.
 ///
 /// Vibration leaps as well, but neither to one value nor so far in its own steps.
 pub(crate) fn missing_code(values: &[f64]) -> Option<(usize, f64)> {

@@ -213,7 +213,7 @@ impl<'s> ChannelSampling<'s> {
         let raw = self.base.keep(self.table.numbers(&self.samples, None, None)?.0)[at];
         let (column, percent) = (self.column(), 100.0 * share);
         let message = format!(
-            "column `{column}` leaps to {raw} and back in {percent:.1} % of the samples: a code for missing values"
+            "column `{column}` leaps to {raw} and back in {percent:.1} % of its changes: a code for missing values"
         );
         let hint = format!("list it: `missing = [{raw}]` in the channel's table of the configuration");
         Err(self.table.error(Fault::new("missing_code", message, hint).column(column)))

@@ -42,7 +42,11 @@ impl Explanation {
             "record": self.record,
             "remedy": remedy(&self.record.estimate),
             "settings": { "part": part, "config_digest": digest, "is_current": is_current },
-            "replay": { "verdict": self.verdict.code(), "says": self.verdict.to_string() },
+            "replay": {
+                "verdict": self.verdict.code(),
+                "says": self.verdict.to_string(),
+                "error": self.replayed.as_ref().err(),
+            },
         })
     }
 }
@@ -88,10 +92,9 @@ fn find(query: &Query, store: &Store) -> Result<GapRecord, Error> {
             let (count, last) = (found.len(), &last.flight);
             let (tail, time) = (&last.tail_number, last.departure_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
             let what = format!("{count} flights are named {flight}; the latest is of {tail}, {time}");
-            (
-                what,
-                format!("select one with `--tail {tail} --since {time}`, and `--until` for an earlier one"),
-            )
+            let hint =
+                format!("select one with `--tail {tail} --since {time}`, and `--until` for an earlier one");
+            (what, hint)
         }
     };
     Err(Error::refused(Diagnostic::new("no_such_record", what).hint(hint)))
@@ -165,7 +168,7 @@ impl std::fmt::Display for ReplayVerdict {
             Self::OtherSettings => "settings changed since; `freeplay run` will recompute it",
             Self::OtherLog => "the log changed since; `freeplay run` will recompute it",
             Self::OtherNumber => "recomputed value differs: please report this with the log",
-            Self::NotReplayed => "the log can no longer be read",
+            Self::NotReplayed => "could not be recomputed",
         })
     }
 }

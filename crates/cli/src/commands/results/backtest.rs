@@ -62,9 +62,9 @@ fn line(
 ) -> Option<Vec<String>> {
     let within = |p: &&BacktestRow| p.target == target && p.used_share >= from && p.used_share < to;
     let among: Vec<&BacktestRow> = found.iter().filter(within).collect();
-    let mut errors: Vec<f64> = among.iter().map(|p| p.relative_error).collect();
-    errors.sort_unstable_by(f64::total_cmp);
-    let median = errors.get(errors.len() / 2)?;
+    let errors: Vec<f64> = among.iter().map(|p| p.relative_error).collect();
+    let near = errors.iter().filter(|error| **error <= 0.2).count();
+    let median = trend::quantity::median(errors)?;
     let per_cent = |count: usize| format!("{:.0}", 100.0 * count as f64 / among.len() as f64);
     let ended = |how: &str| per_cent(among.iter().filter(|p| p.interval == how).count());
     Some(vec![
@@ -75,6 +75,6 @@ fn line(
         ended("held"),
         ended("late"),
         ended("early"),
-        per_cent(errors.iter().filter(|e| **e <= 0.2).count()),
+        per_cent(near),
     ])
 }

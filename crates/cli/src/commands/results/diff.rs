@@ -25,9 +25,8 @@ fn page(diff: &StoreDiff) -> String {
         format!("{} with {}", count(counts.records, "record"), count(counts.with_gap, "gap"))
     };
     let rows = &diff.rows;
-    let mut changes: Vec<f64> = rows.iter().filter_map(|r| r.gap_change_m).map(f64::abs).collect();
-    changes.sort_by(f64::total_cmp);
-    let middle = changes.get(changes.len() / 2).copied();
+    let changes: Vec<f64> = rows.iter().filter_map(|r| r.gap_change_m).map(f64::abs).collect();
+    let largest = changes.iter().copied().max_by(f64::total_cmp);
     let mut head = format!(
         "{} of {} actuator-flights differ; before {}, after {}\n",
         rows.len(),
@@ -35,7 +34,7 @@ fn page(diff: &StoreDiff) -> String {
         record_counts(diff.before),
         record_counts(diff.after)
     );
-    if let (Some(middle), Some(largest)) = (middle, changes.last()) {
+    if let Some((middle, largest)) = trend::quantity::median(changes).zip(largest) {
         let _ = writeln!(
             head,
             "change of the gap: median {:.3} µm, largest {:.3} µm",

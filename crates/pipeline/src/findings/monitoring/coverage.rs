@@ -87,23 +87,26 @@ fn skeleton(name: &str) -> String {
     .collect()
 }
 
-/// A flights table that ends before the logs do: from then on, usage is that of logged flights.
+/// A flights table whose rows of a tail end before its logs do: from then on, usage is that of logged flights.
 fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
-    let ended = rows.iter().filter_map(|row| {
-        let (tail, latest) = (row.tail_number.as_deref()?, row.latest_utc?);
-        let end = config.flights.of_tail(tail).last()?.departure_utc;
-        (days_between(end, latest) > QUIET_DAYS).then_some((tail, end, latest))
-    });
-    let ended: BTreeSet<(&str, Timestamp, Timestamp)> = ended.collect();
-    let tails: BTreeSet<&str> = ended.iter().map(|(tail, ..)| *tail).collect();
-    let (end, latest) = (ended.iter().map(|row| row.1).min()?, ended.iter().map(|row| row.2).max()?);
-    let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
+    let mut ends = BTreeMap::<&str, (Timestamp, Timestamp)>::new();
+    for row in rows {
+        let Some((tail, latest)) = row.tail_number.as_deref().zip(row.latest_utc) else { continue };
+        let Some(last) = config.flights.of_tail(tail).last() else { continue };
+        let known = ends.entry(tail).or_insert((last.departure_utc, latest));
+        known.1 = known.1.max(latest);
+    }
+    ends.retain(|_, (end, latest)| days_between(*end, *latest) > QUIET_DAYS);
+    let (tail, (end, latest)) = ends.iter().max_by_key(|(_, (end, latest))| latest.duration_since(*end))?;
+    let day = |at: &Timestamp| at.strftime("%Y-%m-%d").to_string();
+    let others = ends.keys().filter(|other| *other != tail).map(|other| format!(", {other}"));
     let table = config.document.logs.flights.as_deref().unwrap_or_default();
     Some(format!(
-        "{table} ends on {} and logs go on until {} ({}): usage after it is that of logged flights; bring it up to date",
+        "{table} ends before the logs of {tail}{}: of {tail}, the last row is of {} and the last log of {}; usage between them \
+         is that of logged flights; bring the table up to date",
+        others.collect::<String>(),
         day(end),
-        day(latest),
-        tails.into_iter().collect::<Vec<_>>().join(", ")
+        day(latest)
     ))
 }
 
@@ -125,12 +128,15 @@ fn no_limit(part: &str, count: usize, config: &Config) -> String {
     format!("part {part} is not configured{near}: {lost}; add `[part.\"{part}\"]`, or correct its name")
 }
 
-/// Departures of the flights table that differ from those of the logs by one number of hours: another time zone.
+/// Departures of the flights table that differ from those of the logs by quarters of an hour: another time zone, which may
+/// change in summer.
 pub(crate) fn departures_in_another_zone<'a>(
     config: &Config,
     accounts: impl Iterator<Item = &'a LogRecord>,
 ) -> Option<String> {
-    const QUARTER_S: i64 = 900;
+    const QUARTER_S: f64 = 900.0;
+    /// Tables round departures to the minute.
+    const ROUNDED_S: f64 = 60.0;
     const MIN_FLIGHTS: usize = 3;
     let offset = |account: &LogRecord| {
         let (tail, id, at) =
@@ -140,15 +146,20 @@ pub(crate) fn departures_in_another_zone<'a>(
     let (mut by_offset, mut all) = (BTreeMap::<i64, usize>::new(), 0);
     for offset_s in accounts.filter_map(offset) {
         all += 1;
-        *by_offset.entry(offset_s).or_default() += 1;
+        let quarters = (offset_s as f64 / QUARTER_S).round();
+        if quarters != 0.0 && (offset_s as f64 - quarters * QUARTER_S).abs() <= ROUNDED_S {
+            *by_offset.entry(quarters as i64).or_default() += 1;
+        }
     }
-    let (offset_s, flights) = by_offset.into_iter().max_by_key(|(_, flights)| *flights)?;
-    let is_zone = offset_s != 0 && offset_s % QUARTER_S == 0;
-    (is_zone && flights >= MIN_FLIGHTS && 2 * flights > all).then(|| {
-        let hours = offset_s as f64 / 3600.0;
-        let table = config.document.logs.flights.as_deref().unwrap_or_default();
+    // Winter and summer, without the odd flight that happens to lie apart by so much.
+    by_offset.retain(|_, flights| 5 * *flights >= all);
+    let flights: usize = by_offset.values().sum();
+    (flights >= MIN_FLIGHTS && 2 * flights > all).then(|| {
+        let hours: Vec<String> = by_offset.keys().map(|of| format!("{:+} h", *of as f64 / 4.0)).collect();
+        let (hours, table) =
+            (hours.join(" or "), config.document.logs.flights.as_deref().unwrap_or_default());
         format!(
-            "{table}: {flights} of {all} departures are {hours:+} h from those of the logs, which count; write them in UTC, or \
+            "{table}: {flights} of {all} departures are {hours} from those of the logs, which count; write them in UTC, or \
              with their offset (2026-10-01T08:00-05:00), since those of flights without a log may be on the wrong day"
         )
     })
