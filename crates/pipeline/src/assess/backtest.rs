@@ -57,8 +57,8 @@ records::row! {
 
 /// Past forecasts of the units that have worn since, by part number, serial number and date.
 ///
-/// A forecast is left out if a step or a reset came between it and its target, or if the unit has not clearly worn since. A unit
-/// that seemed steady at the date of its forecast counts as well.
+/// A forecast is left out if a step or a reset came between it and its target, or if the unit has not clearly worn since.
+/// A unit that seemed steady at the date of its forecast counts as well.
 ///
 /// # Errors
 /// When a history or a part's limits are invalid.

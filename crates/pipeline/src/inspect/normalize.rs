@@ -24,8 +24,8 @@ pub struct Normalized {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Writes the normalized logs of the selected logs below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight number
-/// flies again.
+/// Writes the normalized logs of the selected logs below a folder, as `TAIL/DEPARTURE_FLIGHT/POSITION.parquet`: a flight
+/// number flies again.
 ///
 /// # Errors
 /// When workers cannot be started. Logs and actuators in error are diagnostics; the others are written.

@@ -104,7 +104,7 @@ pub struct SelectedLogs {
     pub notes: Vec<String>,
 }
 
-/// The logs that files given by hand hold or belong to; without files, about `most` of all logs.
+/// The logs that the named files hold or belong to; without names, about `most` of all logs.
 ///
 /// # Errors
 /// As [`discover`].
