@@ -39,17 +39,13 @@ pub fn set_max_rows(rows: u64) {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the file claims {found} {what}, more than the limit of {most}")]
 pub(crate) struct Excess {
-    /// What is counted.
     pub(crate) what: &'static str,
-    /// How many the file claims.
     pub(crate) found: u64,
-    /// How many are read.
     pub(crate) most: u64,
     /// The key that raises the bound.
     pub(crate) key: Option<&'static str>,
 }
 
-/// Compares a claim with its bound.
 pub(crate) fn check(what: &'static str, found: u64, most: u64) -> Result<(), Excess> {
     if found <= most { Ok(()) } else { Err(Excess { what, found, most, key: None }) }
 }

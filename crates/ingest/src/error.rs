@@ -42,7 +42,6 @@ impl Error {
         self.0.as_ref().clone()
     }
 
-    /// Whether a column holds more or fewer samples than its table.
     pub(crate) fn is_row_count(&self) -> bool {
         self.0.code == ROW_COUNT_DIFFERS
     }
@@ -157,7 +156,6 @@ pub(crate) fn row_count(column: &str, found: usize, declared: usize) -> Fault {
     Fault::new(ROW_COUNT_DIFFERS, message, CORRUPT).column(column)
 }
 
-/// A file, or a column of it, that is encrypted.
 pub(crate) fn encrypted(column: Option<&str>) -> Fault {
     let hint = "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported";
     match column {
@@ -233,7 +231,6 @@ pub(crate) fn identity_invalid(fact: &str, found: &dyn Display, detail: &dyn Dis
     Fault::new("identity_invalid", format!("`{found}` is no {fact}: {detail}"), hint)
 }
 
-/// What is wrong with a table, or with a cell of it.
 #[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error")]
 pub(crate) fn bad_table(detail: impl ToString) -> Fault {
     let hint =
@@ -242,7 +239,6 @@ pub(crate) fn bad_table(detail: impl ToString) -> Fault {
     Fault::new("bad_table", format!("the table cannot be used: {detail}"), hint)
 }
 
-/// A column pattern that fits none of the columns.
 pub(crate) fn no_position(pattern: &str, columns: &[String]) -> Fault {
     let hint = if pattern.contains('{') && !pattern.contains(PLACEHOLDER) {
         format!("the placeholder of the position is {PLACEHOLDER}")

@@ -21,7 +21,6 @@ pub(crate) fn acquire(values: usize) -> Vec<f64> {
     kept.unwrap_or_else(|| Vec::with_capacity(values))
 }
 
-/// Takes a column back.
 pub(crate) fn release(mut column: Vec<f64>) {
     if !(1..=MAX_VALUES).contains(&column.capacity()) {
         return;

@@ -7,7 +7,6 @@ use crate::channel::stats::{ChannelStats, StatsAccumulator};
 /// Numbers that are read and added at a time: few enough to stay in the first-level cache.
 pub(crate) const BATCH: usize = 2048;
 
-/// A column to which raw numbers are added.
 #[derive(Debug)]
 pub(crate) struct ColumnBuilder {
     to_si: Option<SiConversion>,
@@ -31,7 +30,6 @@ impl ColumnBuilder {
         self.values.len()
     }
 
-    /// Leaves out some values: they are missing.
     pub(crate) fn append_nulls(&mut self, values: usize) {
         self.values.resize(self.values.len() + values, f64::NAN);
     }

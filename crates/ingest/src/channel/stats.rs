@@ -16,7 +16,6 @@ pub(crate) struct ChannelStats {
     pub(crate) min: f64,
     /// Largest value; minus infinite where there is none.
     pub(crate) max: f64,
-    /// Samples without a value.
     pub(crate) missing: usize,
     /// Smallest step between neighbours that differ; infinite where none do.
     pub(crate) min_step: f64,
@@ -27,7 +26,6 @@ pub(crate) struct ChannelStats {
 }
 
 impl ChannelStats {
-    /// Looks at a channel.
     pub(crate) fn of(values: &[f64]) -> Self {
         StatsAccumulator::new().end(values)
     }
@@ -67,7 +65,6 @@ impl StatsAccumulator {
         groups(self, values);
     }
 
-    /// What was seen of the whole channel.
     pub(crate) fn end(mut self, values: &[f64]) -> ChannelStats {
         self.advance(values);
         let at = |k: usize| values.get(k).copied().unwrap_or(f64::NAN);

@@ -31,7 +31,6 @@ pub(super) fn words(name: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Whether a word names a channel.
 fn is_channel(word: &str) -> bool {
     ROLES.iter().any(|(_, known)| place_in(known, &word.to_lowercase()).is_some())
 }
@@ -108,7 +107,6 @@ const OTHERS: &str = "current speed velocity vel rate rpm acceleration accel vol
 /// Words that distinguish redundant sensors of one quantity, best first.
 const SENSORS: &str = "a primary main 1 cha ch1 b secondary backup 2 chb ch2";
 
-/// One column, understood.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ParsedName {
     pub(super) role: Role,

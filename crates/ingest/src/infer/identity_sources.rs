@@ -57,7 +57,6 @@ fn rank_of(name: &str) -> Option<(IdentityField, usize)> {
     known.or_else(|| composed().map(|(fact, ..)| (*fact, usize::MAX)))
 }
 
-/// The fact that a name sounds like.
 pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
     rank_of(name).map(|(fact, _)| fact)
 }
@@ -246,12 +245,10 @@ pub fn path_position(path: &Path) -> Option<(String, String)> {
         .find_map(|expression| Some((captured(&expression, path.to_str()?, "position")?, expression)))
 }
 
-/// What a named group of an expression matches in a text.
 fn captured(expression: &str, text: &str, group: &str) -> Option<String> {
     Some(compiled(expression)?.captures(text)?.name(group)?.as_str().to_owned())
 }
 
-/// Whether an expression matches a part of a text.
 fn fits(expression: &str, text: &str) -> bool {
     compiled(expression).is_some_and(|regex| regex.is_match(text))
 }

@@ -175,7 +175,6 @@ fn identity_columns(
     (facts, by_row)
 }
 
-/// The layout that columns of names, values and positions show.
 fn layout(
     table: &RowTable,
     leaves: &[LeafColumn],

@@ -15,7 +15,6 @@ use object_io::{Address, ObjectFile};
 use crate::error::Fault;
 use crate::io::transient;
 
-/// An open file or object.
 #[derive(Debug)]
 pub(crate) struct ByteSource {
     /// The local file, or the mirror of the object.

@@ -3,7 +3,6 @@
 /// Bytes of a file that are read to identify its format.
 pub(crate) const HEAD_BYTES: usize = 512;
 
-/// First bytes of files of other formats.
 const MAGIC: [(&[u8], &str); 16] = [
     (b"MDF     ", "an MDF file (ASAM)"),
     (b"UnFinMF ", "an MDF file (ASAM) that was not finished"),

@@ -12,7 +12,6 @@ pub(crate) fn file_length(file: &File) -> io::Result<u64> {
     Ok(transient::with_retry(|| file.metadata())?.len())
 }
 
-/// Fills the buffer from some byte on.
 pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io::Result<()> {
     while !buffer.is_empty() {
         let count = read_at(file, buffer, at)?;

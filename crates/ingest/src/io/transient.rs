@@ -35,7 +35,6 @@ pub(crate) fn is_transient(error: &io::Error) -> bool {
     by_kind || is_one_of(error, INPUT_OUTPUT_ERRORS) || is_file_limit(error)
 }
 
-/// Whether too many files are open.
 pub(crate) fn is_file_limit(error: &io::Error) -> bool {
     is_one_of(error, TOO_MANY_OPEN_FILES)
 }
@@ -44,7 +43,6 @@ fn is_one_of(error: &io::Error, numbers: [i32; 2]) -> bool {
     cfg!(unix) && error.raw_os_error().is_some_and(|number| numbers.contains(&number))
 }
 
-/// Repeats an operation while its error is transient.
 pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     for delay in DELAYS {
         match operation() {

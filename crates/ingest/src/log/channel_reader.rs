@@ -111,7 +111,6 @@ impl<'s> ChannelSampling<'s> {
         rows.map_or(&self.samples.leaf, |(_, name)| name)
     }
 
-    /// Whether its rows are those of another channel.
     fn shares_rows(&self, other: &Self) -> bool {
         std::ptr::eq(self.table, other.table)
             && self.samples.rows == other.samples.rows

@@ -79,7 +79,6 @@ impl Log {
         Self { mapping: Arc::clone(mapping), selected: Mutex::new(None), ..self }
     }
 
-    /// The table of the main log.
     fn main(&self) -> &RowTable {
         &self.tables[&None]
     }
@@ -201,7 +200,6 @@ impl Log {
         Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 
-    /// The table that holds a channel.
     fn table(&self, map: &ChannelMapping) -> Option<&RowTable> {
         self.tables.get(&map.group)
     }
@@ -539,7 +537,6 @@ impl<'c> ActuatorReader<'c> {
     }
 }
 
-/// The column of a pattern at a position.
 fn column_at(pattern: &str, position: &Position) -> String {
     ColumnPattern::new(pattern).column_for(position.as_str())
 }

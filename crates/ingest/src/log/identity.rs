@@ -25,7 +25,6 @@ pub struct Identity {
 /// The stamps of a log, from the earliest to the latest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClockSpan {
-    /// What the first stamp means.
     pub(crate) origin: TimeOrigin,
     /// Earliest and latest stamp since the first one, s.
     pub(crate) earliest_s: f64,

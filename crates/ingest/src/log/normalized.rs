@@ -50,7 +50,6 @@ fn noted<'f>(file: &'f LogFile, key: &str) -> Option<&'f str> {
     file.metadata(&format!("freeplay.{key}")).filter(|text| !text.is_empty())
 }
 
-/// The channels as they were written.
 pub(crate) fn read_actuator(
     file: &LogFile,
     position: Position,

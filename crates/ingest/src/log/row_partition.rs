@@ -32,14 +32,12 @@ const MAX_COMBINATIONS: u64 = 1 << 22;
 /// Which samples are meant: the leaf that holds them, and the rows in which it does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct SampleSelector {
-    /// The leaf.
     pub(crate) leaf: String,
     /// Columns and the text they must hold.
     pub(crate) rows: Vec<(String, String)>,
 }
 
 impl SampleSelector {
-    /// Every row of a leaf.
     pub(crate) fn every_row(leaf: &str) -> Self {
         Self { leaf: leaf.to_owned(), rows: Vec::new() }
     }
@@ -61,7 +59,6 @@ pub(crate) struct Partition {
 struct State {
     /// Rows that will be read, and the positions that will read them.
     announced: BTreeMap<Rows, BTreeSet<String>>,
-    /// Leaves that will be read.
     leaves: BTreeSet<String>,
     gathered: HashMap<GatheredKey, Arc<Vec<ArrayRef>>>,
 }
@@ -212,7 +209,6 @@ impl DistinctTexts {
         file.scan(names, scan, |arrays| self.take(names, arrays))
     }
 
-    /// Looks at a batch.
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), Fault> {
         let owned = |texts: Vec<&str>| texts.into_iter().map(str::to_owned).collect();
         self.0.extend(Combinations::of(names, arrays)?.texts().flatten().map(owned));

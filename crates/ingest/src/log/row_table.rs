@@ -43,7 +43,6 @@ pub(crate) struct RowTable {
 }
 
 impl RowTable {
-    /// Some files read as one table.
     pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
         Self { files, clock, layout, ..Self::default() }
     }
@@ -87,7 +86,6 @@ impl RowTable {
         SampleSelector { leaf: leaf.unwrap_or_else(|| name.to_owned()), rows: named.chain(own).collect() }
     }
 
-    /// The leaves that those samples need.
     pub(crate) fn leaves_of(&self, samples: &SampleSelector) -> Vec<String> {
         let clock = self.clock.column.iter();
         let rows = samples.rows.iter().map(|(column, _)| column);
@@ -299,7 +297,6 @@ impl RowTable {
         Ok(stamps)
     }
 
-    /// How many samples those are.
     pub(crate) fn count(&self, samples: &SampleSelector) -> Result<usize, Error> {
         if self.holds_all(samples) && !self.is_listed(&samples.leaf) {
             return Ok(self.rows());
@@ -312,7 +309,6 @@ impl RowTable {
         Ok(count)
     }
 
-    /// What the numbers of a time column are.
     fn ticks(&self, column: &str) -> Result<TickFormat, Error> {
         let (file, clock) = (&self.files[0], &self.clock);
         let kind = &file.leaf(column)?.kind;
@@ -344,7 +340,6 @@ impl RowTable {
     }
 }
 
-/// Whether all rows of a batch hold the same.
 fn is_uniform(array: &ArrayRef) -> bool {
     let first = Scalar::new(array.slice(0, array.len().min(1)));
     !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)

@@ -19,7 +19,6 @@ pub enum RawValue {
 }
 
 impl RawValue {
-    /// Whether a number is this value.
     #[expect(clippy::float_cmp, reason = "a raw value is compared as it was written")]
     fn is(&self, number: f64) -> bool {
         match self {

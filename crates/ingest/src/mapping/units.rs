@@ -10,9 +10,7 @@ use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeOwned, IntoDeserializer};
 use serde::{Deserialize, Serialize};
 
-/// One pound-force, N.
 const LBF_N: f64 = 4.448_221_615_260_5;
-/// One inch, m.
 const INCH_M: f64 = 0.0254;
 
 /// What a unit measures.

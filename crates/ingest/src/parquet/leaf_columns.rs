@@ -14,7 +14,6 @@ use crate::error::{Fault, list_lengths};
 use crate::mapping::column_pattern::composed;
 use crate::parquet::numeric::wrong_type;
 
-/// One leaf of the schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LeafColumn {
     /// Its name: that of its column, with the fields below joined by dots, and with composed accents.

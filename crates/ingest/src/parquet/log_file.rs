@@ -51,7 +51,6 @@ pub(crate) struct LogFile {
     by_name: HashMap<String, Vec<usize>>,
 }
 
-/// How columns are scanned.
 #[derive(Clone, Copy)]
 pub(crate) struct Scan<'s> {
     /// Rows decoded at a time.
@@ -138,7 +137,6 @@ impl LogFile {
         self.named(name).first().copied()
     }
 
-    /// A leaf by its name.
     pub(crate) fn leaf(&self, name: &str) -> Result<&LeafColumn, Error> {
         let found = self.named(name);
         Err(self.error(match found[..] {
@@ -166,7 +164,6 @@ impl LogFile {
         }
     }
 
-    /// Scale, offset and unit in the metadata of a column.
     pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
         self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
     }
@@ -370,7 +367,6 @@ impl LogFile {
         self.all_pages(&[name])?.try_for_each(|pages| pages.map(drop))
     }
 
-    /// Whether every page of these leaves carries a checksum.
     pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
         for pages in self.all_pages(names)? {
             if pages?.iter().any(|page| page.header.crc.is_none()) {
@@ -380,12 +376,10 @@ impl LogFile {
         Ok(true)
     }
 
-    /// Row groups of the file.
     pub(crate) fn groups(&self) -> Range<usize> {
         0..self.footer.metadata().num_row_groups()
     }
 
-    /// Rows that a row group declares.
     pub(crate) fn rows_of(&self, group: usize) -> usize {
         usize::try_from(self.footer.metadata().row_group(group).num_rows()).unwrap_or(0)
     }
@@ -456,9 +450,7 @@ fn json_fields(text: &str) -> BTreeMap<String, String> {
 /// Bounds of the texts of a column in a row group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextBounds<'f> {
-    /// No text is less.
     pub(crate) least: &'f [u8],
-    /// No text is greater.
     pub(crate) greatest: &'f [u8],
     /// Whether both are texts of the column, and not truncated.
     pub(crate) is_exact: bool,
@@ -488,7 +480,6 @@ pub(crate) fn with_codes(fields: &Fields, is_coded: impl Fn(&str) -> bool) -> Fi
     fields.iter().map(field).collect()
 }
 
-/// Byte range of a chunk's pages, from the footer.
 fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
     let (start, bytes) = chunk.byte_range();
     start..start.saturating_add(bytes)

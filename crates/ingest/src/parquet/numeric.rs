@@ -43,7 +43,6 @@ pub(crate) fn wrong_type(column: &str, array: &ArrayRef, wanted: &str) -> Fault 
     column_type(column, &array.data_type().to_string(), wanted)
 }
 
-/// A column as text.
 pub(crate) fn as_text(column: &str, array: &ArrayRef) -> Result<ArrayRef, Fault> {
     cast(array, &DataType::Utf8).map_err(|_| wrong_type(column, array, "text or numbers"))
 }

@@ -42,7 +42,6 @@ pub(crate) struct BoundedGroups<'m> {
     pub(crate) file: Arc<File>,
     pub(crate) metadata: &'m ParquetMetaData,
     pub(crate) groups: Vec<usize>,
-    /// Most rows of a batch.
     pub(crate) batch_rows: usize,
 }
 

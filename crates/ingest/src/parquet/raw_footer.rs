@@ -97,7 +97,6 @@ pub(crate) fn caught<T, E: Display>(read: impl FnOnce() -> Result<T, E>) -> Resu
     }
 }
 
-/// What a footer claims.
 #[derive(Debug, Default)]
 pub(crate) struct Claims {
     /// Groups inside each other in the schema.
@@ -184,7 +183,6 @@ impl<'b> Walk<'b> {
         self.path.pop().map(drop)
     }
 
-    /// A struct.
     fn fields(&mut self) -> Option<()> {
         (self.path.len() < THRIFT_DEPTH).then_some(())?;
         self.footer.read_struct_begin().ok()?;

@@ -120,7 +120,6 @@ pub(crate) fn write_encoded(
     })
 }
 
-/// A batch as Parquet.
 pub(crate) fn write_batch(
     sink: File,
     batch: &RecordBatch,

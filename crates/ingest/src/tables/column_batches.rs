@@ -270,7 +270,6 @@ struct Rows {
     before: usize,
 }
 
-/// The rows of some row groups.
 fn groups(table: &ParquetTable, groups: Range<usize>) -> Result<Rows, Fault> {
     let some = table.metadata.row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();

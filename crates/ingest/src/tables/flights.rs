@@ -14,7 +14,6 @@ use crate::tables::column_batches::{ColumnAliases, TableBatch};
 
 /// A flight may seem to last longer than until the next departure by this factor and by these hours: clocks and rounding.
 const OVERLAP_SHARE: f64 = 1.25;
-/// See [`OVERLAP_SHARE`].
 const OVERLAP_HOURS: f64 = 1.0;
 
 /// A departure in the table and one in a log are those of one flight of the same id when they differ by at most this:

@@ -14,7 +14,6 @@ use jiff::Timestamp;
 use crate::error::{Fault, time_unit_unknown};
 use crate::mapping::ClockMapping;
 
-/// Seconds of a day.
 pub(crate) const DAY_S: f64 = 86_400.0;
 
 /// A step longer than this many usual steps is a break: the filter cannot predict across it.
@@ -59,7 +58,6 @@ const TICK_FOLLOW_S: f64 = 10.0;
 pub(crate) struct TimeBase {
     /// The declared rate's step, else the usual step, s.
     pub(crate) step_s: f64,
-    /// Rows there are.
     pub(crate) rows: usize,
     /// The rows that count, in order of time, [`LOST`] among them; none when every row counts as it stands.
     pub(crate) kept: Option<Vec<u32>>,
@@ -67,7 +65,6 @@ pub(crate) struct TimeBase {
     pub(crate) segments: Vec<Range<usize>>,
     /// The first row after each break, and its time since the first row by the stamps, s.
     pub(crate) breaks: Vec<(usize, f64)>,
-    /// Repairs made.
     pub(crate) repairs: TimestampRepairs,
 }
 
@@ -168,7 +165,6 @@ impl TimeOrigin {
 pub(crate) struct Timestamps {
     /// The column they come from, for diagnostics.
     pub(crate) column: String,
-    /// Seconds since the first stamp.
     pub(crate) seconds: Vec<f64>,
     /// What the first stamp means.
     pub(crate) origin: TimeOrigin,
@@ -322,7 +318,6 @@ fn checked_step(seen_s: f64, clock: &ClockMapping) -> Result<f64, Fault> {
     plausible(step_s, "the step", PLAUSIBLE_STEP_S)
 }
 
-/// A time within a range.
 fn plausible(value_s: f64, what: &str, (least_s, most_s): (f64, f64)) -> Result<f64, Fault> {
     if (least_s..=most_s).contains(&value_s) {
         return Ok(value_s);

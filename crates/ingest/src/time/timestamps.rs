@@ -21,7 +21,6 @@ pub(crate) struct TickFormat {
     /// Whether they have no fraction; texts are read as whole nanoseconds.
     pub(crate) is_whole: bool,
     pub(crate) is_text: bool,
-    /// What zero means.
     pub(crate) zero: TimeOrigin,
     pub(crate) wraps_at: Option<f64>,
 }
