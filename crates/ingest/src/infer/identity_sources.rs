@@ -145,7 +145,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     let place_end = place_end();
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
     let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
-    let PathDeparture { expression: departure, format, folders: taken } = path_departure(path, name, end);
+    let (departure, format, taken) = path_departure(path, name, end);
     let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
     let in_folder = |up: usize| {
         let below = match up - taken - 1 {
@@ -187,14 +187,6 @@ fn tail_in_name(name: &str, tail: &str, is_sure: bool, departure: &str) -> Optio
     (is_sure && fits(&format!("{after}$"), name)).then_some(after)
 }
 
-/// The end of a path from its departure on, if it seems to hold one.
-struct PathDeparture {
-    expression: String,
-    format: Option<String>,
-    /// Folders that the expression takes.
-    folders: usize,
-}
-
 /// The form of a departure that stands alone in a name: no digit is beside it.
 fn known_departure(name: &str) -> Option<&'static (&'static str, &'static str)> {
     DEPARTURES.iter().find(|(form, _)| fits(&alone(form), name))
@@ -204,13 +196,15 @@ fn alone(form: &str) -> String {
     format!(r"^(?:.*\D)?{form}(?:\D.*)?$")
 }
 
-/// The departure in the name of a log, in folders of a day and the name, or in the folder; `end` ends a name.
-fn path_departure(path: &Path, name: &str, end: &str) -> PathDeparture {
+/// An expression for the end of a path from its departure on, the form of the departure if the path seems to hold one, and
+/// how many folders the expression takes. The departure is in the name of a log, in folders of a day and the name, or in the
+/// folder; `end` ends a name.
+fn path_departure(path: &Path, name: &str, end: &str) -> (String, Option<String>, usize) {
     let folder = path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str());
     let days = path.parent().and_then(Path::to_str).unwrap_or_default();
     let day = DAYS.iter().find(|(form, _)| fits(&format!("(?:^|/){form}$"), days));
     let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name));
-    let (expression, format, folders) = if let Some((form, format)) = known_departure(name) {
+    if let Some((form, format)) = known_departure(name) {
         (format!(r"[^/]*?(?<departure_utc>{form}){end}"), Some((*format).to_owned()), 0)
     } else if let Some(((day, days), (time, times))) = day.zip(time) {
         let parts = format!(r"(?<departure_date>{day})/[^/]*?(?<departure_time>{time})[^/]*\.parquet");
@@ -219,8 +213,7 @@ fn path_departure(path: &Path, name: &str, end: &str) -> PathDeparture {
         (format!(r"[^/]*?(?<departure_utc>{form})[^/]*/{end}"), Some((*format).to_owned()), 1)
     } else {
         (end.to_owned(), None, 0)
-    };
-    PathDeparture { expression, format, folders }
+    }
 }
 
 /// The tail number in a path of one of the forms that [`path_identity`] knows.

@@ -79,7 +79,7 @@ const POSITION_WORDS: &str = "unit location ema servo actuator side surface lru"
 pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
     let file = &table.files[0];
-    let mut leaves = file.leaves().to_vec();
+    let mut leaves = file.leaves.clone();
     for leaf in leaves.iter_mut().filter(|leaf| file.holds_numbers(&leaf.name)) {
         leaf.kind = DataType::Float64;
     }
@@ -162,7 +162,7 @@ fn identity_columns(
     table: &RowTable,
     metadata: &BTreeMap<IdentityField, String>,
 ) -> (BTreeMap<IdentityField, String>, bool) {
-    let leaves = table.files[0].leaves();
+    let leaves = &table.files[0].leaves;
     let is_constant = |name: &str| table.constant(name, "fact").is_ok_and(|text| text.is_some());
     let single = leaves.iter().filter(|leaf| !leaf.is_listed).map(|leaf| leaf.name.as_str());
     let mut facts = facts_of(single.map(|name| (name, name)));
@@ -211,10 +211,10 @@ fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, O
     let file = &table.files[0];
     let is_of_units =
         |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && has_word_of(&leaf.name, "unit units uom");
-    if let (Some(names), Some(column)) = (&layout.name_column, file.leaves().iter().find(is_of_units)) {
+    if let (Some(names), Some(column)) = (&layout.name_column, file.leaves.iter().find(is_of_units)) {
         let mut pairs = DistinctTexts::default();
         pairs.take_file(file, &[names, &column.name])?;
-        for pair in pairs.found() {
+        for pair in pairs.0 {
             let unit = unit_of(&pair[1]);
             units.entry(pair[0].clone()).and_modify(|unit| *unit = None).or_insert(unit);
         }

@@ -1,7 +1,7 @@
 //! Formats of flight and measurement data that are given in place of Parquet, by their first bytes.
 
 /// Bytes of a file that are read to identify its format.
-pub(crate) const HEAD_BYTES: usize = 512;
+pub(crate) const HEAD_BYTES: u64 = 512;
 
 const MAGIC: [(&[u8], &str); 16] = [
     (b"MDF     ", "an MDF file (ASAM)"),

@@ -12,9 +12,10 @@ pub(crate) fn file_length(file: &File) -> io::Result<u64> {
     Ok(transient::with_retry(|| file.metadata())?.len())
 }
 
+/// Fills the buffer from some byte on; a transient error is retried.
 pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io::Result<()> {
     while !buffer.is_empty() {
-        let count = read_at(file, buffer, at)?;
+        let count = transient::with_retry(|| read_at(file, buffer, at))?;
         if count == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
@@ -24,18 +25,13 @@ pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io:
     Ok(())
 }
 
-/// Reads some bytes; a transient error is retried.
-pub(crate) fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
-    transient::with_retry(|| read_once(file, buffer, at))
-}
-
 #[cfg(unix)]
-fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::unix::fs::FileExt::read_at(file, buffer, at)
 }
 
 #[cfg(windows)]
-fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, buffer, at)
 }
 

@@ -13,7 +13,7 @@ use crate::log::types::ActuatorChannels;
 use crate::mapping::Role;
 use crate::time::clock::TimeBase;
 use crate::time::slow_channel::join_samples;
-use crate::time::zero_order_hold::{non_empty_segments, zero_order_hold};
+use crate::time::zero_order_hold::zero_order_hold;
 
 /// Channels as read, on one clock.
 pub(crate) struct RawChannels {
@@ -61,7 +61,7 @@ pub(crate) fn assemble(
     flags.extend(quality::load_frozen(&load_n, &motor_m, quality[2].longest_run, base.step_s));
     let is_whole = quality[2].missing_share == 0.0;
     let segments = if is_whole {
-        non_empty_segments(&segments)
+        segments.into_iter().filter(|segment| !segment.is_empty()).collect()
     } else {
         zero_order_hold(&mut load_n, &segments, base.step_s)
     };

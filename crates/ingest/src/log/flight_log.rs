@@ -74,7 +74,7 @@ impl Log {
     pub fn with_mapping(mut self, mapping: &Arc<Mapping>) -> Self {
         for (group, table) in &mut self.tables {
             let (clock, layout, _) = mapping.of_group(group.as_deref());
-            table.remap(clock, layout);
+            *table = RowTable::new(std::mem::take(&mut table.files), clock.clone(), layout.clone());
         }
         Self { mapping: Arc::clone(mapping), selected: Mutex::new(None), ..self }
     }
@@ -112,7 +112,7 @@ impl Log {
 
     /// Names and types of all columns, for `check`.
     pub fn column_types(&self) -> Vec<(String, String)> {
-        let leaves = self.main().files.iter().flat_map(LogFile::leaves);
+        let leaves = self.main().files.iter().flat_map(|file| &file.leaves);
         leaves.map(|leaf| (leaf.name.clone(), leaf.kind.to_string())).collect()
     }
 
@@ -545,9 +545,9 @@ fn column_at(pattern: &str, position: &Position) -> String {
 fn facts(table: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Error> {
     let first = &table.files[0];
     let mut facts: IdentityFields = map.values.clone();
-    facts.extend(identity::from_hive_path(first.path(), &map.folders));
+    facts.extend(identity::from_hive_path(&first.path, &map.folders));
     if let Some(expression) = &map.path {
-        facts.extend(identity::from_path(first.path(), expression).map_err(|f| table.error(f))?);
+        facts.extend(identity::from_path(&first.path, expression).map_err(|f| table.error(f))?);
     }
     for (fact, column) in &map.columns {
         // A column the log lacks may still be covered by another source; what is missing in all is named later.

@@ -67,8 +67,7 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
     }
     let mut distinct = DistinctTexts::default();
     distinct.take_file(&file, &columns)?;
-    let found = distinct.found();
-    if found.is_empty() {
+    if distinct.0.is_empty() {
         return whole();
     }
     let escaped = |text: &String| utf8_percent_encode(text, ESCAPED).to_string();
@@ -78,5 +77,5 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
         whole.push(format!("{MARK}{}", texts.join("/")));
         PathBuf::from(whole)
     };
-    Ok(found.iter().map(path_of).collect())
+    Ok(distinct.0.iter().map(path_of).collect())
 }

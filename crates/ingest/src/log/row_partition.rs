@@ -195,7 +195,7 @@ fn gather(
 
 /// The combinations of texts that the rows of some columns hold; a row without one of the texts holds none.
 #[derive(Debug, Default)]
-pub(crate) struct DistinctTexts(BTreeSet<Vec<String>>);
+pub(crate) struct DistinctTexts(pub(crate) BTreeSet<Vec<String>>);
 
 impl DistinctTexts {
     /// Looks at a file; a row group that holds but one combination, by its statistics, is not read.
@@ -213,11 +213,6 @@ impl DistinctTexts {
         let owned = |texts: Vec<&str>| texts.into_iter().map(str::to_owned).collect();
         self.0.extend(Combinations::of(names, arrays)?.texts().flatten().map(owned));
         Ok(bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)?)
-    }
-
-    /// All that were found.
-    pub(crate) fn found(self) -> BTreeSet<Vec<String>> {
-        self.0
     }
 }
 

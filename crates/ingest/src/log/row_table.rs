@@ -47,12 +47,6 @@ impl RowTable {
         Self { files, clock, layout, ..Self::default() }
     }
 
-    /// The same files by another clock and layout.
-    pub(crate) fn remap(&mut self, clock: &ClockMapping, layout: &Layout) {
-        (self.clock, self.layout) = (clock.clone(), layout.clone());
-        (self.base, self.partition) = (OnceLock::new(), Partition::default());
-    }
-
     /// Whether a row holds a list of this leaf's samples in any file.
     pub(crate) fn is_listed(&self, leaf: &str) -> bool {
         self.files.iter().any(|file| file.is_listed(leaf))
@@ -73,7 +67,7 @@ impl RowTable {
         if let Some(column) = &self.layout.name_column {
             return self.texts(column);
         }
-        let leaves = || self.files.iter().flat_map(LogFile::leaves).map(|leaf| leaf.name.clone());
+        let leaves = || self.files.iter().flat_map(|file| &file.leaves).map(|leaf| leaf.name.clone());
         Ok(Arc::clone(self.leaf_names.get_or_init(|| Arc::new(leaves().collect()))))
     }
 
@@ -227,7 +221,7 @@ impl RowTable {
         } else {
             self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
         }
-        let found: Arc<BTreeSet<String>> = Arc::new(distinct.found().into_iter().flatten().collect());
+        let found: Arc<BTreeSet<String>> = Arc::new(distinct.0.into_iter().flatten().collect());
         texts().insert(column.to_owned(), Arc::clone(&found));
         Ok(found)
     }

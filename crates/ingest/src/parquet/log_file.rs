@@ -35,7 +35,7 @@ const BATCH_ROWS: usize = 8192;
 /// An open Parquet file, of which only the footer has been read.
 #[derive(Debug)]
 pub(crate) struct LogFile {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Columns and the texts that mark the rows of one flight; empty if the file holds only one.
     pub(crate) flight_rows: Vec<(String, String)>,
     source: ByteSource,
@@ -46,7 +46,8 @@ pub(crate) struct LogFile {
     coded: OnceLock<Fields>,
     /// The Arrow schema in the footer, decoded at its first use; `None` if it is missing or damaged.
     noted: OnceLock<Option<Schema>>,
-    leaves: Vec<LeafColumn>,
+    /// Every leaf, in the order of the file.
+    pub(crate) leaves: Vec<LeafColumn>,
     /// Indices in `leaves`, by name.
     by_name: HashMap<String, Vec<usize>>,
 }
@@ -102,10 +103,6 @@ impl LogFile {
         Self { flight_rows, ..self }
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
     pub(crate) fn error(&self, fault: Fault) -> Error {
         fault.in_file(&self.path)
     }
@@ -113,11 +110,6 @@ impl LogFile {
     /// Rows the footer declares.
     pub(crate) fn rows(&self) -> usize {
         usize::try_from(self.footer.metadata().file_metadata().num_rows()).unwrap_or(0)
-    }
-
-    /// Every leaf, in the order of the file.
-    pub(crate) fn leaves(&self) -> &[LeafColumn] {
-        &self.leaves
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {
@@ -213,16 +205,6 @@ impl LogFile {
         scan: Scan<'_>,
         mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
     ) -> Result<(), Error> {
-        self.scan_flat(names, scan, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
-    }
-
-    /// As [`LogFile::scan`], before lists and single values are brought together.
-    pub(crate) fn scan_flat(
-        &self,
-        names: &[&str],
-        scan: Scan<'_>,
-        mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), Fault>,
-    ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         let wanted: Vec<usize> = self.groups().filter(|group| (scan.wants_group)(*group)).collect();
         self.want(&leaves, wanted.iter().copied())?;
@@ -234,7 +216,8 @@ impl LogFile {
                 scan.batch_rows = page_reader::batch_rows(&self.pages(group, leaf)?, scan.batch_rows);
             }
             self.each_batch(group, &leaves, scan, |columns| {
-                take(names, columns.iter().map(leaf_columns::flatten).collect())
+                let flats = columns.iter().map(leaf_columns::flatten).collect();
+                take(&leaf_columns::align_lengths(names, flats)?)
             })?;
         }
         Ok(())

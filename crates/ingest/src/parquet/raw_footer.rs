@@ -72,13 +72,13 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
 
 /// What a file is that does not end with a Parquet footer, by its first bytes.
 fn without_footer(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Fault, Fault> {
-    let mut head = [0; foreign_format::HEAD_BYTES];
+    let mut head = vec![0; read_at::file_length(file)?.min(foreign_format::HEAD_BYTES) as usize];
     want(0..head.len() as u64)?;
-    let length = read_at::read_at(file, &mut head, 0)?;
-    Ok(match &head[..length] {
+    read_at::read_exact(file, &mut head, 0)?;
+    Ok(match head[..] {
         [b'P', b'A', b'R', b'E', ..] => encrypted(None),
         [b'P', b'A', b'R', b'1', ..] => not_parquet("the file is truncated: it does not end with a footer"),
-        head => match foreign_format::of(head) {
+        _ => match foreign_format::of(&head) {
             Some(format) => Fault::new(
                 "not_parquet",
                 format!("this is {format}, not a Parquet file"),

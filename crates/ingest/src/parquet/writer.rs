@@ -53,10 +53,6 @@ impl Column {
             }
         }
     }
-
-    fn nullable(&self) -> bool {
-        matches!(self, Self::Real(v) | Self::Single(v) if v.iter().any(|v| v.is_nan()))
-    }
 }
 
 /// How numbers lie in the file; always under zstd, with a checksum on every page.
@@ -135,8 +131,7 @@ pub(crate) fn write_batch(
 /// # Errors
 /// When the columns differ in length.
 pub fn batch(columns: &[(String, Column)]) -> Result<RecordBatch, ArrowError> {
-    let columns = columns.iter().map(|(name, column)| (name, column.array(), column.nullable()));
-    RecordBatch::try_from_iter_with_nullable(columns)
+    RecordBatch::try_from_iter(columns.iter().map(|(name, column)| (name, column.array())))
 }
 
 fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Encoding) -> WriterProperties {

@@ -63,9 +63,6 @@ pub fn number(text: &str) -> Result<f64, String> {
 }
 
 /// Reads a finite number that is not below zero.
-///
-/// # Errors
-/// When it is none.
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     number(text)
         .and_then(|value| if value < 0.0 { Err(format!("`{text}` is below zero")) } else { Ok(value) })

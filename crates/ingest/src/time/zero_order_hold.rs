@@ -46,11 +46,6 @@ pub(crate) fn zero_order_hold(
     loaded
 }
 
-/// The segments that hold a sample.
-pub(crate) fn non_empty_segments(segments: &[Range<usize>]) -> Vec<Range<usize>> {
-    segments.iter().filter(|segment| !segment.is_empty()).cloned().collect()
-}
-
 /// Samples from one known load to the next, as the median has it.
 pub(crate) fn median_sample_interval(load_n: &[f64]) -> usize {
     if !load_n.iter().any(|f| f.is_nan()) {

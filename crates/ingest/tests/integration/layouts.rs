@@ -332,23 +332,20 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     m.identity.path = Some(r"(?<tail_number>N\w+)_(?<departure_date>\d{8})".into());
     m.identity.departure_format = Some("%Y%m%d".into());
     m.identity.time_zone = Some("Europe/Istanbul".into());
-    let seconds = (0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0));
-    let columns = [("t", reals(seconds))];
-    let of = |m: &Mapping| identity("N1_20261119.parquet", m, &columns);
-    let refused = of(&m).unwrap_err();
+    let of = |m: &Mapping, t: ArrayRef| identity("N1_20261119.parquet", m, &[("t", t)]);
+    let seconds = reals((0..200).map(|k| (86_390.0 + 0.1 * f64::from(k)).rem_euclid(86_400.0)));
+    let refused = of(&m, Arc::clone(&seconds)).unwrap_err();
     assert!(refused.code == "identity_invalid" && refused.message.contains("clock.epoch"), "{refused}");
     m.clock.epoch = Epoch::Midnight;
-    assert_eq!(of(&m).unwrap(), "2026-11-19T20:59:50Z");
-    let packed: Vec<f64> = (0..200).map(|k| 210_130.0 + 0.1 * f64::from(k)).collect();
-    let refused = identity("N1_20261119.parquet", &m, &[("t", reals(packed))]).unwrap_err();
+    assert_eq!(of(&m, seconds).unwrap(), "2026-11-19T20:59:50Z");
+    let packed = reals((0..200).map(|k| 210_130.0 + 0.1 * f64::from(k)));
+    let refused = of(&m, packed).unwrap_err();
     assert!(refused.message.contains("HHMMSS"), "{refused}");
     m.clock.unit = None;
-    let texts: Vec<_> = (0..200).map(|k| format!("23:59:{:05.2}", 50.0 + 0.05 * f64::from(k))).collect();
-    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(StringArray::from(texts)))];
-    assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
-    let of_day = (0..200).map(|k| Some(86_390_000 + 50 * k)).collect::<Time32MillisecondArray>();
-    let columns: [(&str, ArrayRef); 1] = [("t", Arc::new(of_day))];
-    assert_eq!(identity("N1_20261119.parquet", &m, &columns).unwrap(), "2026-11-19T20:59:50Z");
+    let texts = (0..200).map(|k| Some(format!("23:59:{:05.2}", 50.0 + 0.05 * f64::from(k))));
+    assert_eq!(of(&m, Arc::new(texts.collect::<StringArray>())).unwrap(), "2026-11-19T20:59:50Z");
+    let of_day = Time32MillisecondArray::from_iter_values((0..200).map(|k| 86_390_000 + 50 * k));
+    assert_eq!(of(&m, Arc::new(of_day)).unwrap(), "2026-11-19T20:59:50Z");
     // An absolute clock gives the time, unless it is of another day.
     let instant = |day: i64| -> ArrayRef {
         let stamps = (0..200).map(|k| 1_794_000_000_000 + 86_400_000 * day + 50 * k);
