@@ -6,6 +6,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::error::Fault;
+
 /// Bytes of a footer: 1 KiB for each of 262,144 column chunks.
 pub(crate) const FOOTER_BYTES: u64 = 256 << 20;
 /// Groups inside groups of a schema: readers call themselves for each.
@@ -35,26 +37,22 @@ pub fn set_max_rows(rows: u64) {
     MAX_ROWS.store(rows, Ordering::Relaxed);
 }
 
-/// A claim of a file beyond a bound.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the file claims {found} {what}, more than the limit of {most}")]
-pub(crate) struct Excess {
-    pub(crate) what: &'static str,
-    pub(crate) found: u64,
-    pub(crate) most: u64,
-    /// The key that raises the bound.
-    pub(crate) key: Option<&'static str>,
+fn beyond_limit(what: &str, found: u64, most: u64, hint: &str) -> Fault {
+    let message = format!("the file claims {found} {what}, more than the limit of {most}");
+    Fault::new("beyond_limit", message, hint)
 }
 
-pub(crate) fn check(what: &'static str, found: u64, most: u64) -> Result<(), Excess> {
-    if found <= most { Ok(()) } else { Err(Excess { what, found, most, key: None }) }
+pub(crate) fn check(what: &str, found: u64, most: u64) -> Result<(), Fault> {
+    let hint = "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)";
+    if found <= most { Ok(()) } else { Err(beyond_limit(what, found, most, hint)) }
 }
 
 /// Compares rows, or values of a column, with the configured most and with the bytes of their file.
-pub(crate) fn check_rows(what: &'static str, found: u64, file_bytes: u64) -> Result<(), Excess> {
+pub(crate) fn check_rows(what: &str, found: u64, file_bytes: u64) -> Result<(), Fault> {
     let configured = MAX_ROWS.load(Ordering::Relaxed);
     if found > configured {
-        return Err(Excess { what, found, most: configured, key: Some("run.max_rows") });
+        let hint = "if the file is sound, raise `run.max_rows`; docs/limits.md lists all limits";
+        return Err(beyond_limit(what, found, configured, hint));
     }
     check(what, found, file_bytes.saturating_mul(ROWS_PER_BYTE).saturating_add(FREE_ROWS))
 }
@@ -70,11 +68,14 @@ mod tests {
 
     #[test]
     fn rows_are_bounded_by_the_setting_and_by_the_bytes_of_the_file() {
-        assert_eq!(check_rows("rows", 1 << 20, 100), Ok(()));
-        assert_eq!(check_rows("rows", 20_000_000, 100_000), Ok(()));
-        let small = check_rows("rows", 20_000_000, 2_400).unwrap_err();
-        assert_eq!((small.most, small.key), (2_400_000 + (1 << 20), None));
-        let large = check_rows("rows", 1_000_000_000, 1 << 40).unwrap_err();
-        assert_eq!((large.most, large.key), (DEFAULT_MAX_ROWS, Some("run.max_rows")));
+        check_rows("rows", 1 << 20, 100).unwrap();
+        check_rows("rows", 20_000_000, 100_000).unwrap();
+        let small = check_rows("rows", 20_000_000, 2_400).unwrap_err().0;
+        assert!(small.message.ends_with("limit of 3448576"), "{small}");
+        let large = check_rows("rows", 1_000_000_000, 1 << 40).unwrap_err().0;
+        assert!(large.message.ends_with("limit of 200000000"), "{large}");
+        assert!(
+            large.hint.unwrap().contains("run.max_rows") && !small.hint.unwrap().contains("run.max_rows")
+        );
     }
 }

@@ -8,7 +8,6 @@ use std::path::Path;
 
 use records::Diagnostic;
 
-use crate::bounds::Excess;
 use crate::io::transient;
 use crate::mapping::column_pattern::{PLACEHOLDER, nearest};
 
@@ -117,16 +116,6 @@ impl From<io::Error> for Fault {
 impl From<object_io::Error> for Fault {
     fn from(source: object_io::Error) -> Self {
         Self::new(source.code(), &source, source.remedy())
-    }
-}
-
-impl From<Excess> for Fault {
-    fn from(excess: Excess) -> Self {
-        let hint = match excess.key {
-            Some(key) => format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits"),
-            None => "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)".into(),
-        };
-        Self::new("beyond_limit", excess, hint)
     }
 }
 

@@ -189,10 +189,6 @@ fn chi_squared_share(freedom: f64, deviate: f64) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    fn noise(count: usize, rms: f64) -> Vec<f64> {
-        noise_of(42, count, rms)
-    }
-
     /// White noise of a given rms: sums of twelve uniform numbers, the same in every run of a seed.
     pub(crate) fn noise_of(seed: u64, count: usize, rms: f64) -> Vec<f64> {
         let mut state = seed;
@@ -220,7 +216,7 @@ pub(crate) mod tests {
     /// at another row of four.
     #[test]
     fn a_slow_channel_is_taken_at_its_own_rate() {
-        let own = noise(100_000, 5e-6);
+        let own = noise_of(42, 100_000, 5e-6);
         let sparse: Vec<f64> = own[..8000].iter().flat_map(|v| [*v, f64::NAN, f64::NAN, f64::NAN]).collect();
         near(&sparse, 5e-6);
         let mut held: Vec<f64> = own.iter().flat_map(|v| [*v; 4]).collect();
@@ -236,7 +232,7 @@ pub(crate) mod tests {
     #[test]
     fn without_enough_whole_blocks_there_is_no_estimate() {
         assert_eq!(white_noise(&[f64::NAN; 200], None), None);
-        assert_eq!(white_noise(&noise(300, 1.0), None), None);
+        assert_eq!(white_noise(&noise_of(42, 300, 1.0), None), None);
         assert_eq!(white_noise(&vec![1.0; 20_000], Some(0.1)), None);
     }
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use crate::channel::noise_floor::white_noise_of;
-use crate::channel::stats::{ChannelStats, range};
+use crate::channel::stats::{ChannelStats, StatsAccumulator, range};
 use crate::mapping::Role;
 use crate::time::zero_order_hold::median_sample_interval;
 
@@ -45,7 +45,7 @@ impl Quality {
         step_s: f64,
         excluded: usize,
     ) -> Self {
-        let seen = &seen.unwrap_or_else(|| ChannelStats::of(values));
+        let seen = &seen.unwrap_or_else(|| StatsAccumulator::new().end(values));
         let (samples, missing) = (values.len() - excluded, seen.missing - excluded);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);

@@ -25,12 +25,6 @@ pub(crate) struct ChannelStats {
     pub(crate) longest_run: usize,
 }
 
-impl ChannelStats {
-    pub(crate) fn of(values: &[f64]) -> Self {
-        StatsAccumulator::new().end(values)
-    }
-}
-
 /// Looks at a channel that grows, at what is new of it.
 #[derive(Debug, Clone)]
 pub(crate) struct StatsAccumulator {

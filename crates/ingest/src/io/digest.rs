@@ -4,43 +4,28 @@ use std::fs::File;
 use std::io;
 use std::ops::Range;
 
+use blake3::Hasher;
+
 use crate::io::read_at;
 
 /// Bytes that are read and hashed at a time: as many as stay in the cache in between.
 const BUFFER_BYTES: usize = 1 << 17;
 
-/// A digest that stretches are added to, one after the other as if they were one.
-#[derive(Debug)]
-pub(crate) struct Digest {
-    hash: blake3::Hasher,
-    buffer: Vec<u8>,
-}
-
-impl Digest {
-    pub(crate) fn new() -> Self {
-        Self { hash: blake3::Hasher::new(), buffer: vec![0; BUFFER_BYTES] }
-    }
-
-    /// Adds a stretch of a file; an empty one adds nothing.
-    pub(crate) fn take(&mut self, file: &File, stretch: Range<u64>) -> io::Result<()> {
+/// Adds stretches of a file to a digest, one after the other as if they were one; an empty one adds nothing.
+pub(crate) fn add_stretches(
+    hash: &mut Hasher,
+    file: &File,
+    stretches: impl IntoIterator<Item = Range<u64>>,
+) -> io::Result<()> {
+    let mut buffer = vec![0; BUFFER_BYTES];
+    for stretch in stretches {
         for at in stretch.clone().step_by(BUFFER_BYTES) {
-            let bytes = &mut self.buffer[..BUFFER_BYTES.min((stretch.end - at) as usize)];
+            let bytes = &mut buffer[..BUFFER_BYTES.min((stretch.end - at) as usize)];
             read_at::read_exact(file, bytes, at)?;
-            self.hash.update(bytes);
+            hash.update(bytes);
         }
-        Ok(())
     }
-
-    /// Adds a text and its length.
-    pub(crate) fn take_text(&mut self, text: &str) {
-        self.hash.update(&text.len().to_le_bytes());
-        self.hash.update(text.as_bytes());
-    }
-
-    /// In hexadecimal.
-    pub(crate) fn end(self) -> String {
-        self.hash.finalize().to_hex().to_string()
-    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -56,13 +41,12 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(&bytes).unwrap();
         let ends = [0, 1, 1, 3000, 140_000, 2 * BUFFER_BYTES + 140_000, 5 * BUFFER_BYTES];
-        let (mut digest, mut all) = (Digest::new(), Vec::new());
-        for pair in ends.windows(2).rev() {
-            digest.take(&file, pair[0] as u64..pair[1] as u64).unwrap();
-            all.extend_from_slice(&bytes[pair[0]..pair[1]]);
-        }
-        assert_eq!(digest.end(), blake3::hash(&all).to_hex().to_string());
+        let stretches = || ends.windows(2).rev().map(|pair| pair[0]..pair[1]);
+        let all: Vec<u8> = stretches().flat_map(|stretch| &bytes[stretch]).copied().collect();
+        let mut hash = Hasher::new();
+        add_stretches(&mut hash, &file, stretches().map(|s| s.start as u64..s.end as u64)).unwrap();
+        assert_eq!(hash.finalize(), blake3::hash(&all));
         let beyond = bytes.len() as u64;
-        assert!(Digest::new().take(&file, beyond - 1..beyond + 1).is_err());
+        assert!(add_stretches(&mut hash, &file, std::iter::once(beyond - 1..beyond + 1)).is_err());
     }
 }

@@ -12,7 +12,6 @@ use records::Position;
 use crate::channel::si_conversion::Geometry;
 use crate::channel::stats::span;
 use crate::error::{self, Error, Fault};
-use crate::io::digest::Digest;
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
@@ -369,7 +368,7 @@ impl Log {
     /// # Errors
     /// When a file cannot be read.
     pub fn digest(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<String, Error> {
-        let mut digest = Digest::new();
+        let mut hash = blake3::Hasher::new();
         for (table, mut leaves) in self.leaves(used) {
             leaves.extend(self.mapping.identity.columns.values().cloned());
             if self.normalized.is_some() {
@@ -377,10 +376,10 @@ impl Log {
             }
             let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
             for file in &table.files {
-                file.feed(&names, &mut digest)?;
+                file.feed(&names, &mut hash)?;
             }
         }
-        Ok(digest.end())
+        Ok(hash.finalize().to_hex().to_string())
     }
 
     /// Reads the channels of one actuator.

@@ -13,7 +13,7 @@ use records::Position;
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::quality::Quality;
 use crate::channel::si_conversion::Geometry;
-use crate::channel::stats::ChannelStats;
+use crate::channel::stats::{ChannelStats, StatsAccumulator};
 use crate::error::{Error, Fault};
 use crate::log::identity::{Identity, IdentityFields};
 use crate::log::types::ActuatorChannels;
@@ -101,7 +101,7 @@ fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error
     let mut values = ColumnBuilder::with_capacity(file.rows().min(1 << 26), None).with_stats();
     file.append_numbers(name, None, &mut values)?;
     let (values, seen) = values.finish();
-    let seen = seen.unwrap_or_else(|| ChannelStats::of(&values));
+    let seen = seen.unwrap_or_else(|| StatsAccumulator::new().end(&values));
     Ok((values, seen))
 }
 

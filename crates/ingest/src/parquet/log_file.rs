@@ -9,6 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Fields, Schema, TimeUnit};
+use blake3::Hasher;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
@@ -17,7 +18,7 @@ use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{self, Error, Fault, encrypted, not_parquet};
 use crate::io::byte_source::ByteSource;
-use crate::io::digest::Digest;
+use crate::io::digest::add_stretches;
 use crate::io::read_at;
 use crate::mapping::column_pattern::composed;
 use crate::mapping::field_metadata::FieldMetadata;
@@ -399,22 +400,21 @@ impl LogFile {
     ///
     /// Equal digests mean equal data read, whatever the name of the file and
     /// whatever else was added to it.
-    pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
+    pub(crate) fn feed(&self, names: &[&str], hash: &mut Hasher) -> Result<(), Error> {
         let unreadable = |source: std::io::Error| self.error(source.into());
-        let file = &self.source.file;
-        let length = read_at::file_length(file).map_err(unreadable)?;
+        let length = read_at::file_length(&self.source.file).map_err(unreadable)?;
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted, self.groups())?;
-        for group in self.groups() {
-            for leaf in &wanted {
-                let Range { start, end } = range_of(self.chunk(group, leaf));
-                digest.take(file, start..length.min(end)).map_err(unreadable)?;
-            }
+        let chunks = self.groups().flat_map(|group| wanted.iter().map(move |leaf| self.chunk(group, leaf)));
+        let pages = chunks.map(range_of).map(|Range { start, end }| start..length.min(end));
+        let stretches = pages.chain(once(self.footer_start..length));
+        add_stretches(hash, &self.source.file, stretches).map_err(unreadable)?;
+        for (_, text) in &self.flight_rows {
+            hash.update(&text.len().to_le_bytes());
+            hash.update(text.as_bytes());
         }
-        digest.take(file, self.footer_start..length).map_err(unreadable)?;
-        self.flight_rows.iter().for_each(|(_, text)| digest.take_text(text));
         Ok(())
     }
 }

@@ -63,7 +63,7 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
         return Err(format!("its pages would end at byte {start} + {bytes} of a file of {length}"));
     }
     let values = u64::try_from(chunk.num_values()).unwrap_or(u64::MAX);
-    bounds::check_rows("values of a column", values, length).map_err(|excess| excess.to_string())?;
+    bounds::check_rows("values of a column", values, length).map_err(|fault| fault.0.message)?;
     let is_flat = chunk.column_descr().max_rep_level() == 0;
     let (mut at, end) = (start, start + bytes);
     let (mut values, mut found, mut buffer) = (0_i64, Vec::new(), Vec::new());

@@ -25,14 +25,8 @@ use records::{Diagnostic, Position};
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
-    let field = |(name, array): &(&str, ArrayRef)| Field::new(*name, array.data_type().clone(), true);
-    let arrays = columns.iter().map(|(_, array)| Arc::clone(array)).collect();
-    write_fields(file, columns.iter().map(field).collect(), arrays);
-}
-
-/// The same with fields that may have metadata.
-fn write_fields(file: &Path, fields: Vec<Field>, arrays: Vec<ArrayRef>) {
-    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
+    let columns = columns.iter().map(|(name, array)| (name, Arc::clone(array), true));
+    let batch = RecordBatch::try_from_iter_with_nullable(columns).unwrap();
     write_batch(file, &batch, WriterProperties::default());
 }
 
@@ -298,7 +292,9 @@ fn scale_offset_and_unit_of_the_arrow_field_are_taken_unless_the_mapping_has_oth
         Field::new("s", DataType::Float64, true),
     ];
     let (_dir, file) = place("N1_20261119T041300Z.parquet");
-    write_fields(&file, fields.to_vec(), vec![reals([0.0, 0.1]), counts, reals([1.0, 2.0])]);
+    let arrays = vec![reals([0.0, 0.1]), counts, reals([1.0, 2.0])];
+    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields.to_vec())), arrays).unwrap();
+    write_batch(&file, &batch, WriterProperties::default());
     let read = |motor: ChannelMapping| {
         let m = mapping(motor, channel("s", Unit::Metre), channel("s", Unit::Newton));
         read(&file, &m).map_err(|e| e.diagnostic())

@@ -79,7 +79,7 @@ fn channels(read: &ActuatorChannels) -> [Vec<u64>; 3] {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     /// What is read under a condition is what is read without one, less all that lies outside its stretches, and what
-    /// is seen of it is seen of the stretches alone.
+    /// is seen of it is seen of the stretches alone. A condition that is never met leaves no sample, and gives no error.
     #[test]
     fn a_condition_leaves_its_stretches_and_nothing_else(
         group_rows in 60_usize..3500, page_rows in 50_usize..900, is_coded in any::<bool>(),
@@ -99,6 +99,11 @@ proptest! {
         let seen = &some.quality[1];
         prop_assert!(seen.max < 0.1 && seen.spikes == 0 && (seen.rate_hz - 100.0).abs() < 1e-9, "{:?}", seen);
         prop_assert!(some.quality[2].missing_share == 0.0 && all.quality[1].max > 1.0);
+        let mut never = conditional(true);
+        never.channels.when[0].equals = vec![RawValue::Number(7.0)];
+        let none = read(&file, &never).unwrap();
+        prop_assert!(none.segments.is_empty() && none.excluded == ROWS && none.missing_share == 0.0);
+        prop_assert_eq!(channels(&none), [ROWS; 3].map(|rows| vec![u64::MAX; rows]));
     }
 }
 
@@ -145,18 +150,6 @@ fn pages_outside_of_every_stretch_are_not_unpacked() {
         let inside = spoilt(&file, column, |rows| rows.contains(&1250));
         assert!(!is(&inside, true, &sound), "column {column} was not read");
     }
-}
-
-/// A condition that is never met leaves no sample, and gives no other error.
-#[test]
-fn a_condition_that_is_never_met_leaves_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
-    let mut never = conditional(true);
-    never.channels.when[0].equals = vec![RawValue::Number(7.0)];
-    let read = read(&file, &never).unwrap();
-    assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.excluded == ROWS);
-    assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
 }
 
 /// Each actuator uses its own column where the condition names one, and a common column where it does not.
