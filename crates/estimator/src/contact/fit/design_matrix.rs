@@ -5,7 +5,7 @@ use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 use crate::contact::friction::friction_model::Coupling;
 
 /// Columns of the regression.
-pub(crate) const COLUMNS: usize = 17;
+pub(crate) const COLUMNS: usize = 19;
 
 /// δX₀.
 pub(crate) const ORIGIN: usize = 0;
@@ -23,21 +23,23 @@ pub(crate) const SHARE: usize = 5;
 pub(crate) const STRIBECK: usize = 6;
 /// c·t: a stiffness that drifts within the flight.
 pub(crate) const FORCE_DRIFT: usize = 7;
+/// c·X and c·X²: a stiffness that varies along the stroke.
+pub(crate) const FORCE_PLACE: usize = 8;
 /// Ẋ₁ over a reference speed: its coefficient is the skew. From here on no column depends on the force in the coupling.
-pub(crate) const SPEED: usize = 8;
+pub(crate) const SPEED: usize = 10;
 /// Ḟ: a load channel that lags.
-pub(crate) const LOAD_RATE: usize = 9;
+pub(crate) const LOAD_RATE: usize = 11;
 /// Drift: t and t², from −1 to 1.
-pub(crate) const DRIFT: usize = 10;
+pub(crate) const DRIFT: usize = 12;
 /// Transducer error: X, X² and X³, from −1 to 1.
-pub(crate) const PLACE: usize = 12;
+pub(crate) const PLACE: usize = 14;
 /// Errors periodic in position: sine and cosine.
-pub(crate) const PERIODIC: usize = 15;
+pub(crate) const PERIODIC: usize = 17;
 
 /// Share of the 95 % load below which flanks may be soft.
 pub(crate) const FIRM_SHARE: f64 = 0.12;
 /// Number of blocks before a block that must press the same flank as firmly; one block after it must as well.
-const BEFORE: usize = 2;
+pub(crate) const BEFORE: usize = 2;
 
 /// The mean of some blocks in contact on one flank.
 #[derive(Debug, Clone, Copy)]
@@ -63,11 +65,12 @@ pub(crate) struct DesignMatrix {
 
 #[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
 impl BlockMeans {
-    /// Rows of all blocks that keep their flank, none of which mixes flank and gap.
+    /// Rows of all blocks that keep their flank, none of which mixes flank and gap. A firm row is of blocks before which its
+    /// flank was pressed firmly for `settling` blocks.
     ///
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
     /// full or its stretch ends.
-    pub(crate) fn rows(&self, scaling: &Scaling) -> DesignMatrix {
+    pub(crate) fn rows(&self, scaling: &Scaling, settling: usize) -> DesignMatrix {
         let most = ((scaling.row_s / self.period_s).round() as usize).max(6);
         let firm = Vec::with_capacity(self.len() / most);
         let (mut design, most) = (DesignMatrix { firm, light: Vec::new() }, most as f64);
@@ -76,9 +79,13 @@ impl BlockMeans {
         let firm_n = FIRM_SHARE * scaling.load_n;
         let (mut stretch, mut last) = (0, (0, 0));
         for segment in &self.segments {
+            let mut pressed = 0;
             for (k, around) in (segment.start + BEFORE..).zip(self.couplings[segment.clone()].array_windows())
             {
-                let Some(kind) = touch(around, firm_n).filter(|_| self.is_complete(k)) else { continue };
+                pressed = pressed_blocks(pressed, around[BEFORE].force_n, firm_n);
+                let is_settled = |kind: &usize| *kind < 2 || pressed.unsigned_abs() > settling;
+                let kind = touch(around, firm_n).filter(is_settled);
+                let Some(kind) = kind.filter(|_| self.is_complete(k)) else { continue };
                 let here = self.stretch(k);
                 if here != stretch {
                     open.iter_mut().enumerate().for_each(|(kind, row)| design.close(kind, row));
@@ -113,7 +120,10 @@ impl BlockMeans {
         let side = if force_n == 0.0 { 0.0 } else { 0.5 * force_n.signum() };
         let [force, loss, stribeck] =
             [force_n, dforce_dloss_n, dforce_dstribeck_n].map(|n| n * scaling.per_load);
-        [side, force, force.abs(), dforce_ddry, loss, stribeck, force * scaling.time_share(self.time_s[k])]
+        let drift = force * scaling.time_share(self.time_s[k]);
+        let place = scaling.place_share(self.motor_m[k] + self.dx_m[k]);
+        let at_place = force * place;
+        [side, force, force.abs(), dforce_ddry, loss, stribeck, drift, at_place, at_place * place]
     }
 
     /// The columns from [`SPEED`] on, of a block that has neighbours.
@@ -167,6 +177,16 @@ pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>
     f64::min(upper, lower)
 }
 
+/// Number of blocks whose force presses the less pressed flank by more than `least_n`.
+pub(crate) fn less_pressed_blocks(forces_n: impl Iterator<Item = f64>, least_n: f64) -> f64 {
+    let (mut upper, mut lower) = (0, 0);
+    for force_n in forces_n {
+        upper += usize::from(force_n > least_n);
+        lower += usize::from(force_n < -least_n);
+    }
+    upper.min(lower) as f64
+}
+
 /// Kind of contact of a block: 0 lower, 1 upper flank, plus 2 if pressed firmly; `None` if the blocks around it do not
 /// keep it.
 #[inline]
@@ -180,6 +200,18 @@ fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
         around.iter().all(|coupling| coupling.force_n < -least_n)
     };
     is_kept.then_some(2 * usize::from(is_firm) + usize::from(here_n > 0.0))
+}
+
+/// Number of blocks in a row that press one flank firmly, up to one with this force: above zero those on the upper flank,
+/// below zero those on the lower one.
+fn pressed_blocks(before: isize, force_n: f64, firm_n: f64) -> isize {
+    if force_n > firm_n {
+        before.max(0) + 1
+    } else if force_n < -firm_n {
+        before.min(0) - 1
+    } else {
+        0
+    }
 }
 
 /// Σ a·b.

@@ -13,7 +13,7 @@ use std::ops::Range;
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRY, DesignRow, FIRM_SHARE, FORCE, GAP, PERIODIC, PLACE, dot, less_pressed,
+    COLUMNS, DRY, DesignRow, FIRM_SHARE, FORCE, GAP, PERIODIC, PLACE, dot, less_pressed, less_pressed_blocks,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
@@ -141,14 +141,8 @@ pub(crate) fn check_both_sides(
     shows_gap: bool,
 ) -> Result<(), Rejection> {
     let share = if shows_gap { FIRM_SHARE } else { ZERO_ERROR };
-    let beyond = less_pressed_blocks(&blocks.load_n, share * scaling.load_n);
+    let beyond = less_pressed_blocks(blocks.load_n.iter().copied(), share * scaling.load_n);
     rejection_of_contact(beyond * blocks.period_s)
-}
-
-/// Number of blocks whose force presses the less pressed flank by more than `least_n`.
-fn less_pressed_blocks(forces_n: &[f64], least_n: f64) -> f64 {
-    let count = |side: f64| forces_n.iter().filter(|force_n| side * **force_n > least_n).count();
-    count(1.0).min(count(-1.0)) as f64
 }
 
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
@@ -229,7 +223,7 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 fn rejection_without_rows(blocks: &BlockMeans, scaling: &Scaling, why: Rejection) -> Rejection {
     let forces_n: Vec<f64> = blocks.couplings.iter().map(|coupling| coupling.force_n).collect();
     let least_n = FIRM_SHARE * scaling.load_n;
-    let pressed = less_pressed_blocks(&forces_n, least_n);
+    let pressed = less_pressed_blocks(forces_n.iter().copied(), least_n);
     if pressed * blocks.period_s <= 2.0 {
         return why;
     }

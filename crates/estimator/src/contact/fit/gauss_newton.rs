@@ -3,8 +3,8 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE, SHARE,
-    SIDE_FORCE, SPEED, STRIBECK, less_pressed,
+    BEFORE, COLUMNS, DRIFT, DRY, DesignMatrix, FIRM_SHARE, FORCE, FORCE_DRIFT, FORCE_PLACE, GAP, LOAD_RATE,
+    ORIGIN, PERIODIC, PLACE, SHARE, SIDE_FORCE, SPEED, STRIBECK, less_pressed, less_pressed_blocks,
 };
 use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
@@ -15,6 +15,10 @@ use crate::contact::friction::friction_model::{Friction, FrictionState};
 const REQUIRED_CONTACT_S: f64 = 1.0;
 /// The longest delay of the load that is allowed for, s.
 pub(crate) const LATEST_S: f64 = 0.04;
+/// Time for which a flank must be pressed firmly before a block gives a row, s: four time constants of a lag of 10 ms.
+const SETTLING_S: f64 = 0.04;
+/// Least share of the firm blocks of the less pressed flank that must be left.
+const SETTLED_SHARE: f64 = 0.35;
 /// Below this a flank was not touched at all, s.
 const MIN_CONTACT_S: f64 = 0.1;
 
@@ -44,7 +48,7 @@ pub(crate) fn search(
     loop {
         blocks.apply_delays(&state);
         integrate(blocks, &state, scaling.motor_sense);
-        let design = blocks.rows(scaling);
+        let design = settled_rows(blocks, scaling);
         rejection_of_contact(less_pressed(design.firm.iter(), blocks.period_s))?;
         let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
@@ -54,6 +58,22 @@ pub(crate) fn search(
         }
         state = after;
     }
+}
+
+/// Rows of blocks before which their flank was pressed firmly for [`SETTLING_S`]: after a change of the flank, a channel that
+/// lags has not settled on the other one. Where the load vibrates, so that too few of the firm blocks would be left, rows of
+/// all blocks.
+fn settled_rows(blocks: &BlockMeans, scaling: &Scaling) -> DesignMatrix {
+    let settling = (SETTLING_S / blocks.period_s).round() as usize;
+    if settling > BEFORE {
+        let settled = blocks.rows(scaling, settling);
+        let forces_n = blocks.couplings.iter().map(|coupling| coupling.force_n);
+        let firm = less_pressed_blocks(forces_n, FIRM_SHARE * scaling.load_n);
+        if less_pressed(settled.firm.iter(), 1.0) > SETTLED_SHARE * firm {
+            return settled;
+        }
+    }
+    blocks.rows(scaling, 0)
 }
 
 /// Rejects a flight whose less pressed flank is pressed for too short a time, s.
@@ -81,6 +101,8 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
         SIDE_FORCE => GaussianPrior::zero(0.05 * windup_m),
         FORCE_DRIFT => GaussianPrior::zero(0.03 * windup_m),
+        // The middle of the stroke and its ends differ by 10 %.
+        FORCE_PLACE..SPEED => GaussianPrior::zero(0.1 * windup_m),
         // Most likely value and spread of the dry friction over the 95 % load, lost share, and excess friction at rest.
         DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
