@@ -28,7 +28,7 @@ use records::row_schema::{self, FromCells, Row, from_batch, to_batch};
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogResult {
-    /// Its account.
+    /// The status of the log.
     pub account: LogRecord,
     /// Its records; each takes the place of a stored one with the same key.
     pub records: Vec<GapRecord>,
@@ -84,7 +84,7 @@ impl HeldRecord {
     }
 }
 
-/// The one who writes, for as long as it lives.
+/// The right to write to the store, until it is dropped.
 #[derive(Debug)]
 pub struct Writer {
     store: Store,
@@ -96,7 +96,7 @@ pub struct Writer {
 enum Decision<'a> {
     /// This record takes its place.
     Replaced(&'a GapRecord),
-    /// It goes if it is of the log with this digest: its samples have another key now.
+    /// The stored record goes if its log has this digest: its samples are stored under another key now.
     Moved(Option<&'a str>),
 }
 
@@ -234,7 +234,7 @@ impl Writer {
         Ok(change)
     }
 
-    /// What is left of a file without the records named; nothing when it holds none of them.
+    /// The rows of a file that no decision removes; none if all of them stay.
     fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
         let schema = GapRecord::schema();
         let columns = key_columns(&schema)?.into_iter().chain([schema.index_of("log_digest")?]);
@@ -273,11 +273,13 @@ pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(
     })
 }
 
+/// What becomes of each key. A record that another log stores under a key stays when the samples of the record before it
+/// have moved from there.
 fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     let mut decisions = MergeDecisions::new();
     for result in results {
         for (key, digest) in &result.moved_from {
-            decisions.insert(key.clone(), Decision::Moved(Some(digest)));
+            decisions.entry(key.clone()).or_insert(Decision::Moved(Some(digest)));
         }
         let replaced = |record| (RecordKey::of(record), Decision::Replaced(record));
         decisions.extend(result.records.iter().map(replaced));

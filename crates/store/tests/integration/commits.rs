@@ -61,6 +61,8 @@ proptest! {
         for (i, commit) in commits.iter().enumerate() {
             for result in commit {
                 map.retain(|key, _| result.moved_from.iter().all(|(gone, _)| gone != key));
+            }
+            for result in commit {
                 map.extend(result.records.iter().map(|record| (RecordKey::of(record), record.clone())));
             }
             writer.commit(commit).unwrap();
