@@ -12,7 +12,7 @@ pub enum Rejection {
     /// One flank is touched for less than a second.
     #[strum(message = "use a longer flight, or one with more manoeuvres, so that both flanks are pressed")]
     OneSideBrief,
-    /// The load has one size: gap and wind-up are not distinguishable.
+    /// The load has one size, or is clipped to one: gap and wind-up are not distinguishable.
     #[strum(
         message = "use a flight, or a ground check, in which the load changes its size as well as its side, within the \
         range of the load cell"
@@ -21,7 +21,7 @@ pub enum Rejection {
     /// The load stays below the expected friction, or is zero.
     #[strum(message = "check the load channel and its unit; a surface without airload shows no gap")]
     LoadTooSmall,
-    /// The motor moves less than the wind-up.
+    /// The motor travels less than three wind-ups at the 95 % load.
     #[strum(
         message = "use a flight in which the actuator moves; at rest, friction and play are not distinguishable"
     )]

@@ -18,7 +18,7 @@ pub(crate) const LATEST_S: f64 = 0.04;
 /// Time for which a flank must be pressed firmly before a block gives a row, s: four time constants of a lag of 10 ms.
 const SETTLING_S: f64 = 0.04;
 /// Least share of the firm blocks of the less pressed flank that must be left.
-const SETTLED_SHARE: f64 = 0.35;
+const SETTLED_SHARE: f64 = 0.5;
 /// Below this a flank was not touched at all, s.
 const MIN_CONTACT_S: f64 = 0.1;
 
@@ -101,8 +101,8 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         FORCE => GaussianPrior { mean: windup_m, sd: 0.15 * windup_m },
         SIDE_FORCE => GaussianPrior::zero(0.05 * windup_m),
         FORCE_DRIFT => GaussianPrior::zero(0.03 * windup_m),
-        // The middle of the stroke and its ends differ by 10 %.
-        FORCE_PLACE..SPEED => GaussianPrior::zero(0.1 * windup_m),
+        // It differs by 4 % between the middle of the stroke and an end.
+        FORCE_PLACE..SPEED => GaussianPrior::zero(0.04 * windup_m),
         // Most likely value and spread of the dry friction over the 95 % load, lost share, and excess friction at rest.
         DRY => lack((0.02, 0.06), state.friction.dry_n / scaling.load_n),
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
