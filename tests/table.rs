@@ -38,7 +38,7 @@ impl Table {
         real.as_primitive::<Float64Type>().iter().map(|value| value.unwrap_or(f64::NAN)).collect()
     }
 
-    /// All columns of numbers, by name.
+    /// All columns as numbers, by name; texts are NaN.
     pub(crate) fn columns(&self) -> Vec<(String, Vec<f64>)> {
         self.names().into_iter().map(|name| (name.clone(), self.numbers(&name))).collect()
     }

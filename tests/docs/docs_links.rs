@@ -78,13 +78,14 @@ fn constants_that_pages_quote_are_those_of_the_code() {
     assert!(constants.len() > 50 && wrong.is_empty(), "{} constants, wrong: {wrong:?}", constants.len());
 }
 
-/// Errors of another method are not those of the program: the study is repeated when the method changes.
+/// Errors of another method are not those of the program. Only the gate asks: the study is repeated once, after the last
+/// change of a method.
 #[test]
 fn pages_of_errors_are_of_the_present_method() {
     for name in ["docs/accuracy.md", "docs/limits.md"] {
         let page = std::fs::read_to_string(top().join(name)).unwrap();
         let version = format!("method version {}", job::METHOD_VERSION);
-        assert!(!is_gate() || page.contains(&version), "{name}: cargo run --release -p validation");
+        assert!(!is_gate() || page.contains(&version), "{name}: `cargo run --release -p validation` has its figures");
     }
 }
 

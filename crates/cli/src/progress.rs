@@ -40,7 +40,7 @@ struct State {
     refused: usize,
     errors: usize,
     reported_at: Option<Instant>,
-    in_hand: BTreeSet<String>,
+    in_progress: BTreeSet<String>,
 }
 
 impl<'t> Progress<'t> {
@@ -62,13 +62,13 @@ impl<'t> Progress<'t> {
             Event::Planned { logs, .. } => self.total(*logs),
             Event::Started { log } => self.started(log),
             Event::Finished { log, refused, diagnostics, .. } => {
-                self.finished(log, *refused, diagnostics.len());
+                self.finished(log, *refused, !diagnostics.is_empty());
             }
             Event::Stored { .. } | Event::Trends { .. } => {}
         }
     }
 
-    /// Sets the number of items.
+    /// Sets the number of logs.
     fn total(&self, total: usize) {
         self.bar.reset_elapsed();
         self.bar.set_length(total as u64);
@@ -83,26 +83,32 @@ impl<'t> Progress<'t> {
         self.bar.enable_steady_tick(Duration::from_millis(200));
     }
 
-    /// Records that a worker started an item.
-    fn started(&self, piece: &str) {
-        self.update(|state| {
-            state.in_hand.insert(piece.to_owned());
+    /// Records that a worker started a log.
+    fn started(&self, log: &str) {
+        self.show(|state| {
+            state.in_progress.insert(log.to_owned());
         });
     }
 
-    /// Records that an item is finished.
-    fn finished(&self, piece: &str, refused: usize, errors: usize) {
-        let message = self.update(|state| {
-            state.in_hand.remove(piece);
+    /// Records that a log is finished.
+    fn finished(&self, log: &str, refused: usize, has_failed: bool) {
+        self.show(|state| {
+            state.in_progress.remove(log);
             state.refused += refused;
-            state.errors += errors;
-            let hand = state.in_hand.first().map(|path| path.rsplit('/').next().unwrap_or(path));
-            let hand = hand.unwrap_or_default();
-            format!("errors {}  {}", state.errors, escape(hand))
+            state.errors += usize::from(has_failed);
         });
-        self.bar.set_message(message);
         self.bar.inc(1);
         self.print_line();
+    }
+
+    /// Changes the state and shows its failed logs, and a log in progress.
+    fn show(&self, change: impl FnOnce(&mut State)) {
+        let message = self.update(|state| {
+            change(state);
+            let log = state.in_progress.first().map(|path| path.rsplit('/').next().unwrap_or(path));
+            format!("errors {}  {}", state.errors, escape(log.unwrap_or_default()))
+        });
+        self.bar.set_message(message);
     }
 
     /// Removes the bar before the result is printed.

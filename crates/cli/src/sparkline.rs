@@ -10,8 +10,9 @@ const LEAST_SHARE: f64 = 0.2;
 /// Heading of a column of sparklines: their scale.
 pub(crate) const SCALE: &str = "▁ lowest █ limit";
 
-/// Sparkline of at most twelve means of neighbours, oldest first; empty for fewer than two values. An empty block is the
-/// lowest value and a full one the limit, or the highest value without a limit.
+/// Sparkline of at most twelve means of neighbours, oldest first; empty for fewer than two values. `▁` is
+/// the lowest value, or 80 % of the limit if that is lower; `█` is the limit, or without one the highest value, or more where
+/// values differ little.
 pub(crate) fn sparkline(values: &[f64], limit: Option<f64>) -> String {
     if values.len() < 2 {
         return String::new();
@@ -35,7 +36,7 @@ pub(crate) fn sparkline(values: &[f64], limit: Option<f64>) -> String {
 mod tests {
     use super::*;
 
-    /// The lowest value is an empty block and the limit a full one; wear shows, and noise near the limit does not.
+    /// Wear shows, and noise near the limit does not.
     #[test]
     fn values_are_blocks_between_the_lowest_and_the_limit() {
         for (values, limit, blocks) in [

@@ -196,7 +196,7 @@ pub(crate) fn report(
         let program = format!("Freeplay {VERSION}");
         let composed = compose::compose(config, installations, &store, &ask, Timestamp::now(), &program)?;
         if composed.units.is_empty() {
-            let hint = "list all units of the store with `freeplay trend`; fill it with `freeplay run`";
+            let hint = "list all units of the store with `freeplay trend --all`; fill it with `freeplay run`";
             let fault = Diagnostic::new("nothing_to_report", "no selected unit has flown").hint(hint);
             return Err(pipeline::Error::Refused(vec![fault]));
         }

@@ -88,7 +88,7 @@ pub(crate) struct Global {
     /// Disable progress output.
     #[arg(long, global = true)]
     pub no_progress: bool,
-    /// Log format on stderr: text or JSON lines.
+    /// Format of messages on stderr: text or JSON lines.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORM")]
     pub log_format: LogFormat,
     /// When to use colour; `auto`: on a terminal, unless `NO_COLOR` is set.
@@ -113,7 +113,7 @@ pub(crate) enum Command {
         after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs\n  freeplay init --sample demo && cd demo && freeplay run"
     )]
     Init(InitArgs),
-    /// Check how logs are mapped: columns, units, signs and rates per channel; nothing is computed
+    /// Check how logs are mapped: columns, units, signs and rates per channel; no gap is computed
     #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]
     Check(CheckArgs),
     /// Process new and changed logs, then update trends (nightly job)

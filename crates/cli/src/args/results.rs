@@ -14,7 +14,7 @@ use crate::completion;
 /// `query`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct QueryArgs {
-    /// `tail`, `serial`, `flight` or `position`; may be left out where the value is known.
+    /// `tail`, `serial`, `flight` or `position`; or the value alone, if it is known.
     #[arg(value_name = "BY", required_unless_present_any = ["tail", "serial", "flight", "position", "part", "since", "until", "last"])]
     pub first: Option<String>,
     /// Value to match.
@@ -61,7 +61,7 @@ pub(crate) struct TrendArgs {
     /// List normal and removed units too; otherwise a table only counts them.
     #[arg(long, help_heading = "Views")]
     pub all: bool,
-    /// Without effect: the classic statistics are no longer computed. Scripts may still pass it.
+    /// Ignored; scripts may still pass it.
     #[arg(long, hide = true)]
     pub statistics: bool,
     /// Show every followed quantity of the units instead: stiffness, friction, delays, load zero, lost motion, NIS.
@@ -81,7 +81,7 @@ pub(crate) struct ExternalEstimatesArgs {
     /// Read this table of estimates instead of the store; needs no configuration.
     #[arg(long, value_name = "FILE")]
     pub estimates: Option<PathBuf>,
-    /// Removal limit in m for parts without one in the configuration, e.g. 150e-6.
+    /// Limit in m for parts without a `limit_m` of their own, e.g. 150e-6.
     #[arg(long, value_name = "M", value_parser = parse_limit)]
     pub limit_m: Option<f64>,
 }
@@ -131,7 +131,7 @@ pub(crate) struct BacktestArgs {
 /// `report`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ReportArgs {
-    /// Write to this folder; an existing report is replaced, other files are kept.
+    /// Write to this folder; a report in it is replaced, and other files beside that report are kept.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
     #[command(flatten)]

@@ -39,7 +39,7 @@ pub(crate) fn load_trend_context(
     let is_none_named = matches!(&global.config[..], [file] if file.as_os_str() == CONFIG && !file.exists());
     let (mut config, installations) = if external.estimates.is_some() && is_none_named {
         if external.limit_m.is_none() {
-            output.note("no pipeline.toml here and no limit, so no states; set one with `--limit-m 150e-6`");
+            output.note("no pipeline.toml here and no limit, so every unit is unassessed; set one with `--limit-m 150e-6`");
         }
         (Config::default(), Installations::default())
     } else {

@@ -14,7 +14,6 @@ impl TrendRow {
         }
         match self.reason_code {
             Some("above_limit") => self.of_limit(self.over_since_text()),
-            Some("limit_held") => self.of_limit(Some("not yet two records below".to_owned())),
             Some("crosses_soon" | "rises_to_limit" | "at_watch" | "onset") => {
                 self.of_limit(self.growth_text())
             }

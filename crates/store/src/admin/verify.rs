@@ -149,7 +149,7 @@ fn foreign_commit(table: &Table, file: &Path) -> Diagnostic {
         )
 }
 
-/// What is wrong with a data file, in the first respect that is.
+/// The first fault of a data file.
 fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
     const RESTORE: &str = "restore it from a backup of the store";
     let wrong = |code: &str, what: &str, hint: &str| {
@@ -176,7 +176,7 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
             "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
         ));
     }
-    match missed_by_statistics(table, file).map_err(|e| e.diagnostic().in_file(file.path.display()))? {
+    match missed_by_statistics(table, file).map_err(|e| e.diagnostic().in_file(table.location.display_path(&file.path).display()))? {
         None => Ok(()),
         Some(column) => {
             let what = format!("the statistics of a data file do not cover its content: {column}");

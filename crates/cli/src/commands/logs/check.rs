@@ -26,7 +26,7 @@ const MOST_WHOLE_LOGS: usize = 3;
 const NO_CHECKSUMS: &str = "silent corruption would not be detected (`write_page_checksum=True` in pyarrow)";
 
 /// Replaces the channel table if no actuator could be checked.
-const NOTHING: &str = "  no actuator could be checked; see errors above\n";
+const NOTHING: &str = "  no actuator could be checked; see the errors below\n";
 
 /// Checks logs and prints what was found.
 ///
@@ -221,7 +221,7 @@ fn summary(logs: usize, channels: &[ChannelCheck], diagnostics: &[Diagnostic]) -
     files.dedup();
     let warned: BTreeSet<&str> = channels.iter().filter(|c| c.is_warning()).map(|c| c.log.as_str()).collect();
     format!(
-        "{} checked, {} failed, {} with warnings; nothing was computed or written\n",
+        "{} checked, {} failed, {} with warnings; no gap was computed, nothing was stored\n",
         table::count(logs, "log"),
         files.len(),
         warned.len()

@@ -43,8 +43,8 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
         let names: Vec<String> = names.map(|(column, name)| format!("{} `{name}`", called(column))).collect();
         let of = if names.is_empty() { String::new() } else { format!(" of {}", names.join(", ")) };
         output.note(&format!(
-            "no record{of}{}; list all units of the store with `freeplay trend`",
-            range(args)
+            "no record{of}{}; list all units of the store with `freeplay trend --all`",
+            restrictions(args)
         ));
     }
     Ok(Code::Success)
@@ -72,8 +72,8 @@ fn verdict(
     Ok(if found.now.is_empty() { String::new() } else { trend::page(&found, is_one_unit, MAX_RANK) + "\n" })
 }
 
-/// The searched range as text.
-fn range(args: &QueryArgs) -> String {
+/// Part number and dates of a search, as text.
+fn restrictions(args: &QueryArgs) -> String {
     let part = args.part.as_ref().map(|part| format!(" with part number {part}"));
     let since = args.departures.since.map(|since| format!(" from {since}"));
     let until = args.departures.until.map(|until| format!(" before {until}"));
@@ -136,14 +136,14 @@ fn unknown_word(word: &str) -> Failure {
 
 /// Records as a table.
 pub(crate) fn page(records: &[GapRecord]) -> String {
-    let interval = |e: &GapEstimate| e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low));
+    let half_width_m = |e: &GapEstimate| e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low));
     let columns: &table::Columns<'_, GapRecord> = &[
         (text("departure [UTC]", 0), &|r| r.flight.departure_utc.strftime("%Y-%m-%d %H:%M").to_string()),
         (text("tail", 3), &|r| r.flight.tail_number.to_string()),
         (text("flight", 4), &|r| r.flight.flight_id.to_string()),
         (text("position", 1), &|r| r.position.to_string()),
         (text("serial", 0), &|r| r.serial_number.to_string()),
-        (number("gap ± 90 % [µm]", 0), &|r| table::gap(r.estimate.gap_m, interval(&r.estimate))),
+        (number("gap ± 90 % [µm]", 0), &|r| table::gap(r.estimate.gap_m, half_width_m(&r.estimate))),
         (text("part", 5), &|r| r.part_number.to_string()),
         (number("mid-range [µm]", 6), &|r| table::micrometres(r.estimate.gap_midrange_m)),
         (number("load reversals", 8), &|r| r.estimate.load_reversals.to_string()),

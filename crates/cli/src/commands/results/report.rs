@@ -32,7 +32,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
         let known = KnownNames::of(&config);
         known.check_units(&args.units)?;
         let what = known.why_nothing(&ask);
-        let hint = "list all units of the store with `freeplay trend`; fill it with `freeplay run`";
+        let hint = "list all units of the store with `freeplay trend --all`; fill it with `freeplay run`";
         return Err(Failure::usage("nothing_to_report", what, hint));
     }
     let (config, installations) = (Arc::new(config), Arc::new(installations));

@@ -108,7 +108,7 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
 
 fn changes_page(changes: &[QuantityChange], units: usize) -> String {
     if changes.is_empty() {
-        return format!("nothing but the gap changed on {}\n", count(units, "unit"));
+        return format!("no quantity other than the gap changed on {}\n", count(units, "unit"));
     }
     let name = |change: &QuantityChange| match (&change.serial_number, &change.tail_number) {
         (Some(serial), _) => unit_name(change.part_number.as_deref(), serial),

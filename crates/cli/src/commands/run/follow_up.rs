@@ -68,7 +68,7 @@ fn alerts_text(alerts: &AlertSummary) -> String {
     for (channel, n) in &alerts.without_channel {
         let (messages, channel) = (count(*n, "message"), escape(channel));
         parts.push(format!(
-            "{messages} wait for `[alerts.{channel}]`, which the configuration has no more (`freeplay store alerts --drop {channel}`)"
+            "{messages} for `[alerts.{channel}]`, which is no longer configured (`freeplay store alerts --drop {channel}`)"
         ));
     }
     parts.join("; ")

@@ -31,8 +31,8 @@ pub(crate) fn write_failed(file: &Path, started_utc: Timestamp, code: Code) -> R
 
 /// Whether the run that began at this time, or a later one, wrote the file.
 pub(crate) fn is_of(file: &Path, started_utc: Timestamp) -> bool {
-    let ended = value_in(file, "freeplay_run_ended_timestamp_seconds ");
-    ended.is_some_and(|ended| ended * 1e3 >= started_utc.as_millisecond() as f64)
+    let started = value_in(file, "freeplay_run_started_timestamp_seconds ");
+    started.is_some_and(|started| (started * 1e3).round() >= started_utc.as_millisecond() as f64)
 }
 
 fn gauge(text: &mut String, name: &str, help: &str, value: f64) {
@@ -83,10 +83,10 @@ fn text(report: &RunSummary, code: Code, completed_before: Option<f64>) -> Strin
             count(report.unacknowledged()),
         ),
         ("logs_not_reached", "Logs not processed because the run stopped.", count(report.not_reached)),
-        ("records_estimated", "Stored records with a gap.", count(report.estimated)),
+        ("records_estimated", "Records with a gap that the last run stored.", count(report.estimated)),
         (
             "records_refused",
-            "Actuator-flights for which no gap could be determined.",
+            "Records without a gap that the last run stored.",
             count(report.refusals()),
         ),
         (
@@ -97,7 +97,7 @@ fn text(report: &RunSummary, code: Code, completed_before: Option<f64>) -> Strin
         ("tails_quiet", "Tails with no new logs for unusually long.", quiet),
         (
             "units_stale",
-            "Installed units without a gap for unusually long before now.",
+            "Installed units whose newest record is unusually old.",
             count(report.stale_now),
         ),
         ("newest_departure_timestamp_seconds", "Newest departure of all logs.", newest),

@@ -135,7 +135,7 @@ fn table_findings(report: &RunSummary, page: &mut Page) {
     }
 }
 
-/// Logs without records: copies, failures of this run and of earlier ones, and those left for the next run.
+/// Logs that are copies, that failed now or in earlier runs, and that were left for the next run.
 fn failures(report: &RunSummary, page: &mut Page) {
     if !report.duplicates.is_empty() {
         let copies = count(report.duplicates.len(), "log");
@@ -295,11 +295,11 @@ fn exit_text(report: &RunSummary, code: Code) -> String {
     }
     let text = if !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
-        format!("{failed} failed. After fixing them: `freeplay run --retry`")
+        format!("{failed} failed. After the fix: `freeplay run --retry`")
     } else if report.unacknowledged() > 0 {
         let failed = count(report.unacknowledged(), "log");
         format!(
-            "{failed} of earlier runs still failed. After fixing them: `freeplay run --retry`; to accept them: \
+            "{failed} of earlier runs still failed. After the fix: `freeplay run --retry`; to accept them: \
              `logs.acknowledged_errors`"
         )
     } else {
