@@ -16,14 +16,10 @@ pub(crate) struct ColumnBuilder {
 }
 
 impl ColumnBuilder {
-    /// An empty column with room for `values` values, which become SI or stay raw.
-    pub(crate) fn with_capacity(values: usize, to_si: Option<SiConversion>) -> Self {
-        Self { to_si, values: buffer_pool::acquire(values), scanner: None }
-    }
-
-    /// The same, with statistics of the appended values.
-    pub(crate) fn with_stats(self) -> Self {
-        Self { scanner: Some(StatsAccumulator::new()), ..self }
+    /// An empty column with room for `values` values, which become SI or stay raw, with statistics of them or without.
+    pub(crate) fn new(values: usize, to_si: Option<SiConversion>, has_stats: bool) -> Self {
+        let scanner = has_stats.then(StatsAccumulator::new);
+        Self { to_si, values: buffer_pool::acquire(values), scanner }
     }
 
     pub(crate) fn len(&self) -> usize {

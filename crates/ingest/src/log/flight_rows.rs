@@ -26,17 +26,14 @@ const MARK: char = '#';
 /// Characters of a text that a path writes as `%` and two digits.
 const ESCAPED: &AsciiSet = &CONTROLS.add(b'%').add(b'#').add(b'/').add(b'\\');
 
-/// A column and the text that it holds in every row of a flight.
-pub(crate) type FlightRow = (String, String);
-
 /// The columns that tell the flights of a file apart; none where a file holds one flight.
 pub fn flight_columns(mapping: &IdentityMapping) -> Vec<&str> {
     let columns = FIELDS.iter().filter_map(|field| mapping.columns.get(field));
     columns.map(String::as_str).filter(|_| mapping.by_row).collect()
 }
 
-/// The file of a path, and what marks the rows of the flight; nothing where all of its rows are meant.
-pub fn split_path(path: &Path, mapping: &IdentityMapping) -> (PathBuf, Vec<FlightRow>) {
+/// The file of a path, and the columns and texts that mark the rows of the flight; none where all of its rows are meant.
+pub fn split_path(path: &Path, mapping: &IdentityMapping) -> (PathBuf, Vec<(String, String)>) {
     let columns = flight_columns(mapping);
     let parts = path.to_str().and_then(|path| path.rsplit_once(MARK)).filter(|_| !columns.is_empty());
     let Some((file, texts)) = parts else { return (path.to_owned(), Vec::new()) };

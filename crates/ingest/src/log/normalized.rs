@@ -98,7 +98,7 @@ pub(crate) fn read_actuator(
 }
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error> {
-    let mut values = ColumnBuilder::with_capacity(file.rows().min(1 << 26), None).with_stats();
+    let mut values = ColumnBuilder::new(file.rows().min(1 << 26), None, true);
     file.append_numbers(name, None, &mut values)?;
     let (values, seen) = values.finish();
     let seen = seen.unwrap_or_else(|| StatsAccumulator::new().end(&values));

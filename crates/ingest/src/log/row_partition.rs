@@ -51,9 +51,7 @@ type GatheredKey = (Rows, String, Option<String>);
 
 /// The rows of a table by channel or actuator.
 #[derive(Debug, Default)]
-pub(crate) struct Partition {
-    state: Mutex<State>,
-}
+pub(crate) struct Partition(Mutex<State>);
 
 #[derive(Debug, Default)]
 struct State {
@@ -65,7 +63,7 @@ struct State {
 
 impl Partition {
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Remembers rows and leaves that a position will ask for.

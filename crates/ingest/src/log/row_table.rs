@@ -96,10 +96,7 @@ impl RowTable {
     ) -> Result<(Vec<f64>, Option<ChannelStats>), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
         let room = if self.holds_all(samples) { self.rows().min(1 << 26) } else { 0 };
-        let mut values = ColumnBuilder::with_capacity(room, to_si);
-        if to_si.is_some() && wanted.is_none() {
-            values = values.with_stats();
-        }
+        let mut values = ColumnBuilder::new(room, to_si, to_si.is_some() && wanted.is_none());
         if self.holds_all(samples) {
             // In a list a row is no sample.
             let wanted = if self.is_listed(&samples.leaf) { None } else { wanted };

@@ -132,7 +132,7 @@ mod tests {
             write_batch(std::fs::File::create(&path).unwrap(), &batch, properties.build()).unwrap();
             let from = from.min(values.len());
             let stretch = [from..values.len(), values.len()..values.len()];
-            let mut read = ColumnBuilder::with_capacity(0, None);
+            let mut read = ColumnBuilder::new(0, None, false);
             LogFile::open(&path).unwrap().append_numbers("x", Some(&stretch), &mut read).unwrap();
             let read = read.finish().0;
             prop_assert_eq!(read.len(), values.len());

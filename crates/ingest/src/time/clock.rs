@@ -1,11 +1,5 @@
-//! One clock for a log: which rows count, in which order, at which step, and where time breaks.
-//!
-//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a timestamp are left out, unless the rate is
-//! declared and their number fits between their neighbours. Rows out of order are sorted. Rows that repeat a timestamp
-//! are left out. They are spread evenly if `tick_s` is given or if the stamps jitter by a large part of the step. After a
-//! step of more than one and a half times the usual one, the filter starts again. Where up to five rows at a time are lost
-//! often (after over 1 % of the rows, a quarter of all at most), they count as missing samples.
-//! Rows that are in order stay as they are.
+//! One clock for a log: which rows count, in which order, at which step, and where time breaks. The rules for damaged time
+//! are in `docs/equations.md`, "Time".
 
 use std::ops::Range;
 

@@ -27,10 +27,8 @@ pub(crate) struct TickFormat {
 
 impl TickFormat {
     /// What the numbers of a column of this type are: by the type, by the unit of a `duration`, or else by the mapped clock.
-    /// A column that is read as text holds ISO 8601; an offset in it is taken, and without one the time is local.
-    ///
-    /// # Errors
-    /// What was found, where neither the type nor the mapping has a unit.
+    /// A column that is read as text holds ISO 8601; an offset in it is taken, and without one the time is local. An error is
+    /// what was found, where neither the type nor the mapping has a unit.
     pub(crate) fn of(
         kind: &DataType,
         is_text: bool,
