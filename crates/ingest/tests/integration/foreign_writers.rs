@@ -8,7 +8,7 @@ use ingest::mapping::{IdentityField, IdentityMapping};
 use ingest::{ActuatorChannels, ChannelMapping, GroupMapping, Layout, Log, LogFiles, Mapping};
 use records::Position;
 
-use crate::layouts::{self, LINEAR, channel, opened, own_identity};
+use crate::layouts::{self, LINEAR, channel, opened, own_identity, plain, read};
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers").join(name)
@@ -140,4 +140,18 @@ fn loads_in_a_file_of_their_own_at_their_own_rate_move_in_lines() {
     let log = opened(&file("group_positions.parquet"), &m);
     let error = log.actuators(&m.channels, None).unwrap_err();
     assert_eq!(error.diagnostic().code, "group_missing");
+}
+
+/// Files that pyarrow 26.0.1 wrote with an encrypted footer, with an encrypted column under a plain footer, and one
+/// whose footer names encoding 10, which is ALP in the format's list of encodings.
+#[test]
+fn encrypted_files_and_new_encodings_are_named() {
+    let diagnostic = |name: &str| read(&file("..").join(name), &plain()).unwrap_err().diagnostic();
+    assert_eq!(diagnostic("encrypted_footer.parquet").code, "encrypted");
+    let column = diagnostic("encrypted_column.parquet");
+    assert_eq!(column.code, "encrypted");
+    assert!(column.message.contains("`m`"), "{column}");
+    let alp = diagnostic("alp.parquet");
+    assert_eq!(alp.code, "encoding_unsupported");
+    assert!(alp.message.contains("ALP"), "{alp}");
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, Float64Array, Int16Array, Int32Array, ListArray, RecordBatch, StringArray,
+    ArrayRef, Float64Array, Int16Array, Int32Array, ListArray, RecordBatch, StringArray, StructArray,
     Time32MillisecondArray, TimestampMillisecondArray, UInt32Array,
 };
 use arrow::compute::take;
@@ -404,6 +404,27 @@ fn the_closest_column_shares_the_end_of_the_pattern() {
     let log = opened(&file, &m);
     let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
     assert!(hint.contains("`AIL_L_LOAD_LBF`"), "{hint}");
+}
+
+/// Two columns of one name: neither is taken, and the error names them.
+#[test]
+fn a_name_that_two_columns_have_is_refused() {
+    let columns = |last| ["t", "m", "s", "f", "spare", last].map(|name| (name, reals([1.0, 2.0])));
+    for column in ["t", "s"] {
+        let found = refusal(&plain(), &columns(column));
+        assert_eq!((found.code.as_str(), found.column.as_deref()), ("duplicate_column", Some(column)));
+    }
+    assert!(only(&plain(), &columns("spare")).is_ok());
+}
+
+#[test]
+fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
+    let field = |name| (Arc::new(Field::new(name, DataType::Float64, true)), reals([1.0, 2.0]));
+    let record: ArrayRef = Arc::new(StructArray::from(["deg", "raw"].map(field).to_vec()));
+    let [t, s, f] = ["t", "s", "f"].map(|name| (name, reals([1.0, 2.0])));
+    let found = refusal(&plain(), &[t, ("m", record), s, f]);
+    assert_eq!((found.code.as_str(), found.column.as_deref()), ("column_type", Some("m")));
+    assert!(found.to_string().contains("`deg`, `raw`"), "{found}");
 }
 
 /// Rows of 0.1 s with ten positions and five loads each: both begin at the stamp of their row.

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod clocks;
-mod corrupt_files;
 mod foreign_writers;
 mod fuzz;
 mod layouts;

@@ -68,12 +68,9 @@ fn conditional(is_conditional: bool) -> Mapping {
     mapping
 }
 
-fn bits(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() }).collect()
-}
-
 fn channels(read: &ActuatorChannels) -> [Vec<u64>; 3] {
-    [&read.motor_m, &read.dx_m, &read.load_n].map(|values| bits(values))
+    let bits = |value: &f64| if value.is_nan() { u64::MAX } else { value.to_bits() };
+    [&read.motor_m, &read.dx_m, &read.load_n].map(|values| values.iter().map(bits).collect())
 }
 
 proptest! {
