@@ -176,7 +176,9 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
             "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
         ));
     }
-    match missed_by_statistics(table, file).map_err(|e| e.diagnostic().in_file(table.location.display_path(&file.path).display()))? {
+    match missed_by_statistics(table, file)
+        .map_err(|e| e.diagnostic().in_file(table.location.display_path(&file.path).display()))?
+    {
         None => Ok(()),
         Some(column) => {
             let what = format!("the statistics of a data file do not cover its content: {column}");

@@ -273,13 +273,15 @@ pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(
     })
 }
 
-/// What becomes of each key. A record that another log stores under a key stays when the samples of the record before it
-/// have moved from there.
+/// What becomes of each key. Samples that leave a key take their own record with them, and no other log's.
 fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     let mut decisions = MergeDecisions::new();
     for result in results {
         for (key, digest) in &result.moved_from {
-            decisions.entry(key.clone()).or_insert(Decision::Moved(Some(digest)));
+            let is_of_other = |record: &GapRecord| record.provenance.log_digest != *digest;
+            if !matches!(decisions.get(key), Some(Decision::Replaced(record)) if is_of_other(record)) {
+                decisions.insert(key.clone(), Decision::Moved(Some(digest)));
+            }
         }
         let replaced = |record| (RecordKey::of(record), Decision::Replaced(record));
         decisions.extend(result.records.iter().map(replaced));

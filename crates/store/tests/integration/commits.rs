@@ -61,8 +61,6 @@ proptest! {
         for (i, commit) in commits.iter().enumerate() {
             for result in commit {
                 map.retain(|key, _| result.moved_from.iter().all(|(gone, _)| gone != key));
-            }
-            for result in commit {
                 map.extend(result.records.iter().map(|record| (RecordKey::of(record), record.clone())));
             }
             writer.commit(commit).unwrap();
@@ -113,4 +111,18 @@ fn a_reader_beside_a_writer_sees_whole_commits_only() {
         writing.join().unwrap();
     });
     assert_eq!(reader.records(&Query::default()).unwrap().len(), 30);
+}
+
+#[test]
+fn a_record_stays_where_other_samples_leave_its_key_in_the_same_commit() {
+    let (_dir, mut writer) = fresh();
+    let before = result(1, 0, 30e-6);
+    writer.commit(std::slice::from_ref(&before)).unwrap();
+    let mut new = result(1, 0, 40e-6);
+    new.records.iter_mut().for_each(|record| record.provenance.log_digest = "other".into());
+    let key = |record: &GapRecord| (RecordKey::of(record), record.provenance.log_digest.clone());
+    let left = LogResult { moved_from: before.records.iter().map(key).collect(), ..result(0, 1, 30e-6) };
+    writer.commit(&[new.clone(), left]).unwrap();
+    let stored = writer.store().records(&Query::default()).unwrap();
+    assert!(new.records.iter().all(|record| stored.contains(record)), "{stored:?}");
 }
