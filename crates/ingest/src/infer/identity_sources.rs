@@ -132,6 +132,8 @@ const TAILS: [&str; 3] = [
 ];
 /// Pattern of an aircraft type, which is no tail number.
 const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
+/// The name of any log.
+const ANY_LOG: &str = r"[^/]*\.parquet";
 /// Folders between that of the tail and the log, at most.
 const MOST_FOLDERS: usize = 4;
 
@@ -144,7 +146,7 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     let folder = |up: usize| path.ancestors().nth(up).and_then(Path::file_name)?.to_str();
     let place_end = place_end();
     let is_place = with_position && fits(&format!("^{place_end}$"), name);
-    let end = if is_place { &place_end } else { r"[^/]*\.parquet" };
+    let end = if is_place { &place_end } else { ANY_LOG };
     let (departure, format, taken) = path_departure(path, name, end);
     let is = |up: usize, form: &str| folder(up).is_some_and(|text| fits(&format!("^(?:.*=)?{form}$"), text));
     let in_folder = |up: usize| {
@@ -174,11 +176,15 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
 }
 
 /// An expression for names that hold a tail of this form and a departure, if this one does: the tail begins the name or
-/// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may stand anywhere.
+/// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may stand anywhere, and needs no
+/// departure beside it.
 fn tail_in_name(name: &str, tail: &str, is_sure: bool, departure: &str) -> Option<String> {
-    let (form, _) = known_departure(name)?;
     let others = if is_sure { "[^/]*[_ =-]" } else { &format!("{AIRCRAFT_TYPE}|[A-Za-z]{{3,}}[_ -]") };
     let before = format!("(?:{others})?(?<tail_number>{tail})[_ ;-]");
+    let Some((form, _)) = known_departure(name) else {
+        let is_here = is_sure && departure == ANY_LOG && fits(&format!("^{before}{ANY_LOG}$"), name);
+        return is_here.then(|| format!("{before}{departure}"));
+    };
     if fits(&format!("^{before}[^/]*?{form}"), name) {
         return Some(format!("{before}{departure}"));
     }
