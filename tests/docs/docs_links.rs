@@ -85,7 +85,10 @@ fn pages_of_errors_are_of_the_present_method() {
     for name in ["docs/accuracy.md", "docs/limits.md"] {
         let page = std::fs::read_to_string(top().join(name)).unwrap();
         let version = format!("method version {}", job::METHOD_VERSION);
-        assert!(!is_gate() || page.contains(&version), "{name}: `cargo run --release -p validation` has its figures");
+        assert!(
+            !is_gate() || page.contains(&version),
+            "{name}: `cargo run --release -p validation` has its figures"
+        );
     }
 }
 

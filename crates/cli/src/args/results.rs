@@ -131,7 +131,7 @@ pub(crate) struct BacktestArgs {
 /// `report`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ReportArgs {
-    /// Write to this folder; a report in it is replaced, and other files beside that report are kept.
+    /// Write to this folder, in place of a report in it; its other files stay.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
     #[command(flatten)]
