@@ -80,7 +80,6 @@ impl From<ListEntry> for FileStat {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use std::collections::BTreeMap;
     use std::fs::File;
