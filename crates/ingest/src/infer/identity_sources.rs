@@ -176,8 +176,8 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
 }
 
 /// An expression for names that hold a tail of this form and a departure, if this one does: the tail begins the name or
-/// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may stand anywhere, and needs no
-/// departure beside it.
+/// follows a type of aircraft (`A320_N412FP`) or a recorder (`QAR-N412FP`); one that is sure may be anywhere, and needs no
+/// departure.
 fn tail_in_name(name: &str, tail: &str, is_sure: bool, departure: &str) -> Option<String> {
     let others = if is_sure { "[^/]*[_ =-]" } else { &format!("{AIRCRAFT_TYPE}|[A-Za-z]{{3,}}[_ -]") };
     let before = format!("(?:{others})?(?<tail_number>{tail})[_ ;-]");

@@ -217,10 +217,10 @@ fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
     };
     let nothing = BTreeSet::new();
     let with_records = [(Some("EMA-27-1040".to_owned()), "S05".to_owned())].into();
-    let night = |before: &[records::UnitState], with_records, config: &Config| {
+    let run = |before: &[records::UnitState], with_records, config: &Config| {
         changes(config, before, &assess(&rows), RunFacts { run_id: "now", with_records, moved: &[] })
     };
-    let found = night(&states(&known), &with_records, &config());
+    let found = run(&states(&known), &with_records, &config());
     let [change] = &found.changed[..] else { panic!("{:?}", found.changed) };
     assert_eq!(change.serial_number, "S05");
     assert_eq!(change.new_events.len(), 1, "{change:?}");
@@ -234,9 +234,9 @@ fn a_run_reports_what_its_flights_changed_and_a_first_run_nothing() {
     let stored: Vec<_> = found.states.iter().chain(&states(&known)).cloned().collect();
     let stored: std::collections::BTreeMap<_, _> = stored.into_iter().rev().map(|s| (s.unit(), s)).collect();
     let stored: Vec<records::UnitState> = stored.into_values().collect();
-    assert!(night(&stored, &nothing, &config()).changed.is_empty());
-    // A first night stores states and tells nothing.
-    let first = night(&[], &with_records, &config());
+    assert!(run(&stored, &nothing, &config()).changed.is_empty());
+    // A first run stores states and reports nothing.
+    let first = run(&[], &with_records, &config());
     assert_eq!((first.changed.len(), first.states.len()), (0, 14));
 }
 
