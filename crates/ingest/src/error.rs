@@ -196,7 +196,14 @@ pub(crate) fn time_unit_unknown(column: &str, found: &str) -> Fault {
     Fault::new("time_unit_unknown", message, "set `clock.unit` to s, ms, us or ns")
         .column(column)
         .found(found)
-        .expected("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`; of texts, 2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"")
+        .expected("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`")
+}
+
+pub(crate) fn time_text_unknown(column: &str, found: &str) -> Fault {
+    let message = format!("the time column `{column}` holds a text that is no ISO 8601 time");
+    let hint = "convert it to timestamps, or map another clock by `clock.column`";
+    let expected = "2026-11-19T04:13:00Z, or 04:13:00 with `clock.epoch` = \"midnight\"";
+    Fault::new("time_unit_unknown", message, hint).column(column).found(found).expected(expected)
 }
 
 /// A fact for which no source was found in the `looked` places.

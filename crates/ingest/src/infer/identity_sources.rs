@@ -134,12 +134,14 @@ const TAILS: [&str; 3] = [
 const AIRCRAFT_TYPE: &str = r"(?:A[23]\d\d|B7\d\d|E1\d\d|AT[47]\d|CRJ\d)[A-Z]?[_ -]?";
 /// The name of any log.
 const ANY_LOG: &str = r"[^/]*\.parquet";
+/// Pattern of the name of a piece, such as `part-000.parquet`; its folder is the flight.
+const PIECE: &str = r"(?i)^(?:part|piece|chunk|segment|seg)[_ -]?\d";
 /// Folders between that of the tail and the log, at most.
 const MOST_FOLDERS: usize = 4;
 
 /// An expression for logs whose path holds tail, departure or both, if this one seems to, and the form of the departure:
 /// `TAIL/…departure….parquet`, `TAIL/POSITION/…departure….parquet`, `TAIL_departure.parquet`, `departure_TAIL.parquet`,
-/// `TAIL/departure/….parquet`, `TAIL/day/time.parquet` or `TAIL/….parquet`. Where `with_position`, the path holds the
+/// `TAIL/departure/….parquet`, `TAIL/day/time.parquet`, `TAIL/FLIGHT/part-0….parquet` or `TAIL/….parquet`. Where `with_position`, the path holds the
 /// position as [`path_position`] finds it.
 pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option<String>)> {
     let name = path.file_name()?.to_str()?;
@@ -152,6 +154,9 @@ pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, Option
     let in_folder = |up: usize| {
         let below = match up - taken - 1 {
             1 if with_position && !is_place && taken == 0 => format!("(?<position>{PLACE})/"),
+            folders @ 1.. if taken == 0 && is_piece(path) => {
+                format!("{}(?<flight_id>[^/]+)/", "[^/]+/".repeat(folders - 1))
+            }
             folders => "[^/]+/".repeat(folders),
         };
         format!("(?<tail_number>[^/=]+)/{below}{departure}")
@@ -242,6 +247,11 @@ pub fn path_position(path: &Path) -> Option<(String, String)> {
     [format!("(?:^|/){}$", place_end()), below_tail]
         .into_iter()
         .find_map(|expression| Some((captured(&expression, path.to_str()?, "position")?, expression)))
+}
+
+/// Whether a log's name says that it is a piece of a flight.
+pub fn is_piece(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(|name| fits(PIECE, name))
 }
 
 fn captured(expression: &str, text: &str, group: &str) -> Option<String> {

@@ -5,7 +5,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::{Timestamp, civil};
 
-use crate::error::{Fault, time_unit_unknown};
+use crate::error::{Fault, time_text_unknown, time_unit_unknown};
 use crate::mapping::units::TimeUnit;
 use crate::mapping::{ClockMapping, Epoch};
 use crate::parquet::numeric::{append, as_text, wrong_type};
@@ -124,7 +124,10 @@ impl<'a> TimestampParser<'a> {
             self.ticks.zero = TimeOrigin::OfDay(0.0);
             tick = i64::try_from(time.duration_since(civil::Time::midnight()).as_nanos()).ok();
         }
-        tick.ok_or_else(|| time_unit_unknown(self.column, &format!("`{value}` in row {row}")))
+        tick.ok_or_else(|| {
+            let error = if value.parse::<f64>().is_ok() { time_unit_unknown } else { time_text_unknown };
+            error(self.column, &format!("`{value}` in row {row}"))
+        })
     }
 
     fn push_whole(&mut self, tick: Option<i64>) {

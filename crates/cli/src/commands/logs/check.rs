@@ -11,7 +11,7 @@ use pipeline::logs::discover;
 use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 
-use crate::args::{CheckArgs, Format, Global};
+use crate::args::{CheckArgs, Global};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::row_output;
@@ -51,11 +51,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
             summary(count, &channels, &seen.diagnostics)
         )
     };
-    if args.rows.format() == Format::Table && args.rows.output.is_none() {
-        output.write_result(&table())?;
-    } else {
-        row_output::write_rows(&args.rows, output, || row_output::batch(&channels), table)?;
-    }
+    row_output::write_rows(&args.rows, output, || row_output::batch(&channels), table)?;
     let diagnostics: Vec<Diagnostic> = seen.diagnostics.into_iter().chain(seen.mapping_faults).collect();
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })

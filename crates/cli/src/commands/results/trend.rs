@@ -1,7 +1,7 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
 use crate::sparkline::{SCALE, sparkline};
-use crate::table::{self, count, number, or_dash, state_mark, text, unit_name};
+use crate::table::{self, Column, count, number, or_dash, state_mark, text, unit_name};
 
 use crate::commands::context::{KnownNames, load_trend_context, note_future};
 
@@ -128,8 +128,11 @@ fn changes_page(changes: &[QuantityChange], units: usize) -> String {
 
 /// The units of an assessment with what limits the trust in it; normal units are only counted unless `shows_all`.
 pub(crate) fn page(found: &StoreAssessment, shows_all: bool, max_rank: u8) -> String {
-    let as_of = found.now.iter().map(|row| row.as_of_utc).max().unwrap_or_default();
-    let as_of = as_of.strftime("%Y-%m-%d %H:%M UTC");
+    let dates: BTreeSet<_> = found.now.iter().map(|row| row.as_of_utc).collect();
+    let as_of = match (dates.first(), dates.len()) {
+        (Some(date), 1) => date.strftime("%Y-%m-%d %H:%M UTC").to_string(),
+        _ => "the date of each query".to_owned(),
+    };
     let mut page = format!("{} as of {as_of}: {}\n", count(found.now.len(), "unit"), by_state(&found.now));
     let faults = found.mapping_faults.iter().map(ToString::to_string);
     for note in faults.chain(found.notes.iter().cloned()) {
@@ -165,6 +168,9 @@ pub(crate) fn by_state<'r>(rows: impl IntoIterator<Item = &'r TrendRow>) -> Stri
     states.iter().rev().map(of_state).collect::<Vec<_>>().join(", ")
 }
 
+/// Heading of the dates of assessments, shown where they differ.
+const AS_OF: &str = "as of";
+
 /// Units by urgency, with date, reason and certainty; without the columns above a rank.
 pub(crate) fn unit_table(mut units: Vec<&TrendRow>, max_rank: u8) -> String {
     units.sort_by(|a, b| a.urgency().partial_cmp(&b.urgency()).unwrap_or(Ordering::Equal));
@@ -172,6 +178,7 @@ pub(crate) fn unit_table(mut units: Vec<&TrendRow>, max_rank: u8) -> String {
         value.map_or_else(table::empty_cell, |value| format!("{:.1}", value * factor))
     };
     let columns: &table::Columns<'_, TrendRow> = &[
+        (text(AS_OF, 0), &|r| r.as_of_utc.strftime("%Y-%m-%d").to_string()),
         (text("state", 0), &|r| state_mark(r.state)),
         (text("due", 0), &|r| or_dash(r.due_text().as_deref())),
         (text("tail", 0), &|r| or_dash(r.tail_number.as_deref())),
@@ -189,6 +196,8 @@ pub(crate) fn unit_table(mut units: Vec<&TrendRow>, max_rank: u8) -> String {
         (number("flights", 9), &|r| r.flights.to_string()),
         (text("why, and how sure", 0), &|r| r.statement_text()),
     ];
-    let kept: Vec<_> = columns.iter().copied().filter(|(column, _)| column.rank <= max_rank).collect();
+    let is_of_one_date = units.iter().all(|row| row.as_of_utc == units[0].as_of_utc);
+    let is_kept = |column: &Column| column.rank <= max_rank && !(is_of_one_date && column.heading == AS_OF);
+    let kept: Vec<_> = columns.iter().copied().filter(|(column, _)| is_kept(column)).collect();
     table::of(units, &kept)
 }

@@ -28,6 +28,8 @@ const MAX_FAILURES: usize = 10;
 const MAX_CHANGED: usize = 20;
 /// Command that prints all findings.
 const IN_JSON: &str = "`freeplay run --json`";
+/// Command that prints every log of the latest run with its error.
+const LOGS_OF_RUN: &str = "`freeplay store runs --run last`";
 
 /// Labelled lines.
 struct Page(String);
@@ -141,7 +143,7 @@ fn failures(report: &RunSummary, page: &mut Page) {
         let copies = count(report.duplicates.len(), "log");
         page.line("duplicates", &format!("{copies} with the samples of another log; not used"));
         let copy = report.duplicates.iter().map(|copy| format!("{}  copy of {}", copy.log, copy.owner));
-        page.list("", copy, MAX_SHOWN, IN_JSON);
+        page.list("", copy, MAX_SHOWN, LOGS_OF_RUN);
     }
     if !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
@@ -152,7 +154,7 @@ fn failures(report: &RunSummary, page: &mut Page) {
             }
         };
         page.line("failed", &format!("{failed} {what}"));
-        page.list("", causes(report), MAX_FAILURES, IN_JSON);
+        page.list("", causes(report), MAX_FAILURES, LOGS_OF_RUN);
     }
     if !report.standing_errors.is_empty() {
         let failed = count(report.standing_errors.len(), "log");

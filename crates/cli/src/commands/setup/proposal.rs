@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
 use askama::Template;
-use ingest::infer::{InferredMapping, folder_value, path_identity, path_position, path_tail, propose};
+use ingest::infer::{
+    InferredMapping, folder_value, is_piece, path_identity, path_position, path_tail, propose,
+};
 use ingest::mapping::units::{Dimension, Unit};
 use ingest::mapping::{Epoch, IdentityField};
 use ingest::{Layout, Role};
@@ -261,7 +263,8 @@ impl Proposal {
 
     /// How many folders and logs the patterns match, and how many of them were looked at.
     pub(crate) fn coverage(&self) -> String {
-        let covered = self.looked_at - self.uncovered.iter().map(|variant| variant.logs).sum::<usize>();
+        let uncovered = self.uncovered.iter().map(|variant| variant.logs).sum::<usize>();
+        let covered = if self.main.is_whole() { self.looked_at - uncovered } else { 0 };
         let looked = count(self.looked_at, "log");
         let (folders, logs) = (count(self.folders, "folder"), count(self.logs, "log"));
         format!("{folders}, {logs} matched; {looked} looked at, of which the proposal reads {covered}")
@@ -312,6 +315,9 @@ impl Proposal {
         let is_identified = has_tail && has_departure;
         let position_path = needed_position(log, offer).filter(|_| is_identified);
         let identity_path = if is_identified { None } else { identity_path(log, offer) };
+        let has_flight = has(offer, IdentityField::FlightId)
+            || identity_path.as_ref().is_some_and(|(path, _)| path.contains("<flight_id>"));
+        let are_pieces = has_flight && is_piece(log);
         let lacks_format = identity_path.as_ref().map_or(has_tail, |(_, format)| format.is_none());
         let text = Configuration {
             proposal: self,
@@ -320,6 +326,7 @@ impl Proposal {
             positions: if positions.is_empty() { "none".to_owned() } else { positions },
             position_path: position_path.map(|(_, path)| path),
             identity_path,
+            are_pieces,
             has_tail,
             has_departure,
             lacks_departure: lacks_format && !has_departure,
@@ -375,6 +382,7 @@ struct Configuration<'p> {
     position_path: Option<String>,
     /// The expression that finds what metadata and columns do not hold, and the format of its departure.
     identity_path: Option<(String, Option<String>)>,
+    are_pieces: bool,
     has_tail: bool,
     has_departure: bool,
     lacks_departure: bool,
@@ -542,7 +550,7 @@ fn has(offer: &InferredMapping, fact: IdentityField) -> bool {
 /// The expression that finds the rest of the identity in the path of a log, and the format of its departure.
 fn identity_path(log: &Path, offer: &InferredMapping) -> Option<(String, Option<String>)> {
     let (mut path, format) = path_identity(log, needs_position(offer))?;
-    for fact in [IdentityField::TailNumber, IdentityField::DepartureUtc] {
+    for fact in [IdentityField::TailNumber, IdentityField::FlightId, IdentityField::DepartureUtc] {
         if has(offer, fact) {
             path = path.replace(&format!("(?<{}>", fact.as_str()), "(?:");
         }
