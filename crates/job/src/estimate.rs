@@ -31,7 +31,7 @@ pub fn estimate(
     part: &Part,
     settings: &EstimateSettings,
 ) -> Result<GapEstimate, Diagnostic> {
-    if is_too_slow(channels) {
+    if contact::is_too_slow(channels.step_s) {
         return Ok(GapEstimate::refused("rate_too_low"));
     }
     let schedule = GainSchedule::new(&filter(channels, part)?);
@@ -78,7 +78,7 @@ pub fn contact_regression(
     channels: &ActuatorChannels,
     part: &Part,
 ) -> Result<Result<Box<ContactEstimate>, &'static str>, Diagnostic> {
-    if is_too_slow(channels) {
+    if contact::is_too_slow(channels.step_s) {
         return Ok(Err("rate_too_low"));
     }
     filter(channels, part)?;
@@ -118,7 +118,7 @@ fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -
 /// # Errors
 /// A diagnostic when a noise level or the step cannot be.
 pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagnostic> {
-    if is_too_slow(channels) {
+    if contact::is_too_slow(channels.step_s) {
         let rate_hz = channels.step_s.recip();
         return Err(Diagnostic::new("rate_too_low", format!("{rate_hz:.3} samples a second are too few"))
             .hint("record at 20 samples a second or more, 50 or more for a small gap"));
@@ -181,11 +181,6 @@ pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
         },
         output_locked: channels.output_locked,
     }
-}
-
-/// Whether the samples are too far apart for any filter: the noise model is checked for the others.
-fn is_too_slow(channels: &ActuatorChannels) -> bool {
-    channels.step_s > contact::LONGEST_STEP_S * (1.0 + 1e-9)
 }
 
 /// Rejection code of channels without information, before any statistic is computed.

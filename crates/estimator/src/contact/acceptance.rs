@@ -27,7 +27,9 @@ pub(crate) fn flags(
     part_stiffness_n_per_m: f64,
     contact: &FlankFit,
 ) -> Vec<QualityFlag> {
-    let agrees = agrees_with_midrange(found, scaling.unknown_force_n);
+    // A flank that is softer than any flank of the part is no reason for a difference.
+    let stiffness_n_per_m = found.stiffness_n_per_m.max(part_stiffness_n_per_m / UNLIKE);
+    let agrees = agrees_with_midrange(found, scaling.unknown_force_n, stiffness_n_per_m);
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * scaling.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
@@ -59,10 +61,10 @@ pub(crate) fn flags(
 ///
 /// That statistic takes friction for backlash, about twice F_f/K, gives the unknown force over K for a gap of zero, and is
 /// up to a third too low under vibration of the load.
-fn agrees_with_midrange(found: &ContactEstimate, unknown_force_n: f64) -> bool {
+fn agrees_with_midrange(found: &ContactEstimate, unknown_force_n: f64, stiffness_n_per_m: f64) -> bool {
     let Some(midrange_m) = found.midrange_at_fit_m else { return true };
     let larger_m = midrange_m.abs().max(found.gap_m.abs());
     let force_n = found.friction_n() + 2.0 * unknown_force_n;
-    let allowed_m = 0.35 * larger_m + 2.0 * force_n / found.stiffness_n_per_m + 3.0 * found.gap_se_m;
+    let allowed_m = 0.35 * larger_m + 2.0 * force_n / stiffness_n_per_m + 3.0 * found.gap_se_m;
     (midrange_m - found.gap_m).abs() <= allowed_m
 }

@@ -63,17 +63,19 @@ impl BlockMeans {
         let is_calm = is_calm(samples, shortest);
         let count = (CALM_PERIOD_S / (shortest as f64 * samples.step_s)).ceil() as usize;
         let each = if is_calm { shortest * count } else { shortest };
+        // Where the load vibrates, a mean would mix both flanks: the first sample of a block stands for it.
+        let taken = if is_calm { each } else { 1 };
         longest_step(samples.motor_m, samples.segments)?;
         let steps =
             [longest_step(samples.dx_m, samples.segments)?, longest_step(samples.load_n, samples.segments)?];
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
             let first = self.len();
-            let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
+            let middle_s = |start: usize| (start as f64 + 0.5 * (taken as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
             for start in (segment.start..end).step_by(each) {
                 self.time_s.push(middle_s(start));
-                let [motor_m, dx_m, load_n] = mean(samples, start..start + each, steps);
+                let [motor_m, dx_m, load_n] = mean(samples, start..start + taken, steps);
                 self.motor_m.push(motor_m);
                 self.dx_m.push(dx_m);
                 self.load_n.push(load_n);

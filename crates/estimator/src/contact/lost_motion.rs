@@ -38,7 +38,7 @@ pub(crate) fn preload_n(contact: &FlankFit, scaling: &Scaling) -> Option<(f64, f
 /// Loads within 5 % of the 95 % load count, where the load changes by more than 10 % of it from 0.1 s before to 0.1 s after.
 /// On such a branch the screw's friction must press the flank that the load leaves: a screw that moves the other way has left
 /// it before. Each position is compared with the passage along the other branch before it, so that what moves both from loop
-/// to loop is no width.
+/// to loop is no width. A loop narrower than the gap is none: its branches were not seen.
 pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Scaling) -> Option<(f64, f64)> {
     let reach = ((0.1 / blocks.period_s).round() as usize).max(1);
     let (near_n, turn_n) = (0.05 * scaling.load_n, 0.1 * scaling.load_n);
@@ -63,7 +63,9 @@ pub(crate) fn loop_width_m(contact: &FlankFit, blocks: &BlockMeans, scaling: &Sc
         passage.iter().map(move |(side, m, stretch)| (side * (m - before_m), *stretch))
     });
     let (width_m, error_m) = median_and_error(widths)?;
-    Some((width_m, error_m.hypot(contact.unexplained_m)))
+    let error_m = error_m.hypot(contact.unexplained_m);
+    let (gap_m, gap_se_m) = contact.gap_m;
+    (width_m > gap_m - 3.0 * error_m.hypot(gap_se_m)).then_some((width_m, error_m))
 }
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows within 25 % of it on either

@@ -46,7 +46,7 @@ use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
 
 /// Longest step between samples, s: slower logs blur the moment at which a flank is left.
-pub const LONGEST_STEP_S: f64 = 0.05;
+const LONGEST_STEP_S: f64 = 0.05;
 /// Standard normal 95 % quantile.
 const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 /// Standard errors by which no gap of a sound log is below zero.
@@ -105,6 +105,11 @@ pub fn plot_data(samples: &Samples<'_>, prior: &PartPrior) -> Result<Option<Cont
     Ok(found.map(|(scaling, contact)| ContactPlot::of(workspace.whole.period_s, &scaling, &contact)))
 }
 
+/// Whether samples with this step, s, are too far apart; a clock may round the step.
+pub fn is_too_slow(step_s: f64) -> bool {
+    step_s > LONGEST_STEP_S * (1.0 + 1e-9)
+}
+
 fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
     samples.check()?;
     model::positive("stiffness_n_per_m", prior.stiffness_n_per_m)?;
@@ -119,7 +124,7 @@ fn prepare(
     prior: &PartPrior,
     workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, SignCheck), Rejection> {
-    if samples.step_s > LONGEST_STEP_S {
+    if is_too_slow(samples.step_s) {
         return Err(Rejection::RateTooLow);
     }
     workspace.whole.gather(samples, prior)?;

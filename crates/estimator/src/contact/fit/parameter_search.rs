@@ -11,10 +11,16 @@ use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
-use crate::contact::stats::spread;
+use crate::contact::stats::{median, spread};
+use crate::gap::load_band::quantiles;
 
 /// First and last step of the search for the load zero, as shares of the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
+
+/// Reading of the load cell at the middle of δX, over the 95 % load, from which the search also starts from that zero.
+const FAR_ZERO: f64 = 0.25;
+/// By how much the misfit must be smaller from there.
+const ZERO_GAIN: f64 = 0.02;
 
 /// The best candidate.
 #[derive(Debug)]
@@ -81,31 +87,61 @@ impl<'a> ParameterSearch<'a> {
     }
 
     fn best_start(&mut self) -> Result<Candidate, Rejection> {
-        let mut found = Vec::new();
-        let mut rejection = Rejection::TooShort;
         // Dry friction as a share of the 95 % load, and lost share of the load: usual friction, then heavy friction.
-        for (dry, lost_share) in [(0.02, 0.03), (0.10, 0.12)] {
-            let state = FrictionState {
-                stiffness_n_per_m: self.scaling.stiffness_n_per_m,
-                friction: Friction { dry_n: dry * self.scaling.load_n, lost_share },
-                ..FrictionState::default()
-            };
-            match self.search(state, 3) {
-                Ok(result) => {
-                    let mut residuals_m: Vec<f64> = Vec::new();
-                    self.each_residual(&result, result.at.load_zero_n, |e_m| residuals_m.push(e_m));
-                    self.scale_m = self.scale_m.min(spread(residuals_m.into_iter()).max(1e-9));
-                    found.push(result);
-                }
-                Err(why) => rejection = why,
-            }
+        let [usual, heavy] = [self.start((0.02, 0.03), 0.0), self.start((0.10, 0.12), 0.0)];
+        // From a zero of the load cell that is far off, no small step leads to the true one.
+        let middle_n = self.load_at_middle_n();
+        let is_far = middle_n.abs() > FAR_ZERO * self.scaling.load_n;
+        let far = is_far.then(|| self.start((0.02, 0.03), middle_n));
+        let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
+        let near = self.best_of(usual.into_iter().chain(heavy));
+        let far = self.best_of(far.into_iter().flatten());
+        match (near, far) {
+            // Without a gap any zero fits: then the zero is that of the load cell.
+            (Some(near), Some(far)) if far.misfit + ZERO_GAIN < near.misfit => Ok(far),
+            (Some(near), _) => Ok(near),
+            (None, far) => far.ok_or(rejection),
         }
-        let judged = found.into_iter().map(|found| {
+    }
+
+    /// Iterates from usual parameters with this friction and load zero.
+    fn start(
+        &mut self,
+        (dry, lost_share): (f64, f64),
+        load_zero_n: f64,
+    ) -> Result<GaussNewtonResult, Rejection> {
+        let state = FrictionState {
+            stiffness_n_per_m: self.scaling.stiffness_n_per_m,
+            friction: Friction { dry_n: dry * self.scaling.load_n, lost_share },
+            load_zero_n,
+            ..FrictionState::default()
+        };
+        let result = self.search(state, 3)?;
+        let mut residuals_m: Vec<f64> = Vec::new();
+        self.each_residual(&result, result.at.load_zero_n, |e_m| residuals_m.push(e_m));
+        self.scale_m = self.scale_m.min(spread(residuals_m.into_iter()).max(1e-9));
+        Ok(result)
+    }
+
+    fn best_of(&mut self, found: impl Iterator<Item = GaussNewtonResult>) -> Option<Candidate> {
+        let judged = found.map(|found| {
             self.prepare(&found);
             let misfit = self.misfit_at(&found, found.at.load_zero_n);
             self.candidate(found, misfit)
         });
-        judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).ok_or(rejection)
+        judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
+    }
+
+    /// Median reading of the load where δX is near the middle between its 5 % and 95 % quantiles, N; zero if it never is.
+    fn load_at_middle_n(&self) -> f64 {
+        let BlockMeans { dx_m, load_n, .. } = &*self.blocks;
+        let all = 0..dx_m.len();
+        let Some([low_m, high_m]) = quantiles(dx_m, std::slice::from_ref(&all), [0.05, 0.95]) else {
+            return 0.0;
+        };
+        let is_near = |dx_m: f64| (dx_m - 0.5 * (low_m + high_m)).abs() < 0.05 * (high_m - low_m);
+        let near = dx_m.iter().zip(load_n).filter(|(dx_m, load_n)| is_near(**dx_m) && load_n.is_finite());
+        median(&mut near.map(|(_, load_n)| *load_n).collect::<Vec<f64>>())
     }
 
     /// Iterates from a state; afterwards, blocks, couplings and linear parts are those of the result.
