@@ -2,28 +2,22 @@
 
 use jiff::Timestamp;
 use polars::prelude::ChunkAgg;
-use records::GapRecord;
+use records::{GapRecord, LogOutcome, RunRecord};
 
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::query::Query;
 use crate::read::{frame, scan};
-use records::{LogOutcome, RunRecord};
 
-/// A store in numbers.
+/// A store in numbers; flights, units and aircraft are those with a record.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Info {
-    /// Records.
     pub records: usize,
-    /// Flights with a record.
     pub flights: usize,
-    /// Units with a record.
     pub serials: usize,
-    /// Aircraft with a record.
     pub tails: usize,
-    /// The earliest departure.
     pub first_departure_utc: Option<Timestamp>,
-    /// The latest departure.
     pub last_departure_utc: Option<Timestamp>,
     /// Logs with an account.
     pub logs: usize,
@@ -77,11 +71,7 @@ impl Store {
 /// `now` counts only where there is no other.
 fn last_completed(runs: &[RunRecord], now: Timestamp) -> Option<&RunRecord> {
     let key = |run: &&RunRecord| (run.finished_utc <= Some(now), run.finished_utc);
-    runs.iter().filter(|run| completed(run)).max_by_key(key)
-}
-
-fn completed(run: &RunRecord) -> bool {
-    matches!(run.exit_code, Some(0 | 1))
+    runs.iter().filter(|run| matches!(run.exit_code, Some(0 | 1))).max_by_key(key)
 }
 
 #[cfg(test)]

@@ -22,8 +22,7 @@ use records::{GapRecord, Status};
 
 use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
-use crate::handle::Store;
-use crate::read::join::Join;
+use crate::handle::{Join, Store};
 use crate::read::query::Query;
 use crate::read::scan::{self, Condition};
 

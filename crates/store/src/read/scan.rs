@@ -103,9 +103,6 @@ impl Store {
     }
 
     /// The same of files of one table, in their order. They are read by as many threads as the machine has.
-    ///
-    /// # Errors
-    /// As [`Store::read_file`].
     pub(crate) fn read_files(
         &self,
         files: &[PathBuf],
@@ -116,10 +113,7 @@ impl Store {
     }
 }
 
-/// What a function reads of each file, in the order of the files, one empty batch where that is nothing.
-///
-/// # Errors
-/// The first of the function's errors.
+/// What a function reads of each file, in the order of the files, one empty batch where that is nothing; or its first error.
 pub(crate) fn read_each(
     files: &[PathBuf],
     schema: &SchemaRef,

@@ -20,7 +20,11 @@ fn codes(store: &Store) -> Vec<String> {
 }
 
 #[test]
-fn a_sound_store_has_no_findings_and_is_counted() {
+fn a_sound_store_has_no_findings_and_is_counted_from_the_empty_one_on() {
+    let (_dir, writer) = fresh();
+    assert_eq!(writer.store().verify(), []);
+    let info = writer.store().info().unwrap();
+    assert_eq!((info.records, info.logs, info.last_departure_utc, info.last_completed), (0, 0, None, None));
     let (_dir, mut writer) = filled();
     writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
     writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(1))).unwrap();
@@ -48,15 +52,6 @@ fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
     writer.compact().unwrap();
     assert!(!writer.store().needs_compaction().unwrap());
     assert_eq!(writer.store().table_files("runs").unwrap().len(), 1);
-}
-
-#[test]
-fn an_empty_store_is_sound_and_counts_zero() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = Store::create_or_open(dir.path()).unwrap();
-    assert_eq!(store.verify(), []);
-    let info = store.info().unwrap();
-    assert_eq!((info.records, info.logs, info.last_departure_utc, info.last_completed), (0, 0, None, None));
 }
 
 #[test]
