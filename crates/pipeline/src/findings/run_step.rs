@@ -19,7 +19,6 @@ use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
 use crate::fleet::bookkeeping::maintenance_log;
 
-/// Inputs of the step.
 pub(crate) struct FollowUp<'a> {
     pub(crate) config: &'a Config,
     pub(crate) installations: &'a Installations,

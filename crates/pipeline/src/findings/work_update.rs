@@ -87,7 +87,7 @@ fn of_open(
         let reason = format!("removed from {} of {} on {date}", last.position, last.tail_number);
         return closed(WorkEventKind::Removed, reason, removed);
     }
-    if finding.is_none() && !tables.is_known(&name) {
+    if finding.is_none() && tables.installations.of_unit(&name).next().is_none() {
         let reason = "the unit no longer has an installation or a record".to_owned();
         return closed(WorkEventKind::Removed, reason, now);
     }
@@ -196,12 +196,6 @@ impl<'a> Tables<'a> {
         Some((last, last.removed_utc?))
     }
 
-    /// Whether a unit has ever been installed.
-    fn is_known(&self, name: &UnitKey) -> bool {
-        self.installations.of_unit(name).next().is_some()
-    }
-
-    /// Where a unit is installed.
     fn place(&self, name: &UnitKey) -> Option<&'a Installation> {
         self.installations.installed(name, self.at)
     }

@@ -6,6 +6,4 @@ pub mod external_estimates;
 pub mod flight_row;
 pub mod histories;
 pub(crate) mod places;
-pub(crate) mod row_keys;
-mod settings_counts;
 pub(crate) mod unit_rows;

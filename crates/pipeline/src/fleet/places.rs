@@ -14,7 +14,6 @@ pub struct TailPosition {
 }
 
 impl TailPosition {
-    /// Tail and position of an installation.
     pub(crate) fn of(installation: &Installation) -> Self {
         Self {
             tail_number: Some(installation.tail_number.to_string()),

@@ -339,7 +339,6 @@ fn matching(
     }
 }
 
-/// Files of this machine that fit a pattern.
 fn local(config: &Config, pattern: &str) -> Result<Vec<Listed>, glob::PatternError> {
     let found = local_files::matching(&config.folder, pattern)?;
     let file = |path: PathBuf| match is_file(&path) {

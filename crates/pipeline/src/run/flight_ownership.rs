@@ -29,19 +29,15 @@ pub(crate) struct ProcessedLog {
     /// Its status: `known` where its content and settings are those of stored records, so that only its name or its date is
     /// new.
     pub(crate) account: LogRecord,
-    /// Its records.
     pub(crate) records: Vec<GapRecord>,
-    /// Its errors.
     pub(crate) diagnostics: Vec<Diagnostic>,
 }
 
 impl ProcessedLog {
-    /// A log without records.
     pub(crate) fn without_records(account: LogRecord, diagnostics: Vec<Diagnostic>) -> Self {
         Self { account, records: Vec::new(), diagnostics }
     }
 
-    /// A log in error for one reason.
     pub(crate) fn in_error(mut account: LogRecord, diagnostic: Diagnostic) -> Self {
         summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
         Self::without_records(account, vec![diagnostic])
@@ -77,7 +73,6 @@ pub(crate) struct OwnershipLedger<'a> {
     pub(crate) renamed: BTreeMap<String, String>,
 }
 
-/// A record of this run.
 struct OwnRecord {
     held: HeldRecord,
     /// Why it has no gap.
