@@ -72,7 +72,8 @@ impl FollowUp<'_> {
         if !self.is_partial {
             let maintenance = maintenance_log::read(self.config)?;
             let newest = findings.iter().map(|finding| finding.as_of_utc).max();
-            let tables = Tables::new(self.installations, &maintenance, newest.map_or(now, |at| at.max(now)));
+            let at = newest.map_or(now, |newest| newest.max(now));
+            let tables = Tables { installations: self.installations, maintenance: &maintenance, at };
             added = work_update::update(&events, findings, &tables, self.run_id, now);
             writer.add_work_events(&added)?;
         }

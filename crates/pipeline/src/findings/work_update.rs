@@ -14,10 +14,12 @@ use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// What the tables of the operator hold about units.
 pub struct Tables<'a> {
-    installations: &'a Installations,
-    maintenance: &'a MaintenanceLog,
+    /// Where units are and were.
+    pub installations: &'a Installations,
+    /// The work that was done on units.
+    pub maintenance: &'a MaintenanceLog,
     /// The date that counts: today, or that of the newest flight where it is later.
-    at: Timestamp,
+    pub at: Timestamp,
 }
 
 /// Events to add, in order.
@@ -185,11 +187,6 @@ fn rank(state: Option<&str>) -> State {
 }
 
 impl<'a> Tables<'a> {
-    /// The tables on a date.
-    pub fn new(installations: &'a Installations, maintenance: &'a MaintenanceLog, at: Timestamp) -> Self {
-        Self { installations, maintenance, at }
-    }
-
     /// The last installation and the removal of a unit that is installed nowhere.
     fn removal(&self, name: &UnitKey) -> Option<(&'a Installation, Timestamp)> {
         let last = self.installations.removal(name, self.at)?;

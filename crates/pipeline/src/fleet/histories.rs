@@ -12,7 +12,7 @@ use records::Installation;
 use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
 use crate::fleet::unit_rows::{SettingsCounts, UnitRows};
 
-pub use crate::fleet::places::{TailPosition, UnitKey};
+pub use crate::fleet::flight_row::{TailPosition, UnitKey};
 
 /// A unit's flights, by departure.
 #[derive(Debug, Clone, Default)]

@@ -10,8 +10,7 @@ use rayon::prelude::*;
 use store::ColumnScan;
 
 use crate::error::Error;
-use crate::fleet::flight_row::StoredFlight;
-use crate::fleet::places::{TailPosition, UnitKey, place_number};
+use crate::fleet::flight_row::{StoredFlight, TailPosition, UnitKey, place_number};
 
 /// Shares of a table for each worker: several, so that faster workers take more.
 const SHARES: usize = 4;

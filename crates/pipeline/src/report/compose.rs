@@ -46,6 +46,12 @@ pub fn compose(
     let (accounts, mut logs_known) = (store.accounts()?, BTreeMap::<_, usize>::new());
     accounts.iter().for_each(|log| *logs_known.entry(log.tail_number.clone()).or_default() += 1);
     let failed = accounts.into_iter().filter(|log| log.outcome == LogOutcome::Error);
+    let log_error = |account: LogRecord| ReportLogErrorRow {
+        log_path: account.log_path,
+        tail_number: account.tail_number,
+        error_code: account.error_code.unwrap_or_default(),
+        processed_utc: account.processed_utc,
+    };
     let mut log_errors: Vec<ReportLogErrorRow> = failed.map(log_error).collect();
     let StoreContents { mut histories, mut extras, values, store_version } =
         StoreContents::until(ask.as_of_utc, store)?;
@@ -124,15 +130,6 @@ fn scope(ask: &UnitSelection) -> Option<String> {
     let part = ask.part_number.as_ref().map(|part| format!("Part {part} only"));
     let all: Vec<String> = tail.into_iter().chain(serial).chain(part).collect();
     (!all.is_empty()).then(|| all.join(", "))
-}
-
-fn log_error(account: LogRecord) -> ReportLogErrorRow {
-    ReportLogErrorRow {
-        log_path: account.log_path,
-        tail_number: account.tail_number,
-        error_code: account.error_code.unwrap_or_default(),
-        processed_utc: account.processed_utc,
-    }
 }
 
 /// What all units' pages are composed from.

@@ -39,10 +39,7 @@ fn channels() -> Channels {
     let folder = AlertChannel { folder: Some("alerts".to_owned()), ..channel.clone() };
     let command = AlertChannel { command: Some(vec!["notify".to_owned()]), ..channel.clone() };
     let url = AlertChannel { url: Some("http://localhost/".to_owned()), resend_unconfirmed: true, ..channel };
-    [("command", command), ("folder", folder), ("url", url)]
-        .into_iter()
-        .map(|(name, channel)| (name.to_owned(), channel))
-        .collect()
+    [("command", command), ("folder", folder), ("url", url)].map(|(name, of)| (name.to_owned(), of)).into()
 }
 
 /// The run was killed.

@@ -80,7 +80,7 @@ impl Store {
         frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 
-    /// The same as rows.
+    /// The records that fit as rows, in the order of [`Store::scan`].
     ///
     /// # Errors
     /// As [`Store::scan`]; [`Error::Row`] when a cell is not valid in its column.
@@ -109,11 +109,11 @@ impl Store {
         self.newest(&self.logs, &[settled], |account: &LogRecord| account.log_path.clone())
     }
 
-    /// The data files of a table as of now, for engines that do not read Delta's log; by the name of the table: `gaps`,
-    /// `logs`, `runs`, `alerts` or `work`.
+    /// The data files of the newest version of a table, for engines that do not read Delta's log. The tables are `gaps`,
+    /// `logs`, `runs`, `alerts`, `work` and `states`.
     ///
-    /// A listing of the folder would find superseded files too. There is always one at least, except of a table that does
-    /// not exist.
+    /// A listing of the folder would find superseded files too. A table has one file at least; a table that does not exist has
+    /// none.
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.

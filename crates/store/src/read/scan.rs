@@ -102,7 +102,8 @@ impl Store {
         read_file(path, schema, conditions)
     }
 
-    /// The same of files of one table, in their order. They are read by as many threads as the machine has.
+    /// The wanted columns of the matching rows of several files of one table, in the order of the files. As many threads read
+    /// them as the machine has processors.
     pub(crate) fn read_files(
         &self,
         files: &[PathBuf],

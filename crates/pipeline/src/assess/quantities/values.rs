@@ -12,9 +12,8 @@ use trend::Series;
 
 use crate::error::Error;
 use crate::fleet::builder;
-use crate::fleet::flight_row::FlightRow;
+use crate::fleet::flight_row::{FlightRow, TailPosition, UnitKey};
 use crate::fleet::histories::{Histories, History};
-use crate::fleet::places::{TailPosition, UnitKey};
 use crate::fleet::unit_rows::{at, number, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
