@@ -93,7 +93,6 @@ pub fn contact_regression(
 /// Flights of more samples get workspaces of their own, so that no thread keeps large ones.
 const MAX_KEPT_SAMPLES: usize = 2 << 20;
 
-/// Reusable workspaces of one thread.
 #[derive(Debug, Default)]
 struct Workspaces {
     published: Vec<f64>,
@@ -104,7 +103,6 @@ thread_local! {
     static WORKSPACES: RefCell<Workspaces> = RefCell::default();
 }
 
-/// Runs a function with the workspaces of this thread.
 fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -> T {
     if samples > MAX_KEPT_SAMPLES {
         work(&mut Workspaces::default())
@@ -198,7 +196,6 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
 }
 
-/// The gap by contact regression.
 fn contact_estimate(
     channels: &ActuatorChannels,
     prior: &PartPrior,

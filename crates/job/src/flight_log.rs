@@ -26,12 +26,10 @@ const MAX_AHEAD: SignedDuration = SignedDuration::from_hours(24);
 
 /// Provenance that a run writes into its records.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct ProvenanceStamp {
-    /// The run.
     pub run_id: String,
-    /// The version of Freeplay.
     pub program_version: String,
-    /// When the record is made.
     pub processed_utc: Timestamp,
 }
 
@@ -47,7 +45,8 @@ pub struct Actuator {
 #[derive(Debug)]
 pub struct FlightLog<'c> {
     log: Log,
-    display_name: String,
+    /// Its name in records and diagnostics.
+    pub display_name: String,
     config: &'c Config,
     installations: &'c Installations,
     /// Which flight it is.
@@ -71,7 +70,8 @@ impl<'c> FlightLog<'c> {
         let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
         let identity = identity_of(&log, files, config).map_err(in_log)?;
-        check_not_ahead(&identity.flight, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
+        check_not_ahead(identity.flight.departure_utc, Timestamp::now())
+            .map_err(|d| d.in_file(display_name))?;
         check_tail(&identity, display_name, config)?;
         let log = log.with_mapping(&config.mapping(&identity.flight.tail_number, None));
         let all = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
@@ -80,11 +80,6 @@ impl<'c> FlightLog<'c> {
         log.announce(&used);
         let display_name = display_name.to_owned();
         Ok(Self { log, display_name, config, installations, identity, all, digest })
-    }
-
-    /// Its name in records and diagnostics.
-    pub fn display_name(&self) -> &str {
-        &self.display_name
     }
 
     /// Whether every page that is read carries a checksum.
@@ -99,11 +94,6 @@ impl<'c> FlightLog<'c> {
     /// Names of the positions, in order.
     pub fn position_names(&self) -> Vec<Position> {
         self.all.iter().map(|at| at.columns.position.clone()).collect()
-    }
-
-    /// The flight, as records name it.
-    pub fn flight(&self) -> Flight {
-        self.identity.flight.clone()
     }
 
     /// The actuators of the log. A position that lacks a channel counts only where a unit is installed:
@@ -136,7 +126,7 @@ impl<'c> FlightLog<'c> {
         let (estimate, channels) = self.estimate(at, part).map_err(in_file)?;
         channels.into_iter().for_each(ActuatorChannels::recycle_buffers);
         Ok(GapRecord {
-            flight: self.flight(),
+            flight: self.identity.flight.clone(),
             position: at.columns.position.clone(),
             part_number: installation.unit().0.clone(),
             serial_number: installation.unit().1.clone(),
@@ -250,15 +240,12 @@ pub fn read_as_part(
 /// A diagnostic when the configuration does not know it.
 pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Diagnostic> {
     config.parts.get(number).ok_or_else(|| {
-        Diagnostic::new("part_unknown", format!("part number {number} is installed, but not configured"))
-            .hint(format!(
-                "{}add `[part.\"{number}\"]` to {}",
-                nearest(number.as_str(), config.parts.keys().map(PartNumber::as_str))
-                    .map_or_else(String::new, |near| {
-                        format!("nearest: {near}; correct the installations table, or ")
-                    }),
-                config.file.display()
-            ))
+        let near = nearest(number.as_str(), config.parts.keys().map(PartNumber::as_str));
+        let near = near.map(|near| format!("nearest: {near}; correct the installations table, or "));
+        let hint =
+            format!("{}add `[part.\"{number}\"]` to {}", near.unwrap_or_default(), config.file.display());
+        let what = format!("part number {number} is installed, but not configured");
+        Diagnostic::new("part_unknown", what).hint(hint)
     })
 }
 
@@ -388,8 +375,7 @@ pub fn identify_companion(
 
 /// A departure after the machine's clock is a wrong date in the log or a wrong clock; taken at its word it would move
 /// the date of every assessment, and with it silence the fleet.
-fn check_not_ahead(flight: &Flight, now: Timestamp) -> Result<(), Diagnostic> {
-    let departure_utc = flight.departure_utc;
+fn check_not_ahead(departure_utc: Timestamp, now: Timestamp) -> Result<(), Diagnostic> {
     if departure_utc.duration_since(now) <= MAX_AHEAD {
         return Ok(());
     }
@@ -502,22 +488,13 @@ pub fn catch_panic<T>(
 
 #[cfg(test)]
 mod tests {
-    use records::{FlightId, TailNumber};
-
     use super::*;
 
     #[test]
     fn a_departure_more_than_a_day_after_the_clock_is_an_error() {
-        let now: Timestamp = "2026-03-01T12:00:00Z".parse().unwrap();
-        let departure = |utc: &str| Flight {
-            tail_number: TailNumber::new("N1").unwrap(),
-            flight_id: FlightId::new("F1").unwrap(),
-            departure_utc: utc.parse().unwrap(),
-            flight_hours: None,
-            tail_hours_end: None,
-        };
-        assert!(check_not_ahead(&departure("2026-03-02T11:00:00Z"), now).is_ok());
-        let error = check_not_ahead(&departure("2062-03-01T12:00:00Z"), now).unwrap_err();
-        assert_eq!(error.code, "departure_ahead");
+        let [now, soon, wrong] = ["2026-03-01T12:00:00Z", "2026-03-02T11:00:00Z", "2062-03-01T12:00:00Z"]
+            .map(|utc| utc.parse().unwrap());
+        assert!(check_not_ahead(soon, now).is_ok());
+        assert_eq!(check_not_ahead(wrong, now).unwrap_err().code, "departure_ahead");
     }
 }

@@ -45,12 +45,9 @@ impl Trace {
     /// # Errors
     /// A diagnostic when the settings of the part do not fit the step of the log.
     pub fn add(&mut self, log: &str, channels: &ActuatorChannels, part: &Part) -> Result<(), Diagnostic> {
-        let (numbers, count) = (numbers(channels, part)?, channels.dx_m.len());
-        self.log.extend(std::iter::repeat_n(log.to_owned(), count));
-        self.position.extend(std::iter::repeat_n(channels.position.to_string(), count));
-        for (column, numbers) in self.numbers.iter_mut().zip(numbers) {
-            column.extend(numbers);
-        }
+        let count = channels.dx_m.len();
+        let (log, position) = (vec![log.to_owned(); count], vec![channels.position.to_string(); count]);
+        self.extend(Self { log, position, numbers: numbers(channels, part)? });
         Ok(())
     }
 

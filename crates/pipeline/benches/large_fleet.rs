@@ -74,39 +74,30 @@ fn departure(flight: usize) -> Outcomes<Timestamp> {
     Ok(first + SignedDuration::from_hours(24 * i64::try_from(flight)?))
 }
 
-/// How one unit wears.
-struct Unit {
-    new_um: f64,
-    um_per_1000_h: f64,
-    exponent: f64,
-    age_h: f64,
-    /// Flight and size of a step, where there is one.
-    step: Option<(usize, f64)>,
+/// A number from 0 to 1 that belongs to a unit: `what` tells which of them.
+fn chance(tail: usize, place: usize, what: u64) -> f64 {
+    fleet::random((tail, place, what)).f64()
 }
 
-impl Unit {
-    fn of(tail: usize, place: usize, flights: usize) -> Self {
-        let chance = |what: u64| fleet::random((tail, place, what)).f64();
-        let wears = chance(0) < 0.8;
-        Self {
-            new_um: 20.0 + 6.0 * chance(1),
-            um_per_1000_h: if wears { (2.0 * (chance(2) - 0.5)).exp() * 14.0 } else { 0.0 },
-            exponent: 0.8 + 0.6 * chance(3),
-            age_h: 3500.0 * chance(4),
-            step: (chance(5) < 0.03).then(|| ((flights as f64 * chance(6)) as usize, -25.0 * chance(7))),
-        }
-    }
-
-    fn gap_um(&self, flight: usize) -> f64 {
-        let hours = self.age_h + HOURS * flight as f64;
-        let worn = self.um_per_1000_h * (hours / 1000.0).powf(self.exponent);
-        let step = self.step.filter(|(at, _)| flight >= *at).map_or(0.0, |(_, size)| size);
-        (self.new_um + worn + step).max(5.0)
-    }
+/// Hours of a unit before its first flight.
+fn age_h(tail: usize, place: usize) -> f64 {
+    3500.0 * chance(tail, place, 4)
 }
 
-fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<GapRecord> {
-    let gap_um = unit.gap_um(flight) + 1.2 * fleet::scatter((tail_at, place, flight));
+/// Gap of a unit in one of its flights: most wear by a law of their own, and some have a step.
+fn gap_um(tail: usize, place: usize, flight: usize, flights: usize) -> f64 {
+    let chance = |what| chance(tail, place, what);
+    let wears = chance(0) < 0.8;
+    let um_per_1000_h = if wears { (2.0 * (chance(2) - 0.5)).exp() * 14.0 } else { 0.0 };
+    let hours = age_h(tail, place) + HOURS * flight as f64;
+    let worn = um_per_1000_h * (hours / 1000.0).powf(0.8 + 0.6 * chance(3));
+    let has_stepped = chance(5) < 0.03 && flight >= (flights as f64 * chance(6)) as usize;
+    let step = if has_stepped { -25.0 * chance(7) } else { 0.0 };
+    (20.0 + 6.0 * chance(1) + worn + step).max(5.0)
+}
+
+fn record(tail_at: usize, place: usize, flight: usize, flights: usize) -> Outcomes<GapRecord> {
+    let gap_um = gap_um(tail_at, place, flight, flights) + 1.2 * fleet::scatter((tail_at, place, flight));
     let noise = |quantity: usize| fleet::scatter((tail_at, place, quantity, flight));
     let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
     let estimate = GapEstimate {
@@ -137,7 +128,8 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
     let names = [&*tail, POSITIONS[place], PARTS[place / 2], &serial, &format!("{tail_at}-{flight:04}")];
     let mut record = fleet::record(names, departure(flight)?, HOURS, estimate);
     let hours = HOURS * (flight + 1) as f64;
-    (record.flight.tail_hours_end, record.unit_hours) = (Some(1000.0 + hours), Some(unit.age_h + hours));
+    (record.flight.tail_hours_end, record.unit_hours) =
+        (Some(1000.0 + hours), Some(age_h(tail_at, place) + hours));
     record.provenance.log_path = log(tail_at, flight);
     Ok(record)
 }
@@ -146,11 +138,11 @@ fn log(tail_at: usize, flight: usize) -> String {
     format!("logs/{}/{flight:04}.parquet", tail(tail_at))
 }
 
-fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> {
+fn result(tail_at: usize, flight: usize, flights: usize) -> Outcomes<LogResult> {
     let bad = (tail_at * 31 + flight).is_multiple_of(ERROR_EVERY);
-    let places = units.iter().enumerate();
+    let places = 0..POSITIONS.len();
     let records: Vec<GapRecord> =
-        places.map(|(place, unit)| record(tail_at, place, flight, unit)).collect::<Outcomes<_>>()?;
+        places.map(|place| record(tail_at, place, flight, flights)).collect::<Outcomes<_>>()?;
     let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count() as i64;
     let mut result = fleet::result(records);
     result.account.estimated -= refused;
@@ -171,12 +163,10 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
 
 fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
     let mut writer = Store::create_or_open(store)?.lock(&Holder::this_process(), None)?;
-    let units: Vec<Vec<Unit>> =
-        (0..tails).map(|t| (0..POSITIONS.len()).map(|p| Unit::of(t, p, flights)).collect()).collect();
     let mut night = Vec::new();
     for flight in 0..flights {
-        for (tail_at, units) in units.iter().enumerate() {
-            night.push(result(tail_at, flight, units)?);
+        for tail_at in 0..tails {
+            night.push(result(tail_at, flight, flights)?);
         }
         if night.len() >= COMMIT || flight + 1 == flights {
             writer.commit(&std::mem::take(&mut night))?;
@@ -206,10 +196,9 @@ fn installations(units: usize) -> String {
     let mut table = format!("{columns},unit_hours_at_install,tail_hours_at_install\n");
     for tail_at in 0..units.div_ceil(POSITIONS.len()) {
         for (place, position) in POSITIONS.iter().enumerate() {
-            let unit = Unit::of(tail_at, place, 1);
             let (name, serial) = (quoted(&tail(tail_at)), quoted(&serial(tail_at, place)));
             let part = PARTS[place / 2];
-            let hours = unit.age_h;
+            let hours = age_h(tail_at, place);
             let _ = writeln!(table, "{name},{position},{part},{serial},2025-10-31T00:00:00Z,,{hours},1000");
         }
     }
@@ -222,8 +211,7 @@ fn inspections(units: usize, flights: usize) -> Outcomes<String> {
     let at = flights.saturating_sub(flights / 5 + 1);
     for k in (0..units).step_by(8) {
         let (tail_at, place) = (k / POSITIONS.len(), (k / 8) % POSITIONS.len());
-        let gap_um =
-            Unit::of(tail_at, place, flights).gap_um(at) + 3.0 + 4.0 * fleet::scatter((tail_at, place));
+        let gap_um = gap_um(tail_at, place, at, flights) + 3.0 + 4.0 * fleet::scatter((tail_at, place));
         let (part, serial) = (PARTS[place / 2], quoted(&serial(tail_at, place)));
         let date = departure(at)?;
         writeln!(table, "{part},{serial},{date},{:e},<i>dial gauge</i>,200", gap_um * 1e-6)?;

@@ -4,6 +4,7 @@ use records::Diagnostic;
 
 /// Error that ends a run.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub enum Error {
     /// Configuration, tables or the request are wrong: nothing was processed.
     #[error("{} errors in configuration or tables", .0.len())]
@@ -22,12 +23,7 @@ pub enum Error {
     Page(#[from] ::report::Error),
     /// A page cannot be written.
     #[error("the report cannot be written to {}: {source}", .path.display())]
-    Pages {
-        /// Where.
-        path: std::path::PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Pages { path: std::path::PathBuf, source: std::io::Error },
     /// Rows cannot be made.
     #[error("rows cannot be made: {0}")]
     Rows(#[from] arrow::error::ArrowError),

@@ -64,12 +64,12 @@ pub enum Error {
 impl Error {
     /// The error as a person meets it: with its stable code, its file and a remedy.
     pub fn diagnostic(&self) -> Diagnostic {
-        let diagnostic = Diagnostic::new(self.code(), self);
-        let diagnostic = match self.file() {
+        let (code, remedy) = self.code_and_remedy();
+        let diagnostic = Diagnostic::new(code, self).hint(remedy);
+        match self.file() {
             Some(file) => diagnostic.in_file(file.display()),
             None => diagnostic,
-        };
-        diagnostic.hint(self.remedy())
+        }
     }
 
     /// The error of the system that caused this one, if one did: it is no finding about the content of the store.
@@ -86,22 +86,6 @@ impl Error {
         }
     }
 
-    fn code(&self) -> &'static str {
-        match self {
-            _ if self.system_error().is_some() => "store_io",
-            Self::Missing { .. } => "store_missing",
-            Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
-            Self::Format { .. } | Self::Torn { .. } => "store_format",
-            Self::Held { .. } => "store_held",
-            Self::Io { .. } => "store_io",
-            Self::Table { .. } | Self::LogTable { .. } => "store_table",
-            Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
-            Self::Object(error) => error.code(),
-            Self::Row(_) | Self::Arrow(_) | Self::Frame(_) => "store_value",
-            Self::Parquet(_) => "store_unreadable",
-        }
-    }
-
     fn file(&self) -> Option<&PathBuf> {
         match self {
             Self::Missing { dir } | Self::Foreign { dir, .. } | Self::Name { dir, .. } => Some(dir),
@@ -111,36 +95,48 @@ impl Error {
         }
     }
 
-    fn remedy(&self) -> &'static str {
+    fn code_and_remedy(&self) -> (&'static str, &'static str) {
         if let Some(error) = self.system_error() {
-            return io_remedy(&error);
+            return ("store_io", io_remedy(&error));
         }
         match self {
-            Self::Missing { .. } => "create it with `freeplay run`, or correct `path` under `[store]`",
-            Self::Foreign { .. } => "name a new or an empty folder as `store` in the configuration",
-            Self::Name { .. } => "name a folder without a percent sign as `store` in the configuration",
-            Self::Format { .. } => "read it with the release that wrote it",
-            Self::Torn { .. } => "restore this file from a backup; its content is in docs/store.md",
-            Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
-            Self::Io { source, .. } => io_remedy(source),
-            Self::Table { verb: "read", .. } => {
+            Self::Missing { .. } => {
+                ("store_missing", "create it with `freeplay run`, or correct `path` under `[store]`")
+            }
+            Self::Foreign { .. } => {
+                ("store_foreign", "name a new or an empty folder as `store` in the configuration")
+            }
+            Self::Name { .. } => {
+                ("store_foreign", "name a folder without a percent sign as `store` in the configuration")
+            }
+            Self::Format { .. } => ("store_format", "read it with the release that wrote it"),
+            Self::Torn { .. } => {
+                ("store_format", "restore this file from a backup; its content is in docs/store.md")
+            }
+            Self::Held { .. } => ("store_held", "wait for it with `--wait 20m`; readers need not wait"),
+            Self::Io { source, .. } => ("store_io", io_remedy(source)),
+            Self::Table { verb: "read", .. } => (
+                "store_table",
                 "its log (`_delta_log` in the table's folder) may be truncated: restore the store from a backup; without \
-                 one, remove it and run its logs again"
-            }
+                 one, remove it and run its logs again",
+            ),
             Self::Table { .. } | Self::LogTable { .. } => {
-                "is the disk full, or does another program write into this table?"
+                ("store_table", "is the disk full, or does another program write into this table?")
             }
-            Self::LogDamaged { .. } => {
-                "restore this file, or the whole store, from a backup; data files are not affected"
-            }
-            Self::Object(error) => error.remedy(),
-            Self::Damaged { .. } => {
-                "restore this file from a backup; without one, remove the store and run its logs again"
-            }
-            Self::Row(_) | Self::Arrow(_) | Self::Frame(_) => {
-                "was the table changed by another program? `freeplay store verify` shows details"
-            }
-            Self::Parquet(_) => "`freeplay store verify` lists the damaged files",
+            Self::LogDamaged { .. } => (
+                "store_damaged",
+                "restore this file, or the whole store, from a backup; data files are not affected",
+            ),
+            Self::Object(error) => (error.code(), error.remedy()),
+            Self::Damaged { .. } => (
+                "store_damaged",
+                "restore this file from a backup; without one, remove the store and run its logs again",
+            ),
+            Self::Row(_) | Self::Arrow(_) | Self::Frame(_) => (
+                "store_value",
+                "was the table changed by another program? `freeplay store verify` shows details",
+            ),
+            Self::Parquet(_) => ("store_unreadable", "`freeplay store verify` lists the damaged files"),
         }
     }
 
@@ -212,13 +208,13 @@ mod tests {
         let not_found = DeltaTableError::InvalidTableLocation("Invalid table location: /a".to_owned());
         let of_parquet = Error::Parquet(parquet::errors::ParquetError::External(Box::new(os(24))));
         let of_arrow = Error::Arrow(arrow::error::ArrowError::ParquetError(format!("External: {}", os(24))));
-        assert!([&of_parquet, &of_arrow].iter().all(|error| error.remedy().contains("ulimit -n")));
+        assert!([&of_parquet, &of_arrow].iter().all(|error| error.code_and_remedy().1.contains("ulimit -n")));
         for error in [of_store(116), of_store(5), table(not_found), of_parquet, of_arrow] {
-            assert_eq!(error.code(), "store_io");
-            let remedy = error.remedy();
+            let (code, remedy) = error.code_and_remedy();
+            assert_eq!(code, "store_io");
             assert!(remedy.contains("run again") && !remedy.contains("remove"), "{remedy}");
         }
         let damage = parquet::errors::ParquetError::EOF("eof".to_owned());
-        assert_eq!(Error::Parquet(damage).code(), "store_unreadable");
+        assert_eq!(Error::Parquet(damage).code_and_remedy().0, "store_unreadable");
     }
 }

@@ -4,17 +4,43 @@ use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use records::GapRecord;
+use arrow::array::RecordBatch;
+use arrow::error::ArrowError;
+use records::{AlertRecord, GapRecord, LogRecord, RunRecord, UnitState, WorkEvent};
 
 use crate::delta::data_file;
 use crate::delta::location::Location;
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
-use crate::read::join::Join;
-use records::{AlertRecord, LogRecord, RunRecord, UnitState, WorkEvent};
 
 const LOCK: &str = "lock";
+
+type Function = dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync;
+
+/// Join of bookkeeping to records: it replaces the bookkeeping columns among a batch's columns. The batch also has tail
+/// number, position, departure and flight.
+#[derive(Clone)]
+pub struct Join(Arc<Function>);
+
+impl Join {
+    /// A join by a function from a batch to one with the same columns.
+    pub fn new(
+        join: impl Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync + 'static,
+    ) -> Self {
+        Self(Arc::new(join))
+    }
+
+    pub(crate) fn apply(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+        (self.0)(batch)
+    }
+}
+
+impl std::fmt::Debug for Join {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Join")
+    }
+}
 
 /// Result store, open for reading.
 #[derive(Debug, Clone)]

@@ -46,11 +46,10 @@ mod write;
 
 pub use admin::info::Info;
 pub use admin::withdraw::Withdrawal;
-pub use delta::foreign_table::{LiveFile, live_files};
+pub use delta::foreign_table::live_files;
 pub use error::Error;
-pub use handle::Store;
+pub use handle::{Join, Store};
 pub use read::column_scan::ColumnScan;
-pub use read::join::Join;
 pub use read::query::Query;
 pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};
 pub use write::compact::Compaction;

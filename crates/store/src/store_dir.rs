@@ -15,7 +15,6 @@ use crate::handle::Store;
 /// 3: files of one table may differ in later columns.
 /// Every earlier format is read, and is raised to the current one when the store is next written.
 pub(crate) const FORMAT: u32 = 3;
-/// The oldest one.
 const FIRST_FORMAT: u32 = 1;
 pub(crate) const MARKER: &str = "store.json";
 

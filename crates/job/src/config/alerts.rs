@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_with::skip_serializing_none;
 use smart_default::SmartDefault;
 
-use super::faults::Faults;
 use super::keys::with_nearest;
+use super::layers::Faults;
 
 /// States of quantities other than the gap: of a unit, of a tail, of a part.
 pub const QUANTITY_STATES: [&str; 11] = [

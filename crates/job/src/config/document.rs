@@ -17,10 +17,9 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
 use super::alerts::AlertChannel;
-use super::faults::Faults;
 use super::keys::with_nearest;
-use crate::config::part::{PartSettings, WearAxis};
-use crate::config::quantity_limits::QuantityLimits;
+use super::layers::Faults;
+use crate::config::part::{PartSettings, QuantityLimits, WearAxis};
 
 /// The whole file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,4 +1,5 @@
-//! The text of a configuration, in one file or several that override each other, and the location of its keys.
+//! The text of a configuration, in one file or several that override each other, the location of its keys, and the faults
+//! of their values, each with its line.
 
 use std::ops::Range;
 
@@ -12,14 +13,12 @@ use super::toml_errors;
 /// Bytes of a line that a diagnostic shows at most.
 const MAX_CONTENT: usize = 4096;
 
-/// A file of the configuration.
 #[derive(Debug)]
 pub(super) struct ConfigLayer {
     file: String,
     /// Its text, after as many empty lines as the files before have bytes: a span then identifies its file.
     text: String,
     start: usize,
-    /// Where each line of its own text starts.
     lines: Vec<usize>,
 }
 
@@ -61,7 +60,6 @@ impl<'t> Source<'t> {
         self.table.get_ref()
     }
 
-    /// The whole as a type.
     pub(super) fn document<T: DeserializeOwned>(&self) -> Result<T, Diagnostic> {
         T::deserialize(toml::de::Deserializer::from(self.table.clone()))
             .map_err(|e| from_toml(self.layers, &e))
@@ -88,6 +86,42 @@ impl<'t> Source<'t> {
             }
         }
         span
+    }
+}
+
+/// Collects the faults of a configuration, below the table that is being checked.
+pub(crate) struct Faults<'s> {
+    source: &'s Source<'s>,
+    table: Vec<String>,
+    /// What was found so far.
+    pub(super) found: Vec<Diagnostic>,
+}
+
+impl<'s> Faults<'s> {
+    pub(super) fn new(source: &'s Source<'s>) -> Self {
+        Self { source, table: Vec::new(), found: Vec::new() }
+    }
+
+    /// Checks a table: keys that `check` reports lie below it.
+    pub(super) fn within<T>(&mut self, table: &[&str], check: impl FnOnce(&mut Self) -> T) -> T {
+        let above = self.table.len();
+        self.table.extend(table.iter().map(|&name| name.to_owned()));
+        let checked = check(self);
+        self.table.truncate(above);
+        checked
+    }
+
+    /// Reports a fault of a key of the present table; without a key, of the table itself.
+    pub(super) fn report(&mut self, key: &[&str], fault: Diagnostic) {
+        let path: Vec<&str> = self.table.iter().map(String::as_str).chain(key.iter().copied()).collect();
+        self.found.push(self.source.at(&path, fault));
+    }
+
+    /// A pattern of `*` and `?`; a text that is none is reported.
+    pub(super) fn pattern(&mut self, key: &[&str], text: &str, kind: &str) -> Option<glob::Pattern> {
+        let pattern = glob::Pattern::new(text);
+        let what = |e| format!("`{text}` is not a valid {kind}: {e}");
+        pattern.map_err(|e| self.report(key, Diagnostic::new("bad_pattern", what(e)))).ok()
     }
 }
 

@@ -2,13 +2,11 @@
 
 pub mod alerts;
 mod document;
-mod faults;
 mod keys;
 mod layers;
 pub mod limits;
 mod overrides;
 pub mod part;
-mod quantity_limits;
 mod toml_errors;
 mod validate_channels;
 
@@ -25,10 +23,9 @@ pub use alerts::AlertChannel;
 pub use document::{
     AsOf, Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
-use faults::Faults;
-use layers::{ConfigLayer, Source};
+use layers::{ConfigLayer, Faults, Source};
 use overrides::Overrides;
-pub use quantity_limits::QuantityLimits;
+pub use part::QuantityLimits;
 
 use crate::METHOD_VERSION;
 use crate::config::part::{LimitedGap, Part};

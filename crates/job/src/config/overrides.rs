@@ -8,7 +8,7 @@ use records::{Diagnostic, PartNumber, TailNumber};
 use serde::de::DeserializeOwned;
 
 use super::document::{Document, Override, check_clock};
-use super::faults::Faults;
+use super::layers::Faults;
 use super::validate_channels;
 
 /// The checked overrides of a configuration, and the mappings that were derived from them.
@@ -92,7 +92,6 @@ impl Overrides {
         text
     }
 
-    /// The overrides that apply.
     fn numbers(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Vec<usize> {
         let applies = |(number, one): (usize, &ValidatedOverride)| one.is_for(tail, part).then_some(number);
         self.overrides.iter().enumerate().filter_map(applies).collect()
@@ -117,7 +116,6 @@ impl Overrides {
         mapping
     }
 
-    /// The mapping without overrides.
     pub(super) fn base(&self) -> &Arc<Mapping> {
         &self.base
     }

@@ -6,16 +6,11 @@ use records::Diagnostic;
 /// The reader's message as a diagnostic; one that is not known is handed on as it is.
 pub(super) fn diagnostic(message: &str) -> Diagnostic {
     let message = message.trim();
-    unknown_value(message).or_else(|| missing_key(message)).or_else(|| other_type(message)).unwrap_or_else(
-        || {
-            let diagnostic = Diagnostic::new("bad_toml", message);
-            if message == "duplicate key" {
-                diagnostic.hint("remove one of the two lines")
-            } else {
-                diagnostic
-            }
-        },
-    )
+    let known = unknown_value(message).or_else(|| missing_key(message)).or_else(|| other_type(message));
+    known.unwrap_or_else(|| {
+        let diagnostic = Diagnostic::new("bad_toml", message);
+        if message == "duplicate key" { diagnostic.hint("remove one of the two lines") } else { diagnostic }
+    })
 }
 
 fn unknown_value(message: &str) -> Option<Diagnostic> {
@@ -23,10 +18,8 @@ fn unknown_value(message: &str) -> Option<Diagnostic> {
     let wanted = wanted.trim_start_matches("one of ");
     let near = nearest(found, wanted.split('`').skip(1).step_by(2));
     let near = near.map(|near| format!("`{near}`? ")).unwrap_or_default();
-    Some(
-        Diagnostic::new("bad_toml", format!("unknown value or key `{found}`"))
-            .hint(format!("{near}It can be {wanted}")),
-    )
+    let diagnostic = Diagnostic::new("bad_toml", format!("unknown value or key `{found}`"));
+    Some(diagnostic.hint(format!("{near}It can be {wanted}")))
 }
 
 fn missing_key(message: &str) -> Option<Diagnostic> {

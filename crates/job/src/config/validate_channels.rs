@@ -8,8 +8,8 @@ use ingest::{ChannelMapping, Channels, SampleFilter};
 use records::Diagnostic;
 
 use super::document::Document;
-use super::faults::Faults;
 use super::keys::with_nearest;
+use super::layers::Faults;
 
 /// Reports every fault of the channels, each at its key.
 pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Faults<'_>) {

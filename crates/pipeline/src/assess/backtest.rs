@@ -76,7 +76,6 @@ pub fn of_histories(
     Ok(pasts.collect::<Result<Vec<_>, Error>>()?.into_iter().flatten().collect())
 }
 
-/// Cut dates of a unit.
 fn cuts(history: &History) -> impl Iterator<Item = Timestamp> {
     let estimated = history.flights().iter().filter(|f| f.gap_m().is_some());
     let days: Vec<Timestamp> = estimated.map(FlightRow::departure_utc).collect();

@@ -83,7 +83,6 @@ impl<'a> Limits<'a> {
         of_part.or(self.config.document.trend.quantity_limits)
     }
 
-    /// Configuration of a part.
     fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
         let number = PartNumber::new(number?).ok()?;
         self.config.parts.get(&number)

@@ -112,13 +112,8 @@ impl<'a> PriorTrainer<'a, '_> {
             return vec![parts.to_vec()];
         }
         let life_hours = |part| {
-            let units = self.of_parts(&[part]);
-            let hours = FleetPrior::rough_median_life_hours(
-                units,
-                cutoff_us,
-                self.limits.limit_m(part),
-                &RayonExecutor,
-            );
+            let (units, limit_m) = (self.of_parts(&[part]), self.limits.limit_m(part));
+            let hours = FleetPrior::rough_median_life_hours(units, cutoff_us, limit_m, &RayonExecutor);
             (hours, part)
         };
         let mut lives: Vec<(f64, Option<&str>)> = parts.par_iter().copied().map(life_hours).collect();

@@ -58,12 +58,8 @@ impl<'m> TailWide<'m> {
             (step.first_us..=step.last_us).contains(&change.departure_us) && step.step_m * change.step_m > 0.0
         };
         let steps = self.steps.get(tail).map_or(&[][..], Vec::as_slice);
-        let is_wide = is_sudden(change) && (steps.iter().any(is_within) || self.is_explained(flown, tail));
-        is_wide.then_some(tail)
-    }
-
-    fn is_explained(&self, flown: &FlightRow, tail: &str) -> bool {
-        self.moved.iter().any(|moved| moved.explains(tail, flown.departure_utc()))
+        let is_explained = || self.moved.iter().any(|moved| moved.explains(tail, flown.departure_utc()));
+        (is_sudden(change) && (steps.iter().any(is_within) || is_explained())).then_some(tail)
     }
 
     /// One change of the gap for each tail-wide step.

@@ -20,7 +20,6 @@ fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
 }
 
 impl FleetContext<'_> {
-    /// The trend row of a unit, from its assessment at a date.
     pub(super) fn row(
         &self,
         name: &UnitKey,
@@ -146,7 +145,7 @@ impl RowSources<'_> {
         let Self { history, trend, as_of, .. } = self;
         let fault = self.fleet.mapping_faults.iter().find(|fault| fault.units.contains(self.name));
         let mapping = fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
-        let settings = history.other_settings().map(|(others, last, all)| {
+        let settings = history.settings.others().map(|(others, last, all)| {
             format!(
                 "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
                 last.strftime("%Y-%m-%d")

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use job::Config;
+use job::config::AsOf;
 use rayon::prelude::*;
-use records::{Diagnostic, Installations, QuantityChange, QuantityRow, UnitState};
+use records::{Diagnostic, Installations, QuantityChange, QuantityRow, TrendRow, UnitState};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series};
 
@@ -32,8 +33,6 @@ use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
 use crate::fleet::unit_rows;
 use crate::run::summary::RunSummary;
-use job::config::AsOf;
-use records::TrendRow;
 
 /// Assessments of units, and steps of the gap that whole tails made.
 type Statements = (Vec<TrendRow>, Vec<QuantityChange>);
@@ -58,9 +57,9 @@ impl UnitSelection {
             && (self.part_number.is_none() || self.part_number == name.0)
     }
 
-    /// Whether an assessed unit is on the selected tail.
-    fn fits(&self, row: &TrendRow) -> bool {
-        self.tail_number.is_none() || row.tail_number == self.tail_number
+    /// Whether a tail is selected.
+    pub(crate) fn is_on(&self, tail_number: Option<&String>) -> bool {
+        self.tail_number.is_none() || self.tail_number.as_ref() == tail_number
     }
 }
 
@@ -169,6 +168,10 @@ pub(crate) fn assess_run(
     Ok((findings, states))
 }
 
+/// Assessments of earlier dates, each with its forecast for the date of a report, by the number of days before and unit; of units
+/// that had flown by then.
+pub(crate) type EarlierAssessments = BTreeMap<i64, BTreeMap<UnitKey, (TrendRow, Option<trend::Interval>)>>;
+
 /// Assessments of the selected units with everything that a report shows.
 #[derive(Default)]
 pub(crate) struct ReportAssessments {
@@ -176,10 +179,7 @@ pub(crate) struct ReportAssessments {
     pub(crate) fleet: StoreAssessment,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
-    /// Assessments of earlier dates, by the number of days before and unit; of units that had flown by then.
-    pub(crate) before: BTreeMap<i64, BTreeMap<UnitKey, TrendRow>>,
-    /// Forecasts of those dates for the date of the report, by days and unit.
-    pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
+    pub(crate) earlier: EarlierAssessments,
     /// Fleet prior of each part, and its training cut-off.
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
@@ -206,15 +206,16 @@ pub(crate) fn assess_for_report(
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
-    let past = earlier
-        .iter()
-        .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
-        .collect::<Result<_, Error>>()?;
     let then = |(days, at): (i64, Timestamp)| {
+        let mut forecasts = fleet.forecasts(&names, at, as_of)?;
         let flown = fleet.statements(names.iter(), at)?.0.into_iter().filter(|row| row.flights > 0);
-        Ok((days, flown.map(|row| (row.unit(), row)).collect()))
+        let of_unit = flown.map(|row| (row.unit(), row)).map(|(unit, row)| {
+            let forecast = forecasts.remove(&unit);
+            (unit, (row, forecast))
+        });
+        Ok((days, of_unit.collect()))
     };
-    let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
+    let earlier = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let selected: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let priors = |part: Option<&str>| {
         let (turn, prior) = fleet.priors.of(part, as_of)?;
@@ -222,7 +223,7 @@ pub(crate) fn assess_for_report(
     };
     let priors = selected.into_iter().filter_map(priors).collect();
     let fleet = fleet.assessed(now, &tail_wide, ask.as_of_utc);
-    Ok(ReportAssessments { fleet, drawn, before, past, priors })
+    Ok(ReportAssessments { fleet, drawn, earlier, priors })
 }
 
 /// Assesses the selected units of the store, or of the `histories` of a table made elsewhere; with `queries`, the unit and
@@ -338,7 +339,6 @@ impl<'a> FleetContext<'a> {
         })
     }
 
-    /// A unit's flights.
     pub(crate) fn series(&self, name: &UnitKey) -> Option<&Series> {
         self.units.get(name).map(|(_, series)| series)
     }
@@ -349,12 +349,10 @@ impl<'a> FleetContext<'a> {
         history.until(as_of).last().map(FlightRow::departure_utc)
     }
 
-    /// Trend settings of a unit.
     pub(crate) fn settings(&self, name: &UnitKey) -> trend::Settings {
         self.limits.settings(name.0.as_deref())
     }
 
-    /// Fleet prior of a unit at a date.
     pub(crate) fn prior<'s>(&'s self, name: &'s UnitKey, as_of: Timestamp) -> Option<&'s FleetPrior> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
@@ -432,7 +430,6 @@ impl<'a> FleetContext<'a> {
         FollowedQuantities { rows: of_units, changes }
     }
 
-    /// The selected assessments.
     fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Statements, Error> {
         let names = self.units.keys().copied();
         let (mut rows, tail_wide) = self.statements(names.filter(|name| ask.names(name)), as_of)?;
@@ -441,7 +438,7 @@ impl<'a> FleetContext<'a> {
         let now = Timestamp::now();
         let is_ahead =
             |row: &TrendRow| self.units.get(&row.unit()).is_some_and(|unit| unit.0.until(now).is_empty());
-        rows.retain(|row| (row.flights > 0 || is_ahead(row)) && ask.fits(row));
+        rows.retain(|row| (row.flights > 0 || is_ahead(row)) && ask.is_on(row.tail_number.as_ref()));
         Ok((rows, tail_wide))
     }
 

@@ -15,7 +15,6 @@ use crate::findings::finding::{Finding, GAP, UNCHANGED};
 /// Channels by name.
 pub type Channels = BTreeMap<String, AlertChannel>;
 
-/// Kind of the row of a change.
 const CHANGE: &str = "change";
 /// Kind of the rows that hold the states known when alerts begin.
 const BASELINE: &str = "baseline";

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use job::config::alerts::NOT_ASSESSED;
 use records::TrendRow;
 use records::sanitize::escape_cell;
 use serde_json::{Value, json};
 
 use crate::findings::finding::{Finding, GAP};
-use job::config::alerts::NOT_ASSESSED;
 
 /// Version of the message: it is raised when a key changes its meaning.
 const VERSION: u32 = 1;
@@ -25,7 +25,6 @@ pub(super) fn unit_text(part: Option<&str>, serial: &str) -> String {
     escape_cell(&name).into_owned()
 }
 
-/// Message of a change.
 pub(super) fn change(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -> String {
     let mut message = unit_fields(to);
     message["freeplay_alert"] = json!(VERSION);

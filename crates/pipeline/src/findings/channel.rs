@@ -22,7 +22,6 @@ const MAX_STDERR: u64 = 2048;
 /// Time for the last messages of a command that has ended.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
-/// Sends the message of a row through a channel.
 pub(super) fn send(config: &Config, channel: &AlertChannel, row: &AlertRecord) -> Attempt {
     let message = row.message.as_deref().unwrap_or_default();
     match (&channel.command, &channel.folder, &channel.url) {
@@ -189,31 +188,21 @@ mod tests {
     const HOSTILE: &str = "{\"serial_number\":\"$(touch X)'; rm -rf \\\"\\n\u{202e}\"}";
 
     fn shell(script: &str, folder: &Path, timeout: Duration) -> Attempt {
-        command(
-            &["sh".to_owned(), "-c".to_owned(), script.to_owned()],
-            folder,
-            HOSTILE,
-            timeout,
-            &["CARGO_PKG_NAME".to_owned()],
-        )
-    }
-
-    #[test]
-    fn a_command_gets_the_message_byte_by_byte_on_standard_input() {
-        let dir = tempfile::tempdir().unwrap();
-        assert_eq!(shell("cat > got", dir.path(), LONG), Attempt::Sent);
-        assert_eq!(fs::read_to_string(dir.path().join("got")).unwrap(), format!("{HOSTILE}\n"));
-        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing in a name is executed");
+        let words = ["sh", "-c", script].map(str::to_owned);
+        command(&words, folder, HOSTILE, timeout, &["CARGO_PKG_NAME".to_owned()])
     }
 
     /// Cargo sets the variables of tests: keys of object stores are passed on as little as they are.
     #[test]
-    fn a_command_gets_a_minimal_environment_and_what_is_passed_on() {
+    fn a_command_gets_the_message_byte_by_byte_and_a_minimal_environment() {
         let dir = tempfile::tempdir().unwrap();
+        let got = || fs::read_to_string(dir.path().join("got")).unwrap();
+        assert_eq!(shell("cat > got", dir.path(), LONG), Attempt::Sent);
+        assert_eq!(got(), format!("{HOSTILE}\n"));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing in a name is executed");
         assert_eq!(shell("env > got", dir.path(), LONG), Attempt::Sent);
-        let got = fs::read_to_string(dir.path().join("got")).unwrap();
-        assert!(got.contains("CARGO_PKG_NAME=") && got.contains("PATH="), "{got}");
-        assert!(!got.contains("CARGO_MANIFEST_DIR="), "{got}");
+        assert!(got().contains("CARGO_PKG_NAME=") && got().contains("PATH="), "{}", got());
+        assert!(!got().contains("CARGO_MANIFEST_DIR="), "{}", got());
     }
 
     #[test]
@@ -237,12 +226,9 @@ mod tests {
         assert!(begun.elapsed() < Duration::from_secs(10));
         let pid = fs::read_to_string(dir.path().join("pid")).unwrap();
         let state = || fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
-        let is_gone = || state().is_empty() || state().contains(") Z ");
         let is_ended = (0..100).any(|_| {
-            is_gone() || {
-                std::thread::sleep(POLL);
-                false
-            }
+            std::thread::sleep(POLL);
+            state().is_empty() || state().contains(") Z ")
         });
         assert!(is_ended || !Path::new("/proc/self").exists(), "{}", state());
     }

@@ -80,7 +80,6 @@ impl Finding {
         if self.quantity == GAP { self.state.is_some() } else { self.state != Some(UNCHANGED) }
     }
 
-    /// The finding about a unit's gap.
     pub(crate) fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
         Self {
             unit: row.unit(),

@@ -19,7 +19,6 @@ use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
 use crate::fleet::bookkeeping::maintenance_log;
 
-/// Inputs of the step.
 pub(crate) struct FollowUp<'a> {
     pub(crate) config: &'a Config,
     pub(crate) installations: &'a Installations,
@@ -73,7 +72,8 @@ impl FollowUp<'_> {
         if !self.is_partial {
             let maintenance = maintenance_log::read(self.config)?;
             let newest = findings.iter().map(|finding| finding.as_of_utc).max();
-            let tables = Tables::new(self.installations, &maintenance, newest.map_or(now, |at| at.max(now)));
+            let at = newest.map_or(now, |newest| newest.max(now));
+            let tables = Tables { installations: self.installations, maintenance: &maintenance, at };
             added = work_update::update(&events, findings, &tables, self.run_id, now);
             writer.add_work_events(&added)?;
         }

@@ -29,8 +29,7 @@ impl WorkSelection {
             Some("all") => true,
             Some(status) => request.status == status,
         };
-        let tail = &self.units.tail_number;
-        is_wanted && self.units.names(&request.unit()) && (tail.is_none() || *tail == request.tail_number)
+        is_wanted && self.units.names(&request.unit()) && self.units.is_on(request.tail_number.as_ref())
     }
 }
 

@@ -104,11 +104,8 @@ pub fn decide(
     if !request.is_open() {
         let how = request.closed_by.as_deref().unwrap_or("closed");
         let on = request.closed_utc.map(|at| format!(" on {}", at.strftime("%Y-%m-%d"))).unwrap_or_default();
-        return Err(Diagnostic::new(
-            "request_closed",
-            format!("work request {} was {how}{on}", request.request_id),
-        )
-        .hint("`freeplay work list` lists the open ones"));
+        let what = format!("work request {} was {how}{on}", request.request_id);
+        return Err(Diagnostic::new("request_closed", what).hint("`freeplay work list` lists the open ones"));
     }
     Ok(WorkEvent {
         number: next_number(events),
@@ -120,7 +117,6 @@ pub fn decide(
     })
 }
 
-/// Number of the next event.
 pub(crate) fn next_number(events: &[WorkEvent]) -> i64 {
     events.iter().map(|event| event.number).max().unwrap_or(0) + 1
 }

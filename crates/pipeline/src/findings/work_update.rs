@@ -14,10 +14,12 @@ use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// What the tables of the operator hold about units.
 pub struct Tables<'a> {
-    installations: &'a Installations,
-    maintenance: &'a MaintenanceLog,
+    /// Where units are and were.
+    pub installations: &'a Installations,
+    /// The work that was done on units.
+    pub maintenance: &'a MaintenanceLog,
     /// The date that counts: today, or that of the newest flight where it is later.
-    at: Timestamp,
+    pub at: Timestamp,
 }
 
 /// Events to add, in order.
@@ -87,7 +89,7 @@ fn of_open(
         let reason = format!("removed from {} of {} on {date}", last.position, last.tail_number);
         return closed(WorkEventKind::Removed, reason, removed);
     }
-    if finding.is_none() && !tables.is_known(&name) {
+    if finding.is_none() && tables.installations.of_unit(&name).next().is_none() {
         let reason = "the unit no longer has an installation or a record".to_owned();
         return closed(WorkEventKind::Removed, reason, now);
     }
@@ -185,23 +187,12 @@ fn rank(state: Option<&str>) -> State {
 }
 
 impl<'a> Tables<'a> {
-    /// The tables on a date.
-    pub fn new(installations: &'a Installations, maintenance: &'a MaintenanceLog, at: Timestamp) -> Self {
-        Self { installations, maintenance, at }
-    }
-
     /// The last installation and the removal of a unit that is installed nowhere.
     fn removal(&self, name: &UnitKey) -> Option<(&'a Installation, Timestamp)> {
         let last = self.installations.removal(name, self.at)?;
         Some((last, last.removed_utc?))
     }
 
-    /// Whether a unit has ever been installed.
-    fn is_known(&self, name: &UnitKey) -> bool {
-        self.installations.of_unit(name).next().is_some()
-    }
-
-    /// Where a unit is installed.
     fn place(&self, name: &UnitKey) -> Option<&'a Installation> {
         self.installations.installed(name, self.at)
     }

@@ -66,9 +66,6 @@ pub(crate) fn histories<R: Send>(
 
 /// Adds the flights of an estimates table to those of their units. In flights of the parts `by_largest`, the largest gap along
 /// the stroke is the gap, where the table has it.
-///
-/// # Errors
-/// When a column that must be there is not, or has another type, and as [`add_stored`].
 pub(crate) fn add_external(
     rows: &mut RowsByUnit<()>,
     chunk: &TableBatch,
@@ -82,10 +79,6 @@ pub(crate) fn add_external(
     add(rows, chunk, by_largest, other_gap_m, |_| ())
 }
 
-/// Adds the flights of the store's records to those of their units, each with what else `further` makes of its row.
-///
-/// # Errors
-/// The first row without a serial number, or without a departure that a calendar has.
 pub(crate) fn add_stored<R>(
     rows: &mut RowsByUnit<R>,
     chunk: &TableBatch,
@@ -158,44 +151,13 @@ fn add<R>(
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{
-        ArrayRef, Float64Array, Int64Array, ListBuilder, StringArray, StringBuilder,
-        TimestampMicrosecondArray,
-    };
+    use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray, TimestampMicrosecondArray};
     use arrow::compute::cast;
     use arrow::datatypes::DataType;
 
     use super::*;
     use crate::error::Error;
     use crate::fleet::unit_rows::of_parts;
-
-    /// A standard error of 3 µm and a distance of 4 µm between the estimators make 5 µm.
-    #[test]
-    fn stored_gaps_with_the_flag_have_an_error_that_spans_both_estimators() {
-        let mut flags = ListBuilder::new(StringBuilder::new());
-        for of_row in [&["estimators_disagree"][..], &["soft_contact"], &[]] {
-            of_row.iter().for_each(|flag| flags.values().append_value(flag));
-            flags.append(true);
-        }
-        let departures = TimestampMicrosecondArray::from(vec![1, 2, 3]).with_timezone("UTC");
-        let numbers = |values: [f64; 3]| Arc::new(Float64Array::from(values.to_vec())) as ArrayRef;
-        let columns: [(&str, ArrayRef); 6] = [
-            ("serial_number", Arc::new(StringArray::from(vec!["S"; 3]))),
-            ("departure_utc", Arc::new(departures)),
-            ("gap_m", numbers([30e-6; 3])),
-            ("gap_se_m", numbers([3e-6; 3])),
-            (OTHER_GAP, numbers([34e-6; 3])),
-            ("flags", Arc::new(flags.finish())),
-        ];
-        let batch = RecordBatch::try_from_iter(columns).unwrap();
-        let histories = of_batches(&[batch], add_batch);
-        let history = &histories.units[&(None, "S".into())];
-        let errors: Vec<f64> =
-            history.flights().iter().map(|flown| history.extras(flown).gap_se_m.abs() * 1e6).collect();
-        assert!((errors[0] - 5.0).abs() < 1e-9 && (errors[1] - 3.0).abs() < 1e-9, "{errors:?}");
-        let at = |us| Timestamp::from_microsecond(us).unwrap();
-        assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
-    }
 
     type Rows = RowsByUnit<()>;
     type Add = fn(&mut Rows, &RecordBatch) -> Result<(), ingest::Error>;

@@ -4,13 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use ingest::tables::{TableBatch, TableSplits, name, utc};
+use jiff::Timestamp;
 
 use crate::error::Error;
 use crate::fleet::builder::{self, add_external};
 use crate::fleet::histories::{Histories, UnitKey};
-use crate::fleet::row_keys::KeyColumns;
-use crate::fleet::unit_rows::{PartsByUnit, of_parts};
-use jiff::Timestamp;
+use crate::fleet::unit_rows::{KeyColumns, PartsByUnit, of_parts};
 
 /// A unit, and the date of its assessment; later data are ignored.
 pub type AsOfQuery = (UnitKey, Timestamp);

@@ -10,10 +10,9 @@ use jiff::Timestamp;
 use records::Installation;
 
 use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
-use crate::fleet::settings_counts::SettingsCounts;
-use crate::fleet::unit_rows::UnitRows;
+use crate::fleet::unit_rows::{SettingsCounts, UnitRows};
 
-pub use crate::fleet::places::{TailPosition, UnitKey};
+pub use crate::fleet::flight_row::{TailPosition, UnitKey};
 
 /// A unit's flights, by departure.
 #[derive(Debug, Clone, Default)]
@@ -26,7 +25,7 @@ pub struct History {
     names: String,
     /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
     disputed_us: Vec<i64>,
-    settings: SettingsCounts,
+    pub(crate) settings: SettingsCounts,
 }
 
 impl History {
@@ -54,24 +53,16 @@ impl History {
         })
     }
 
-    /// Number of gaps with other estimator settings than the latest gap, the departure of the last of them, and the number
-    /// of all gaps; `None` if all have the same settings.
-    pub(crate) fn other_settings(&self) -> Option<(usize, Timestamp, usize)> {
-        self.settings.others()
-    }
-
     /// The flight that departed at this time.
     pub(crate) fn at(&self, departure_utc: Timestamp) -> Option<&FlightRow> {
         let first = self.flights.partition_point(|f| f.departure_utc() < departure_utc);
         self.flights.get(first).filter(|f| f.departure_utc() == departure_utc)
     }
 
-    /// The name of one of them.
     pub(crate) fn flight_id(&self, flown: &FlightRow) -> Option<&str> {
         flown.name_in(&self.names)
     }
 
-    /// Secondary columns of one of them.
     pub(crate) fn extras(&self, flown: &FlightRow) -> FlightExtras {
         self.extras[flown.row as usize]
     }
@@ -81,7 +72,6 @@ impl History {
         self.extras = Vec::new();
     }
 
-    /// Where one of them was flown.
     pub(crate) fn place(&self, flown: &FlightRow) -> &TailPosition {
         &self.places[flown.place as usize]
     }
@@ -117,7 +107,10 @@ impl History {
         let disputed = rows.iter().filter(|((_, extras), _)| extras.is_disputed());
         let disputed_us = disputed.map(|((flown, _), _)| flown.departure_us()).collect();
         let (stored, further): (Vec<StoredFlight>, Vec<R>) = rows.into_iter().unzip();
-        let numbered = |((flown, extras), row): (StoredFlight, u32)| (flown.numbered(row), extras);
+        let numbered = |((mut flown, extras), row): (StoredFlight, u32)| {
+            flown.row = row;
+            (flown, extras)
+        };
         let (flights, extras) = stored.into_iter().zip(0..).map(numbered).unzip();
         (Self { places, flights, extras, names, disputed_us, settings }, further)
     }

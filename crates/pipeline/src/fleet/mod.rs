@@ -5,7 +5,4 @@ pub(crate) mod builder;
 pub mod external_estimates;
 pub mod flight_row;
 pub mod histories;
-pub(crate) mod places;
-pub(crate) mod row_keys;
-mod settings_counts;
 pub(crate) mod unit_rows;

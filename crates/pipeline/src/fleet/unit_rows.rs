@@ -4,25 +4,53 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use arrow::array::{Array, Float64Array, RecordBatch};
-use ingest::tables::TableBatch;
+use ingest::tables::{StringColumn, TableBatch};
+use jiff::Timestamp;
 use rayon::prelude::*;
 use store::ColumnScan;
 
 use crate::error::Error;
-use crate::fleet::flight_row::StoredFlight;
-use crate::fleet::places::{TailPosition, UnitKey, place_number};
-use crate::fleet::row_keys::KeyColumns;
-use crate::fleet::settings_counts::SettingsCounts;
+use crate::fleet::flight_row::{StoredFlight, TailPosition, UnitKey, place_number};
 
 /// Shares of a table for each worker: several, so that faster workers take more.
 const SHARES: usize = 4;
+
+/// Number of gaps and latest departure, µs since 1970 UTC, by the digest of the settings of the estimate. A unit has one or
+/// two, so each row's is found by comparing.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SettingsCounts(Vec<(String, usize, i64)>);
+
+impl SettingsCounts {
+    pub(crate) fn add(&mut self, settings: &str, gaps: usize, latest_us: i64) {
+        match self.0.iter_mut().find(|(known, ..)| known == settings) {
+            Some((_, count, latest)) => {
+                *count += gaps;
+                *latest = latest_us.max(*latest);
+            }
+            None => self.0.push((settings.to_owned(), gaps, latest_us)),
+        }
+    }
+
+    pub(crate) fn add_all(&mut self, others: &Self) {
+        others.0.iter().for_each(|(settings, gaps, latest_us)| self.add(settings, *gaps, *latest_us));
+    }
+
+    /// Number of gaps with other settings than the latest gap, the departure of the last of them, and the number of all
+    /// gaps; `None` if all have the same settings.
+    pub(crate) fn others(&self) -> Option<(usize, Timestamp, usize)> {
+        let latest_us = self.0.iter().map(|(_, _, us)| *us).max()?;
+        let others = || self.0.iter().filter(|(_, _, us)| *us < latest_us);
+        let last_us = others().map(|(_, _, us)| *us).max()?;
+        let all = self.0.iter().map(|(_, gaps, _)| gaps).sum();
+        Some((others().map(|(_, gaps, _)| gaps).sum(), Timestamp::from_microsecond(last_us).ok()?, all))
+    }
+}
 
 /// Flights of one unit, in the order of arrival, each with what else `R` holds of it.
 #[derive(Debug)]
 pub(crate) struct UnitRows<R> {
     /// Where the unit was; a flight holds the number of its place.
     pub(crate) places: Vec<TailPosition>,
-    /// Flights' names one after the other.
     pub(crate) names: String,
     /// Gaps by the settings that they were estimated with.
     pub(crate) settings: SettingsCounts,
@@ -37,7 +65,6 @@ impl<R> Default for UnitRows<R> {
 }
 
 impl<R> UnitRows<R> {
-    /// One after the other.
     pub(crate) fn concatenated(parts: Vec<Self>) -> Self {
         let mut all = Self::default();
         all.rows.reserve_exact(parts.iter().map(|part| part.rows.len()).sum());
@@ -54,6 +81,57 @@ impl<R> UnitRows<R> {
             all.settings.add_all(&part.settings);
         }
         all
+    }
+}
+
+/// Numbers of a unit and of its place.
+type Seat = (usize, u32);
+
+pub(crate) struct KeyColumns {
+    pub(crate) serials: StringColumn,
+    pub(crate) parts: StringColumn,
+    pub(crate) tails: StringColumn,
+    pub(crate) positions: StringColumn,
+    /// The last row of each serial number with its seat, by code; the first entry is that of serial numbers without codes.
+    seats: Vec<Option<(usize, Seat)>>,
+}
+
+impl KeyColumns {
+    /// The columns of names that repeat, under all their names.
+    pub(crate) const COLUMNS: [&'static str; 6] =
+        ["serial_number", "serial", "part_number", "tail_number", "tail", "position"];
+
+    pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
+        let column = |names: &[&str]| chunk.texts(chunk.find(names));
+        Ok(Self {
+            serials: column(&["serial_number", "serial"])?,
+            parts: column(&["part_number"])?,
+            tails: column(&["tail_number", "tail"])?,
+            positions: column(&["position"])?,
+            seats: Vec::new(),
+        })
+    }
+
+    /// The seat of a row: that of an earlier row with the same keys, or what `find` finds.
+    pub(crate) fn seat(
+        &mut self,
+        row: usize,
+        find: impl FnOnce(&Self) -> Result<Seat, ingest::Error>,
+    ) -> Result<Seat, ingest::Error> {
+        let entry = self.serials.code(row).map_or(0, |code| code + 1);
+        let known = self.seats.get(entry).copied().flatten();
+        if let Some((_, seat)) = known.filter(|(before, _)| self.are_same(*before, row)) {
+            return Ok(seat);
+        }
+        let seat = find(self)?;
+        self.seats.resize(self.seats.len().max(entry + 1), None);
+        self.seats[entry] = Some((row, seat));
+        Ok(seat)
+    }
+
+    /// Whether two rows are of one unit in one place.
+    fn are_same(&self, a: usize, b: usize) -> bool {
+        [&self.serials, &self.positions, &self.tails, &self.parts].iter().all(|names| names.are_same(a, b))
     }
 }
 
@@ -78,8 +156,6 @@ impl<R> RowsByUnit<R> {
     /// Reads the rows of a table: `read` gets the number of a row, the rows of its unit, to which it adds, and the index of
     /// its place.
     ///
-    /// # Errors
-    /// A row without a serial number, and the first error of `read`.
     pub(crate) fn add_rows(
         &mut self,
         chunk: &TableBatch,
@@ -99,7 +175,6 @@ impl<R> RowsByUnit<R> {
         Ok(())
     }
 
-    /// Index of a unit.
     fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let is_it = |unit: &&usize| self.units[**unit].0.0.as_deref() == part_number;
         if let Some(unit) = self.by_serial.get(serial_number).and_then(|all| all.iter().find(is_it)) {

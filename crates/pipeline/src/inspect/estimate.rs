@@ -13,7 +13,6 @@ use records::{Diagnostic, GapEstimate, GapRecord, Installations, PartNumber, Pos
 use report::EstimatePlot;
 
 use crate::error::Error;
-use crate::inspect::estimate_plots;
 use crate::logs::discover;
 use crate::run::time_limit::within_time_limit;
 
@@ -114,7 +113,7 @@ impl LogEstimates {
             });
         }
         let opened = FlightLog::open(files, log_path, config, installations)?;
-        let flight = opened.flight();
+        let flight = &opened.identity.flight;
         for at in opened.actuators() {
             let estimated = opened.unit(at).and_then(|(installation, part)| {
                 let (estimate, channels) = opened.estimate(at, part)?;
@@ -167,7 +166,7 @@ impl LogEstimates {
             self.trace.add(log_path, &channels, part)?;
         }
         if let Some(row) = self.rows.last().filter(|_| request.has_plots) {
-            self.plots.push(estimate_plots::plot(log_path, &channels, part, &row.estimate)?);
+            self.plots.push(plot(log_path, &channels, part, &row.estimate)?);
         }
         channels.recycle_buffers();
         Ok(())
@@ -206,4 +205,42 @@ fn unidentified(
         program_version: program_version.to_owned(),
         ..EstimateRow::default()
     }
+}
+
+/// The diagnostic plot of an actuator of a log, for `estimate --plot` and for the flights of a report.
+pub(crate) fn plot(
+    log_path: &str,
+    channels: &ActuatorChannels,
+    part: &Part,
+    estimate: &GapEstimate,
+) -> Result<EstimatePlot, Diagnostic> {
+    let (s_m, midrange) = job::estimate::filter_output(channels, part)?;
+    Ok(EstimatePlot {
+        title: format!("{} in {log_path}", channels.position),
+        summary: summary(estimate),
+        step_s: channels.step_s,
+        breaks: channels.breaks.clone(),
+        bounds_m: midrange.map(|gap| (gap.upper_m, gap.lower_m)),
+        dx_m: channels.dx_m.clone(),
+        load_n: channels.load_n.clone(),
+        s_m,
+        contact: job::estimate::plot_data(channels, part)?,
+    })
+}
+
+/// The estimate in one line.
+fn summary(e: &GapEstimate) -> String {
+    let mut words = Vec::new();
+    let mut say = |name: &str, value: Option<f64>, unit: &str| {
+        words.extend(value.map(|v| format!("{name} {v:.1} {unit}")));
+    };
+    say("gap", e.gap_m.map(|m| m * 1e6), "µm");
+    say("standard error", e.gap_se_m.map(|m| m * 1e6), "µm");
+    say("mid-range", e.gap_midrange_m.map(|m| m * 1e6), "µm");
+    say("stiffness", e.stiffness_n_per_m.map(|k| k / 1e6), "N/µm");
+    say("skew", e.skew_s.map(|s| s * 1e3), "ms");
+    say("lost motion", e.lost_motion_m.map(|m| m * 1e6), "µm");
+    words.extend(e.reason.as_ref().filter(|_| e.gap_m.is_none()).map(|why| format!("refused: {why}")));
+    words.extend((!e.flags.is_empty()).then(|| e.flags.join(", ")));
+    words.join(" · ")
 }

@@ -43,7 +43,7 @@ impl Explanation {
             "remedy": remedy(&self.record.estimate),
             "settings": { "part": part, "config_digest": digest, "is_current": is_current },
             "replay": {
-                "verdict": self.verdict.code(),
+                "verdict": <&str>::from(self.verdict),
                 "says": self.verdict.to_string(),
                 "error": self.replayed.as_ref().err(),
             },
@@ -153,11 +153,6 @@ impl ReplayVerdict {
         } else {
             Self::OtherNumber
         }
-    }
-
-    /// Stable word for scripts.
-    pub(crate) fn code(self) -> &'static str {
-        self.into()
     }
 }
 

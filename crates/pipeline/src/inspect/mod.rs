@@ -3,7 +3,6 @@
 
 pub mod check;
 pub mod estimate;
-pub(crate) mod estimate_plots;
 pub mod explain;
 pub mod normalize;
 pub mod simulate;

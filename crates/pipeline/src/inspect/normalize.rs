@@ -93,7 +93,7 @@ impl Normalization<'_> {
             return Ok(None);
         }
         let provenance = BTreeMap::from([
-            ("source_log".to_owned(), opened.display_name().to_owned()),
+            ("source_log".to_owned(), opened.display_name.clone()),
             ("source_digest".to_owned(), opened.digest.clone()),
             ("config_digest".to_owned(), opened.config_digest(installation)),
             ("part_number".to_owned(), installation.part_number.to_string()),
@@ -107,7 +107,7 @@ impl Normalization<'_> {
     /// Gives a file to a log, where no other log of this run has it and it is not there, or is of the same log. False if a
     /// copy of the log has the file.
     fn claim(&self, file: &Path, opened: &FlightLog<'_>) -> Result<bool, Diagnostic> {
-        let log_path = opened.display_name();
+        let log_path = opened.display_name.as_str();
         let mut claims = self.claims.lock().unwrap_or_else(PoisonError::into_inner);
         let owner = match claims.get(file) {
             Some((_, digest)) if *digest == opened.digest => return Ok(false),

@@ -29,11 +29,8 @@ pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
         })?,
     };
     let mut spec: Spec = toml::from_str(&text).map_err(|e| {
-        Error::refused(
-            Diagnostic::new("bad_spec", e.message())
-                .in_file(&shown)
-                .hint("docs/simulator.md lists every key"),
-        )
+        let diagnostic = Diagnostic::new("bad_spec", e.message()).in_file(&shown);
+        Error::refused(diagnostic.hint("docs/simulator.md lists every key"))
     })?;
     spec.seed = seed.unwrap_or(spec.seed);
     Ok(spec)
@@ -189,40 +186,41 @@ fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
     }
 }
 
+/// A table of CSV, a line for each row.
+fn csv<R>(columns: &str, rows: &[R], line: impl Fn(&R) -> String) -> String {
+    rows.iter().fold(format!("{columns}\n"), |table, row| table + &line(row) + "\n")
+}
+
 fn installations(plan: &Plan) -> String {
-    let head = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n";
-    let rows = plan.installations.iter().map(|of| {
+    let columns = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,\
+                   tail_hours_at_install";
+    csv(columns, &plan.installations, |of| {
         let removed = of.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
         let names = [&of.tail_number, &of.position, &of.part_number, &of.serial_number].map(String::as_str);
         let (installed, hours) = (instant(of.installed_us), of.unit_hours_at_install);
-        format!("{},{installed},{removed},{hours:.1},{:.1}\n", names.join(","), of.tail_hours_at_install)
-    });
-    head.to_owned() + &rows.collect::<String>()
+        format!("{},{installed},{removed},{hours:.1},{:.1}", names.join(","), of.tail_hours_at_install)
+    })
 }
 
 /// Every flight, with and without a log.
 fn flights(plan: &Plan) -> String {
-    let row = |of: &PlannedFlight| {
+    csv("tail_number,flight_id,departure_utc,flight_hours,tail_hours_end", &plan.flights, |of| {
         let (names, departure) = (format!("{},{}", of.tail_number, of.flight_id), instant(of.departure_us));
-        format!("{names},{departure},{:.2},{:.2}\n", of.flight_hours, of.tail_hours_end)
-    };
-    "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned()
-        + &plan.flights.iter().map(row).collect::<String>()
+        format!("{names},{departure},{:.2},{:.2}", of.flight_hours, of.tail_hours_end)
+    })
 }
 
 fn maintenance(plan: &Plan) -> String {
-    let rows = plan.maintenance.iter();
-    let rows =
-        rows.map(|of| format!("{},{},{},reshim\n", of.part_number, of.serial_number, instant(of.at_us)));
-    "part_number,serial_number,utc,kind\n".to_owned() + &rows.collect::<String>()
+    csv("part_number,serial_number,utc,kind", &plan.maintenance, |of| {
+        format!("{},{},{},reshim", of.part_number, of.serial_number, instant(of.at_us))
+    })
 }
 
 fn inspections(plan: &Plan) -> String {
-    let rows = plan.inspections.iter().map(|of| {
+    csv("part_number,serial_number,date_utc,play_m,instrument,force_n", &plan.inspections, |of| {
         let (unit, date) = (format!("{},{}", of.part_number, of.serial_number), instant(of.at_us));
-        format!("{unit},{date},{:e},{},{}\n", of.play_m, of.instrument, of.force_n)
-    });
-    "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned() + &rows.collect::<String>()
+        format!("{unit},{date},{:e},{},{}", of.play_m, of.instrument, of.force_n)
+    })
 }
 
 /// The contract's columns of a truth table: actuators of the flights whose logs are whole.
@@ -313,41 +311,30 @@ fn part_table(part: &simulator::Part, spec: &Spec) -> Value {
     let (screw, motor) = (&spec.sensors.screw, &spec.sensors.motor);
     // Friction that the filter does not know is of the order of a fortieth of the load.
     let unknown_n = spec.profile.load_n / 40.0;
-    let Some(r) = part.reference_radius_m else {
-        return json!({
-            "stiffness_n_per_m": contact.stiffness_n_per_m,
-            "damping_n_s_per_m": contact.damping_n_s_per_m,
-            "screw_mass_kg": plant.screw_mass_kg,
-            "lead_m_per_rev": part.lead_m,
-            "limit_m": part.limit_m,
-            "watch_m": part.limit_m * 0.75,
-            "noise": {
-                "screw_rms_m": screw.noise_rms,
-                "screw_resolution_m": screw.resolution,
-                "motor_rms_m": motor.noise_rms,
-                "motor_resolution_m": motor.resolution,
-                "unknown_force_n": unknown_n,
-                "bandwidth_hz": 10.0,
-            },
-        });
-    };
+    // The values of a rotary part are angles and torques at its reference radius.
+    let r = part.reference_radius_m.unwrap_or(1.0);
     let square = r * r;
-    json!({
-        "kind": "rotary",
-        "reference_radius_m": r,
-        "stiffness_nm_per_rad": contact.stiffness_n_per_m * square,
-        "damping_nm_s_per_rad": contact.damping_n_s_per_m * square,
-        "inertia_kg_m2": plant.screw_mass_kg * square,
+    let key = |linear, rotary| if part.reference_radius_m.is_some() { rotary } else { linear };
+    let mut table = json!({
+        (key("stiffness_n_per_m", "stiffness_nm_per_rad")): contact.stiffness_n_per_m * square,
+        (key("damping_n_s_per_m", "damping_nm_s_per_rad")): contact.damping_n_s_per_m * square,
+        (key("screw_mass_kg", "inertia_kg_m2")): plant.screw_mass_kg * square,
         "limit_m": part.limit_m,
         "noise": {
-            "screw_rms_rad": screw.noise_rms / r,
-            "screw_resolution_rad": screw.resolution / r,
-            "motor_rms_rad": motor.noise_rms / r,
-            "motor_resolution_rad": motor.resolution / r,
-            "unknown_torque_nm": unknown_n * r,
+            (key("screw_rms_m", "screw_rms_rad")): screw.noise_rms / r,
+            (key("screw_resolution_m", "screw_resolution_rad")): screw.resolution / r,
+            (key("motor_rms_m", "motor_rms_rad")): motor.noise_rms / r,
+            (key("motor_resolution_m", "motor_resolution_rad")): motor.resolution / r,
+            (key("unknown_force_n", "unknown_torque_nm")): unknown_n * r,
             "bandwidth_hz": 10.0,
         },
-    })
+    });
+    if let Some(radius_m) = part.reference_radius_m {
+        (table["kind"], table["reference_radius_m"]) = (json!("rotary"), json!(radius_m));
+    } else {
+        (table["lead_m_per_rev"], table["watch_m"]) = (json!(part.lead_m), json!(part.limit_m * 0.75));
+    }
+    table
 }
 
 /// A planned instant always lies within the calendar.

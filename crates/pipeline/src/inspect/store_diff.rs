@@ -58,7 +58,10 @@ pub fn compare_stores(before: &Path, after: &Path, min_change_m: f64) -> Result<
     let (before, after) = (records(before)?, records(after)?);
     let keys: BTreeSet<_> = before.keys().chain(after.keys()).collect();
     let rows = keys.iter().filter_map(|key| row(before.get(*key), after.get(*key)));
-    let rows = rows.filter(|row| differs(row, min_change_m)).collect();
+    let is_change = |change: f64| change != 0.0 && change.abs() >= min_change_m;
+    let differs =
+        |row: &DiffRow| row.status_before != row.status_after || row.gap_change_m.is_some_and(is_change);
+    let rows = rows.filter(differs).collect();
     Ok(StoreDiff { rows, compared: keys.len(), before: counts(&before), after: counts(&after) })
 }
 
@@ -94,9 +97,4 @@ fn row(before: Option<&GapRecord>, after: Option<&GapRecord>) -> Option<DiffRow>
         gap_change_m: gap(before).zip(gap(after)).map(|(b, a)| a - b),
         se_m: se(after).or_else(|| se(before)),
     })
-}
-
-fn differs(row: &DiffRow, least_m: f64) -> bool {
-    row.status_before != row.status_after
-        || row.gap_change_m.is_some_and(|change| change != 0.0 && change.abs() >= least_m)
 }

@@ -9,7 +9,7 @@ use ingest::{IdentityMapping, LogFiles};
 use jiff::Timestamp;
 use job::Config;
 use job::flight_log::{MAX_BETWEEN_PIECES, flights_in, identify, identify_companion};
-use object_io::Address;
+use object_io::{Address, ListEntry};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
@@ -303,7 +303,11 @@ fn matching(
             let address = Address::parse_required(pattern)?;
             let wanted = glob::Pattern::new(address.key()).map_err(invalid)?;
             let objects = discover_remote::matching(&address, &wanted, &mut tables)?;
-            objects.into_iter().map(|entry| Ok((entry.path.clone(), Some(entry.into())))).collect()
+            let stat = |object: ListEntry| {
+                let (size_bytes, file_id) = (object.size_bytes as i64, object.e_tag);
+                (object.path, Some(FileStat { size_bytes, modified_utc_ns: object.modified_utc_ns, file_id }))
+            };
+            objects.into_iter().map(|object| Ok(stat(object))).collect()
         } else {
             local(config, pattern).map_err(invalid)?
         };
@@ -339,7 +343,6 @@ fn matching(
     }
 }
 
-/// Files of this machine that fit a pattern.
 fn local(config: &Config, pattern: &str) -> Result<Vec<Listed>, glob::PatternError> {
     let found = local_files::matching(&config.folder, pattern)?;
     let file = |path: PathBuf| match is_file(&path) {

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use ingest::log::flight_rows::split_path;
 use ingest::{IdentityMapping, LogFiles};
-use object_io::ListEntry;
 use store::LogRecord;
 
 /// File status of listed objects: it avoids one request per key for millions of keys.
@@ -67,16 +66,6 @@ fn file_id(data: &std::fs::Metadata) -> String {
 #[cfg(not(unix))]
 fn file_id(_: &std::fs::Metadata) -> String {
     String::new()
-}
-
-impl From<ListEntry> for FileStat {
-    fn from(entry: ListEntry) -> Self {
-        Self {
-            size_bytes: entry.size_bytes as i64,
-            modified_utc_ns: entry.modified_utc_ns,
-            file_id: entry.e_tag,
-        }
-    }
 }
 
 #[cfg(test)]

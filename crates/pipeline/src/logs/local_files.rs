@@ -22,7 +22,6 @@ pub(crate) const AS_FILES: MatchOptions = MatchOptions {
 /// Files that match a pattern, and paths that could not be listed or were skipped.
 #[derive(Debug, Default)]
 pub(crate) struct LocalFiles {
-    /// Paths that fit.
     pub(crate) paths: BTreeSet<PathBuf>,
     /// Folders that cannot be listed, links that lead nowhere, and links that lead back.
     pub(crate) faults: Vec<(PathBuf, io::Error)>,

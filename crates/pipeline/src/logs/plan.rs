@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use ingest::LogFiles;
 use jiff::Timestamp;
 use job::Config;
+use job::flight_log::{config_digest, digest_without_identity, identify};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use serde::{Deserialize, Serialize};
@@ -47,7 +48,6 @@ impl Request {
             || self.serial_number.is_some()
     }
 
-    /// Whether a flight is selected.
     pub(crate) fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
         let flew = |serial: &SerialNumber| {
@@ -209,7 +209,7 @@ pub fn plan(
     } else {
         HashSet::new()
     };
-    let unidentified = job::flight_log::digest_without_identity(config, installations);
+    let unidentified = digest_without_identity(config, installations);
     let planner =
         Planner { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
     let verdicts: Vec<Result<WorkItem, Skipped>> = found
@@ -309,11 +309,8 @@ impl Planner<'_> {
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
         let why = why.ok_or(Skipped::Known)?;
         // A log that cannot be identified is always processed, or its error would never be reported.
-        let flight = || {
-            before
-                .and_then(flight_of)
-                .or_else(|| Some(job::flight_log::identify(files, log_path, self.config).ok()?.0))
-        };
+        let flight =
+            || before.and_then(flight_of).or_else(|| Some(identify(files, log_path, self.config).ok()?.0));
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
         if !asked {
@@ -326,17 +323,8 @@ impl Planner<'_> {
     /// Why this log is processed in this run, or nothing when it is up to date.
     fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
         let Some(account) = account else { return Some(WorkReason::New) };
-        let settings = flight_of(account).map_or_else(
-            || self.unidentified.to_owned(),
-            |flight| {
-                job::flight_log::config_digest(
-                    self.config,
-                    self.installations,
-                    &flight,
-                    &positions_of(account),
-                )
-            },
-        );
+        let digest = |flight| config_digest(self.config, self.installations, &flight, &positions_of(account));
+        let settings = flight_of(account).map_or_else(|| self.unidentified.to_owned(), digest);
         if self.request.redo {
             Some(WorkReason::Asked)
         } else if !stat.is_some_and(|stat| stat.is_of(account)) {

@@ -161,5 +161,5 @@ fn live_files(root: &Path, format: TableFormat) -> Result<BTreeMap<PathBuf, bool
             .hint("repair the table, or name its files without the table: copy them to a folder of their own")
     })?;
     let whole = |name: &str| if name.contains("://") { PathBuf::from(name) } else { root.join(name) };
-    Ok(live.into_iter().map(|file| (whole(&file.name), file.has_deleted_rows)).collect())
+    Ok(live.into_iter().map(|(name, has_deleted_rows)| (whole(&name), has_deleted_rows)).collect())
 }

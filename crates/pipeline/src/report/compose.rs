@@ -6,23 +6,24 @@ use std::sync::Arc;
 use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
 use jiff::Timestamp;
 use job::Config;
-use records::{Flight, Installation, Installations, PartNumber, QuantityRow};
+use records::report_rows::{
+    ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
+};
+use records::time::{days_after, days_between};
+use records::{
+    ChangePoint, Flight, Installation, Installations, PartNumber, QuantityRow, TrendRow, WorkRequest,
+};
 use store::{LogOutcome, LogRecord, Store};
 use trend::Forecast;
 
 use crate::assess::quantities::values::{FleetValues, READ};
-use crate::assess::trends::{self, ReportAssessments, StoreAssessment, UnitSelection};
+use crate::assess::trends::{self, EarlierAssessments, ReportAssessments, StoreAssessment, UnitSelection};
 use crate::error::Error;
 use crate::findings::work_requests;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::flight_row::FlightRow as FlownRow;
 use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::report::flight_columns::{FlightExtras, StoreContents};
-use records::report_rows::{
-    ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
-};
-use records::time::{days_after, days_between};
-use records::{ChangePoint, TrendRow, WorkRequest};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -45,12 +46,18 @@ pub fn compose(
     let (accounts, mut logs_known) = (store.accounts()?, BTreeMap::<_, usize>::new());
     accounts.iter().for_each(|log| *logs_known.entry(log.tail_number.clone()).or_default() += 1);
     let failed = accounts.into_iter().filter(|log| log.outcome == LogOutcome::Error);
+    let log_error = |account: LogRecord| ReportLogErrorRow {
+        log_path: account.log_path,
+        tail_number: account.tail_number,
+        error_code: account.error_code.unwrap_or_default(),
+        processed_utc: account.processed_utc,
+    };
     let mut log_errors: Vec<ReportLogErrorRow> = failed.map(log_error).collect();
     let StoreContents { mut histories, mut extras, values, store_version } =
         StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { fleet, drawn, before, past, priors } =
+    let ReportAssessments { fleet, drawn, earlier, priors } =
         trends::assess_for_report(config, installations, &mut histories, &values, ask, &days)?;
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
@@ -64,8 +71,7 @@ pub fn compose(
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
     let compose = ReportComposer {
         config,
-        before: &before,
-        past: &past,
+        earlier: &earlier,
         checks: checks.as_deref().unwrap_or(&[]),
         installations,
         quantities: by_unit(&followed.rows, |row| row.unit()),
@@ -86,7 +92,9 @@ pub fn compose(
     attribute_by_path(&mut log_errors, &tails, installations);
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
     log_errors.retain(|fault| wanted(fault.tail_number.as_deref()));
-    add_log_errors(&mut tails, &log_errors);
+    for name in log_errors.iter().filter_map(|fault| fault.tail_number.as_deref()) {
+        entry(&mut tails, name).logs_in_error += 1;
+    }
     let tails = tails.into_values().filter(|t| wanted(Some(&t.tail_number))).collect();
     Ok(Report {
         made_utc,
@@ -108,7 +116,6 @@ pub fn compose(
     })
 }
 
-/// Rows by the unit that each is of.
 fn by_unit<R>(rows: impl IntoIterator<Item = R>, unit: impl Fn(&R) -> Name) -> BTreeMap<Name, Vec<R>> {
     let mut units = BTreeMap::<Name, Vec<R>>::new();
     for row in rows {
@@ -125,20 +132,10 @@ fn scope(ask: &UnitSelection) -> Option<String> {
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-fn log_error(account: LogRecord) -> ReportLogErrorRow {
-    ReportLogErrorRow {
-        log_path: account.log_path,
-        tail_number: account.tail_number,
-        error_code: account.error_code.unwrap_or_default(),
-        processed_utc: account.processed_utc,
-    }
-}
-
 /// What all units' pages are composed from.
 struct ReportComposer<'a> {
     config: &'a Config,
-    before: &'a BTreeMap<i64, BTreeMap<Name, TrendRow>>,
-    past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
+    earlier: &'a EarlierAssessments,
     checks: &'a [InspectionRow],
     installations: &'a Installations,
     quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
@@ -156,7 +153,8 @@ impl ReportComposer<'_> {
         let name = row.unit();
         let installations: Vec<Installation> = self.installations.of_unit(&name).cloned().collect();
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
-        let before = self.before.get(&1).and_then(|units| units.get(&name));
+        let before = self.earlier.get(&1).and_then(|units| units.get(&name));
+        let before = before.map(|(row, _)| row).filter(|row| row.gap_m.is_some());
         let checks = self.checks.iter().filter(|check| check.is_of(&name));
         UnitView {
             level: drawn
@@ -166,9 +164,7 @@ impl ReportComposer<'_> {
                 .collect(),
             forecast: forecast(drawn, &row),
             watch_m: part.and_then(|part| self.config.parts.get(&part)?.settings.watch_m),
-            state_day_before: before
-                .filter(|row| row.gap_m.is_some())
-                .map(|row| row.state.map(str::to_owned)),
+            state_day_before: before.map(|row| row.state.map(str::to_owned)),
             quality: quality(history, &extras, &row),
             events: events(&row, &installations),
             past_forecasts: self.past(&row, &name),
@@ -195,8 +191,8 @@ impl ReportComposer<'_> {
     /// The forecasts that were made for the date of the report, and the level found.
     fn past(&self, row: &TrendRow, name: &Name) -> Vec<ReportPastForecastRow> {
         let of_day = |days: &i64| {
-            let then = self.before.get(days)?.get(name)?;
-            let forecast = self.past.get(days)?.get(name)?;
+            let (then, forecast) = self.earlier.get(days)?.get(name)?;
+            let forecast = forecast.as_ref()?;
             Some(ReportPastForecastRow {
                 part_number: row.part_number.clone(),
                 serial_number: row.serial_number.clone(),
@@ -377,13 +373,6 @@ fn attribute_by_path(
         if let (Some(tail), None) = (named.next(), named.next()) {
             fault.tail_number = Some((*tail).to_owned());
         }
-    }
-}
-
-/// Adds each tail's logs in error, of tails that never had a good one too.
-fn add_log_errors(tails: &mut BTreeMap<String, ReportTailRow>, faults: &[ReportLogErrorRow]) {
-    for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
-        entry(tails, name).logs_in_error += 1;
     }
 }
 

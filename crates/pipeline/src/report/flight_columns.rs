@@ -31,7 +31,6 @@ const NUMBERS: [&str; 8] = [
 /// Columns of the gap along the stroke.
 const PROFILE: [&str; 3] = ["gap_profile_at_m", "gap_profile_m", "gap_profile_se_m"];
 
-/// All flights of all units.
 pub(super) struct StoreContents {
     pub(super) histories: Histories,
     /// Further columns of each unit's flights, by departure: each flight's `row` is its place among them.
@@ -123,7 +122,6 @@ fn profile_of(columns: &[Option<&ListArray>; 3], row: usize) -> Option<Box<[[f64
     Some(gaps.map(|((at_m, m), se_m)| [*at_m, *m, *se_m]).collect())
 }
 
-/// The flags of a row.
 fn flags_of(flags: &ListArray, row: usize) -> Box<[Box<str>]> {
     if flags.is_null(row) || flags.value_length(row) == 0 {
         return Box::default();

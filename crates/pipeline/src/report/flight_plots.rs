@@ -13,7 +13,7 @@ use records::{Diagnostic, Installations};
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::inspect::estimate_plots;
+use crate::inspect::estimate::plot;
 use crate::logs::discover;
 use crate::run::time_limit::within_time_limit;
 
@@ -143,13 +143,13 @@ fn of_log(
             let hint = "its flights are not drawn; `freeplay run` stores them anew";
             return Err(Diagnostic::new("log_changed", what).in_file(&name).hint(hint));
         }
-        let plot = |position: &Arc<str>| {
+        let plotted = |position: &Arc<str>| {
             let at = opened.actuator_at(position)?;
             let (_, part) = opened.unit(at)?;
             let (estimate, channels) = opened.estimate(at, part)?;
-            channels.map(|channels| estimate_plots::plot(&name, &channels, part, &estimate)).transpose()
+            channels.map(|channels| plot(&name, &channels, part, &estimate)).transpose()
         };
-        positions.iter().map(plot).collect::<Result<Vec<_>, _>>()
+        positions.iter().map(plotted).collect::<Result<Vec<_>, _>>()
     })?;
     let page = |(wanted, plot): (&Wanted, Option<EstimatePlot>)| {
         let plot = plot?;

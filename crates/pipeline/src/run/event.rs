@@ -4,40 +4,16 @@ use records::Diagnostic;
 
 /// One thing that happened. Events of different logs may come in any order.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub enum Event {
     /// The plan is complete: number and bytes of the logs to read.
-    Planned {
-        /// Logs to do.
-        logs: usize,
-        /// Their size.
-        bytes: u64,
-    },
+    Planned { logs: usize, bytes: u64 },
     /// A worker took a log.
-    Started {
-        /// Its name.
-        log: String,
-    },
-    /// A log is finished: estimated, refused or in error.
-    Finished {
-        /// Its name.
-        log: String,
-        /// Its size.
-        bytes: u64,
-        /// Gaps.
-        estimated: usize,
-        /// Sound logs that cannot show one.
-        refused: usize,
-        /// What is wrong with it.
-        diagnostics: Vec<Diagnostic>,
-    },
+    Started { log: String },
+    /// A log is finished, with its gaps, its flights without one, and its errors.
+    Finished { log: String, bytes: u64, estimated: usize, refused: usize, diagnostics: Vec<Diagnostic> },
     /// Number of logs that are now safe in the store.
-    Stored {
-        /// Logs in this commit.
-        logs: usize,
-    },
+    Stored { logs: usize },
     /// Number of units whose trends are being assessed.
-    Trends {
-        /// Units.
-        units: usize,
-    },
+    Trends { units: usize },
 }

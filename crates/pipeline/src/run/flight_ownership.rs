@@ -29,19 +29,15 @@ pub(crate) struct ProcessedLog {
     /// Its status: `known` where its content and settings are those of stored records, so that only its name or its date is
     /// new.
     pub(crate) account: LogRecord,
-    /// Its records.
     pub(crate) records: Vec<GapRecord>,
-    /// Its errors.
     pub(crate) diagnostics: Vec<Diagnostic>,
 }
 
 impl ProcessedLog {
-    /// A log without records.
     pub(crate) fn without_records(account: LogRecord, diagnostics: Vec<Diagnostic>) -> Self {
         Self { account, records: Vec::new(), diagnostics }
     }
 
-    /// A log in error for one reason.
     pub(crate) fn in_error(mut account: LogRecord, diagnostic: Diagnostic) -> Self {
         summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
         Self::without_records(account, vec![diagnostic])
@@ -77,7 +73,6 @@ pub(crate) struct OwnershipLedger<'a> {
     pub(crate) renamed: BTreeMap<String, String>,
 }
 
-/// A record of this run.
 struct OwnRecord {
     held: HeldRecord,
     /// Why it has no gap.
@@ -180,27 +175,9 @@ impl<'a> OwnershipLedger<'a> {
         writer: &Writer,
         report: &mut RunSummary,
     ) -> Result<Vec<LogResult>, Error> {
-        if !done.is_known() {
-            return self.read(done, writer, report);
+        if done.is_known() {
+            return Ok(vec![self.take_over(done.account, report)]);
         }
-        let account = done.account;
-        report.known += 1;
-        if let Some(digests) = plan::digests(&account) {
-            let is_new_path = !self.plan.accounts.contains_key(&account.log_path);
-            let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
-            let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
-            self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
-        }
-        self.insert(account.clone());
-        Ok(vec![LogResult { account, records: Vec::new(), moved_from: Vec::new() }])
-    }
-
-    fn read(
-        &mut self,
-        done: ProcessedLog,
-        writer: &Writer,
-        report: &mut RunSummary,
-    ) -> Result<Vec<LogResult>, Error> {
         let ProcessedLog { mut account, records, mut diagnostics } = done;
         let pieces = self.undeclared_pieces(&account);
         if !pieces.is_empty() {
@@ -261,6 +238,19 @@ impl<'a> OwnershipLedger<'a> {
             results.push(self.store(loser, Vec::new(), report));
         }
         Ok(results)
+    }
+
+    /// Counts a log of known content, and notes the former path of one that was renamed.
+    fn take_over(&mut self, account: LogRecord, report: &mut RunSummary) -> LogResult {
+        report.known += 1;
+        if let Some(digests) = plan::digests(&account) {
+            let is_new_path = !self.plan.accounts.contains_key(&account.log_path);
+            let gone = self.plan.gone.get(&digests.0).filter(|_| is_new_path).into_iter().flatten();
+            let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
+            self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
+        }
+        self.insert(account.clone());
+        LogResult { account, records: Vec::new(), moved_from: Vec::new() }
     }
 
     /// The records of this run that a log still has, after another one took some of them.

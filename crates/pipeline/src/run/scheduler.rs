@@ -90,7 +90,9 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// [`Error::Refused`] when nothing could be run; [`Error::Store`] when the store fails in the middle:
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<RunSummary, Error> {
-    let workers = workers(request);
+    // One worker per core also for one log, whose actuators are spread over them.
+    let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let workers = request.jobs.unwrap_or_else(cores).max(1);
     execute_run(config, request, context, workers, |inputs, store| {
         process_all(inputs, context, workers, store)
     })
@@ -201,14 +203,6 @@ pub(crate) fn execute_run(
     Ok(report)
 }
 
-/// Number of workers: one per core, also for one log, whose actuators are spread over them.
-fn workers(request: &Request) -> usize {
-    request
-        .jobs
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
-        .max(1)
-}
-
 /// Names sort as the runs did.
 fn run_id(started_utc: Timestamp) -> String {
     format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
@@ -232,7 +226,6 @@ pub(crate) struct RunInputs {
 }
 
 impl RunInputs {
-    /// Outcome of a log with an error.
     pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> ProcessedLog {
         let mut account = summary::of_log(work, &self.run_id);
         account.config_digest = Some(self.plan.unidentified.clone());
@@ -334,20 +327,15 @@ impl WorkerContext<'_> {
             return self.inputs.failed(work, fault.clone());
         }
         let step = self.steps.begin();
-        let opened = match FlightLog::open(
-            &work.files,
-            &work.log_path,
-            &self.inputs.config,
-            &self.inputs.installations,
-        ) {
+        let RunInputs { config, installations, run_id, .. } = self.inputs;
+        let opened = match FlightLog::open(&work.files, &work.log_path, config, installations) {
             Ok(opened) => opened,
             Err(diagnostic) => return self.inputs.failed(work, diagnostic),
         };
-        let flight = opened.flight();
+        let flight = &opened.identity.flight;
         let names = opened.position_names();
-        let mut account = summary::of_log(work, &self.inputs.run_id);
-        account.config_digest =
-            Some(config_digest(&self.inputs.config, &self.inputs.installations, &flight, &names));
+        let mut account = summary::of_log(work, run_id);
+        account.config_digest = Some(config_digest(config, installations, flight, &names));
         account.log_digest = Some(opened.digest.clone());
         account.tail_number = Some(flight.tail_number.to_string());
         account.flight_id = Some(flight.flight_id.to_string());

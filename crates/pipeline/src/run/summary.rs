@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use records::time::days_between;
-use records::{Diagnostic, Installations};
+use records::{Diagnostic, Installations, QuantityChange, TrendRow};
 use store::{LogOutcome, LogRecord, RunRecord};
+use trend::State;
 
 use crate::assess::changes::UnitChange;
 use crate::error::is_passing;
@@ -21,8 +22,6 @@ use crate::fleet::bookkeeping::join::MovedFlights;
 use crate::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{Plan, StandingError, WorkItem};
-use records::{QuantityChange, TrendRow};
-use trend::State;
 
 /// Error of a log.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -45,25 +45,3 @@ pub(crate) fn log_timeout(display_name: &str, limit_s: f64) -> Diagnostic {
         "check its disk or share and its size, or raise `run.log_timeout_s`; the next run tries it again",
     )
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn work_that_never_ends_and_work_that_panics_are_errors_of_their_log() {
-        let mut config = Config::default();
-        assert_eq!(within_time_limit("a", &config, || Ok(7)).unwrap(), 7);
-        config.document.run.log_timeout_s = 0.05;
-        let endless = within_time_limit::<()>("b", &config, || {
-            loop {
-                std::thread::park();
-            }
-        });
-        assert_eq!(endless.unwrap_err().code, "log_timeout");
-        config.document.run.log_timeout_s = 600.0;
-        let broken = within_time_limit::<()>("c", &config, || panic!("broken"));
-        assert_eq!(broken.unwrap_err().code, "panic");
-    }
-}

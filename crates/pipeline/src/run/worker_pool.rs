@@ -163,7 +163,6 @@ pub(crate) struct WorkerPool<'a> {
 }
 
 impl<'a> WorkerPool<'a> {
-    /// Starts the workers.
     pub(crate) fn start(settings: PoolSettings<'a>) -> Result<Self, Error> {
         let workers = Workers::start(&settings, (0..settings.plan.work.len()).collect())?;
         Ok(Self {

@@ -39,10 +39,7 @@ fn channels() -> Channels {
     let folder = AlertChannel { folder: Some("alerts".to_owned()), ..channel.clone() };
     let command = AlertChannel { command: Some(vec!["notify".to_owned()]), ..channel.clone() };
     let url = AlertChannel { url: Some("http://localhost/".to_owned()), resend_unconfirmed: true, ..channel };
-    [("command", command), ("folder", folder), ("url", url)]
-        .into_iter()
-        .map(|(name, channel)| (name.to_owned(), channel))
-        .collect()
+    [("command", command), ("folder", folder), ("url", url)].map(|(name, of)| (name.to_owned(), of)).into()
 }
 
 /// The run was killed.
@@ -220,13 +217,17 @@ fn filters_select_by_new_state_part_and_tail() {
         tails: vec!["N41?FP".to_owned()],
         ..AlertChannel::default()
     };
-    assert!(channel.selects(Some("act"), Some("EMA-27-1040"), Some("N412FP")));
-    assert!(!channel.selects(Some("plan"), Some("EMA-27-1040"), Some("N412FP")));
-    assert!(!channel.selects(Some("act"), Some("EMA-32-1040"), Some("N412FP")));
-    assert!(!channel.selects(Some("act"), Some("EMA-27-1040"), Some("N4122FP")));
-    assert!(!channel.selects(Some("act"), None, Some("N412FP")));
-    assert!(AlertChannel::default().selects(Some("watch"), None, None));
-    assert!(!AlertChannel::default().selects(None, None, None));
+    for (state, part, tail, expected) in [
+        ("act", Some("EMA-27-1040"), "N412FP", true),
+        ("plan", Some("EMA-27-1040"), "N412FP", false),
+        ("act", Some("EMA-32-1040"), "N412FP", false),
+        ("act", Some("EMA-27-1040"), "N4122FP", false),
+        ("act", None, "N412FP", false),
+    ] {
+        assert_eq!(channel.selects(Some(state), part, Some(tail)), expected, "{state} {part:?} {tail}");
+    }
+    let all = AlertChannel::default();
+    assert!(all.selects(Some("watch"), None, None) && !all.selects(None, None, None));
 }
 
 /// A message that always fails must not keep the others back, and a dead receiver costs three attempts a run.

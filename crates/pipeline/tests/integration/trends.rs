@@ -295,19 +295,18 @@ fn a_step_of_all_units_of_a_tail_is_reported_as_one_of_its_sensors() {
 /// The last six gaps are 3.5 µm too high, and the other estimator reports it.
 #[test]
 fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them() {
-    let with = |off_um: f64, is_flagged: bool| {
+    let with = |off_um: f64, flag: Option<&str>| {
         let mut rows = flown(200);
         for row in rows.iter_mut().filter(|row| unit(row) == 3 && row.flight.departure_utc > day(193)) {
             let gap_m = row.estimate.gap_m.unwrap();
             row.estimate.gap_m = Some(gap_m + off_um * 1e-6);
-            if is_flagged {
-                row.estimate.flags = vec!["estimators_disagree".to_owned()];
-                row.estimate.gap_midrange_fitted_m = Some(gap_m);
-            }
+            row.estimate.flags = flag.map(str::to_owned).into_iter().collect();
+            row.estimate.gap_midrange_fitted_m = Some(gap_m);
         }
         assess(&rows, day(199)).into_iter().find(|row| row.serial_number == "S03").unwrap()
     };
-    let (sound, off, flagged) = (with(0.0, false), with(3.5, false), with(3.5, true));
+    let (sound, off, flagged) = (with(0.0, None), with(3.5, None), with(3.5, Some("estimators_disagree")));
+    assert_eq!(with(3.5, Some("soft_contact")), off, "no other flag disputes a gap");
     let moved_um = |row: &TrendRow| (row.gap_m.unwrap() - sound.gap_m.unwrap()) * 1e6;
     assert!(moved_um(&off) > 0.3, "{}", moved_um(&off));
     assert!(moved_um(&flagged).abs() < 0.3 * moved_um(&off), "{} {}", moved_um(&flagged), moved_um(&off));

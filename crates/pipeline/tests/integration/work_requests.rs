@@ -83,7 +83,7 @@ impl Desk {
             .collect();
         let installations = Installations::new(self.installations.clone()).unwrap();
         let now = utc(&format!("{day}T20:00:00Z"));
-        let tables = Tables::new(&installations, &self.maintenance, now);
+        let tables = Tables { installations: &installations, maintenance: &self.maintenance, at: now };
         self.runs += 1;
         let run_id = format!("R{}", self.runs);
         let found = work_update::update(&self.events, &findings, &tables, &run_id, now);

@@ -2,28 +2,22 @@
 
 use jiff::Timestamp;
 use polars::prelude::ChunkAgg;
-use records::GapRecord;
+use records::{GapRecord, LogOutcome, RunRecord};
 
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::query::Query;
 use crate::read::{frame, scan};
-use records::{LogOutcome, RunRecord};
 
-/// A store in numbers.
+/// A store in numbers; flights, units and aircraft are those with a record.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Info {
-    /// Records.
     pub records: usize,
-    /// Flights with a record.
     pub flights: usize,
-    /// Units with a record.
     pub serials: usize,
-    /// Aircraft with a record.
     pub tails: usize,
-    /// The earliest departure.
     pub first_departure_utc: Option<Timestamp>,
-    /// The latest departure.
     pub last_departure_utc: Option<Timestamp>,
     /// Logs with an account.
     pub logs: usize,
@@ -42,7 +36,7 @@ pub struct Info {
 }
 
 impl Store {
-    /// Counts.
+    /// Figures about the newest version of the store.
     ///
     /// # Errors
     /// As [`Store::scan`].
@@ -53,8 +47,8 @@ impl Store {
         let rows = frame::frame(&self.select(&snapshot, &Query::default(), &columns).read_all()?, &names)?;
         let departures = rows.column(names[0])?.i64()?;
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
-        let runs = self.runs()?;
-        let accounts = self.accounts()?;
+        let (runs, accounts, now) = (self.runs()?, self.accounts()?, Some(Timestamp::now()));
+        let completed = runs.iter().filter(|run| matches!(run.exit_code, Some(0 | 1)));
         Ok(Info {
             records: rows.height(),
             flights: frame::distinct(&rows, &names[..3])?,
@@ -67,47 +61,9 @@ impl Store {
             files: snapshot.files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,
-            last_completed: last_completed(&runs, Timestamp::now()).cloned(),
+            // A run under a clock that was ahead counts only where there is no other: it hides none.
+            last_completed: completed.max_by_key(|run| (run.finished_utc <= now, run.finished_utc)).cloned(),
             last: runs.last().cloned(),
         })
-    }
-}
-
-/// The completed run that ended last. A clock that was ahead when a run ended hides no other run: one that ended after
-/// `now` counts only where there is no other.
-fn last_completed(runs: &[RunRecord], now: Timestamp) -> Option<&RunRecord> {
-    let key = |run: &&RunRecord| (run.finished_utc <= Some(now), run.finished_utc);
-    runs.iter().filter(|run| completed(run)).max_by_key(key)
-}
-
-fn completed(run: &RunRecord) -> bool {
-    matches!(run.exit_code, Some(0 | 1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn run(run_id: &str, finished_utc: &str) -> RunRecord {
-        let at: Timestamp = finished_utc.parse().unwrap();
-        RunRecord {
-            run_id: run_id.to_owned(),
-            started_utc: at,
-            finished_utc: Some(at),
-            program_version: "0".to_owned(),
-            exit_code: Some(0),
-            ..RunRecord::default()
-        }
-    }
-
-    #[test]
-    fn a_run_under_a_clock_that_was_ahead_does_not_hide_the_runs_after_it() {
-        let now: Timestamp = "2026-03-03T06:00:00Z".parse().unwrap();
-        let ahead = run("ahead", "2031-01-01T04:00:00Z");
-        let runs = [ahead.clone(), run("old", "2026-03-01T04:00:00Z"), run("new", "2026-03-03T04:00:00Z")];
-        assert_eq!(last_completed(&runs, now).unwrap().run_id, "new");
-        assert_eq!(last_completed(&[ahead], now).unwrap().run_id, "ahead");
-        let back = run("ten years back", "2016-03-03T05:00:00Z");
-        assert_eq!(last_completed(&[runs[1].clone(), back], now).unwrap().run_id, "old");
     }
 }

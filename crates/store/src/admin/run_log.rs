@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::slice;
 
 use jiff::{SignedDuration, Timestamp};
-use records::{GapRecord, Status};
+use records::{GapRecord, LogOutcome, LogRecord, RunRecord, Status};
 
 use crate::error::Error;
 use crate::handle::Store;
@@ -16,7 +16,6 @@ use crate::read::query::Query;
 use crate::read::scan::Condition;
 use crate::write::lock::Lock;
 use crate::write::writer::{self, Writer};
-use records::{LogOutcome, LogRecord, RunRecord};
 
 /// A run in a bucket that gave no sign of life for so long was killed: it stores each log as it is finished.
 const SILENT: SignedDuration = SignedDuration::from_hours(1);

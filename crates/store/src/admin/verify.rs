@@ -7,8 +7,7 @@ use std::sync::Arc;
 
 use arrow::compute::concat_batches;
 use jiff::Timestamp;
-use records::Diagnostic;
-use records::GapRecord;
+use records::{Diagnostic, GapRecord, LogRecord, RecordKey};
 
 use crate::delta::data_file;
 use crate::delta::file_stats::{self, Stats};
@@ -19,8 +18,6 @@ use crate::error::Error;
 use crate::handle::Store;
 use crate::read::{frame, scan};
 use crate::write::writer::{Writer, key_columns, keys_of};
-use records::LogRecord;
-use records::RecordKey;
 
 /// Maximum number of similar findings that are listed; the others are counted.
 const NAMED: usize = 3;
@@ -84,7 +81,6 @@ fn first_of(mut findings: impl ExactSizeIterator<Item = Diagnostic>, problem: &s
     named
 }
 
-/// A flight: tail and departure.
 type FlightKey<'a> = (&'a str, i64);
 
 /// Logs with more records than are stored of their flight, and the number that is stored. A flight with several logs is

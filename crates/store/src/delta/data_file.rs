@@ -19,7 +19,6 @@ use crate::error::Error;
 /// Rows of a row group: small enough that one tail's history decodes little of a big file.
 pub(crate) const GROUP_ROWS: usize = 16_384;
 
-/// Hexadecimal digits of a blake3 digest.
 const DIGEST_DIGITS: usize = 64;
 
 /// Writes a batch as a data file into a table's folder and returns the action that adds it.

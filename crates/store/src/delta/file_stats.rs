@@ -24,7 +24,6 @@ const UNITS: (&str, &str) = ("serial_number", "freeplaySerials");
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct Stats {
-    /// Rows.
     pub(crate) num_records: Option<i64>,
     min_values: Map<String, Value>,
     max_values: Map<String, Value>,
@@ -155,30 +154,21 @@ fn written(milliseconds: i64) -> Option<String> {
 mod tests {
     use super::*;
 
+    /// Bounds are widened to whole milliseconds and never narrowed; a file without rows widens no span; and what is not known,
+    /// or cannot be, prunes nothing.
     #[test]
-    fn a_bound_of_time_is_widened_to_whole_milliseconds_and_never_narrowed() {
+    fn bounds_of_time_hold_every_row() {
+        const ALL: (i64, i64) = (i64::MIN, i64::MAX);
         assert_eq!(written(0).as_deref(), Some("1970-01-01T00:00:00.000Z"));
-        let stats = Stats::parse(Some(
-            r#"{"numRecords":1,"minValues":{"t":"1970-01-01T00:00:00.001Z"},"maxValues":{"t":"1970-01-01T00:00:00.002Z"}}"#,
-        ));
-        assert_eq!(stats.times_us("t"), (1_000, 3_000));
-    }
-
-    #[test]
-    fn a_file_without_rows_widens_no_span() {
-        let empty = Stats::parse(Some(r#"{"numRecords":0}"#));
-        let (first, last) = empty.times_us("t");
-        assert_eq!((first.min(3), last.max(5)), (3, 5));
-    }
-
-    #[test]
-    fn what_is_not_known_or_cannot_be_never_prunes() {
-        let stats = Stats::parse(Some("torn"));
-        assert!(stats.may_hold("tail_number", "N1", "N1"));
-        assert_eq!(stats.times_us("departure_utc"), (i64::MIN, i64::MAX));
-        let reversed = Stats::parse(Some(
-            r#"{"minValues":{"t":"2026-01-02T00:00:00Z"},"maxValues":{"t":"2026-01-01T00:00:00Z"}}"#,
-        ));
-        assert_eq!(reversed.times_us("t"), (i64::MIN, i64::MAX));
+        let bounds = |low, high| format!(r#"{{"minValues":{{"t":"{low}"}},"maxValues":{{"t":"{high}"}}}}"#);
+        for (text, expected) in [
+            (&*bounds("1970-01-01T00:00:00.001Z", "1970-01-01T00:00:00.002Z"), (1_000, 3_000)),
+            (&bounds("2026-01-02T00:00:00Z", "2026-01-01T00:00:00Z"), ALL),
+            (r#"{"numRecords":0}"#, (i64::MAX, i64::MIN)),
+            ("torn", ALL),
+        ] {
+            assert_eq!(Stats::parse(Some(text)).times_us("t"), expected, "{text}");
+        }
+        assert!(Stats::parse(Some("torn")).may_hold("tail_number", "N1", "N1"));
     }
 }

@@ -1,27 +1,21 @@
 //! Delta tables of other programs: which of the files in a folder of logs belong to the table now.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use deltalake::kernel::LogicalFileView;
 use deltalake::{DeltaTable, DeltaTableError};
 
 use crate::delta::location::Location;
 use crate::error::Error;
 
-/// A data file that belongs to the current version of a table.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LiveFile {
-    /// Its path below the table's folder, with `/` between folders.
-    pub name: String,
-    /// Whether a deletion vector marks some of its rows as deleted.
-    pub has_deleted_rows: bool,
-}
-
 /// Data files of the current version of a Delta table, by its log: files that were withdrawn or compacted away may
-/// still be in its folder.
+/// still be in its folder. Each has its path below the folder, with `/` between folders, and whether a deletion vector marks
+/// some of its rows as deleted.
 ///
 /// # Errors
 /// [`Error::LogTable`] when the log cannot be read, or maps columns to other names in the files.
-pub fn live_files(folder: &Path) -> Result<Vec<LiveFile>, Error> {
+pub fn live_files(folder: &Path) -> Result<BTreeMap<String, bool>, Error> {
     let location = Location::at(folder)?;
     let load = async {
         let mut delta = DeltaTable::new(location.log_store()?);
@@ -34,11 +28,9 @@ pub fn live_files(folder: &Path) -> Result<Vec<LiveFile>, Error> {
             return Err(DeltaTableError::Generic(unsupported.into()));
         }
         let files = snapshot.log_data();
-        let live = files.iter().map(|view| LiveFile {
-            name: view.path().into_owned(),
-            has_deleted_rows: view.deletion_vector_descriptor().is_some(),
-        });
-        Ok(live.collect())
+        let live =
+            |view: LogicalFileView| (view.path().into_owned(), view.deletion_vector_descriptor().is_some());
+        Ok(files.iter().map(live).collect())
     };
     location.block_on(load).map_err(|source| Error::LogTable { source: Box::new(source) })
 }

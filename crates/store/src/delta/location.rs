@@ -19,7 +19,6 @@ use crate::delta::durable_fs::{self, Entry};
 use crate::delta::log_storage::LogStorage;
 use crate::error::Error;
 
-/// A store's or a table's location.
 #[derive(Debug, Clone)]
 pub(crate) struct Location {
     /// The folder itself, or the folder of the copies.
@@ -63,7 +62,6 @@ impl Location {
         Ok(Self { dir, bucket: None, runtime })
     }
 
-    /// A folder of this location.
     pub(crate) fn join(&self, name: &str) -> Self {
         let deeper = |bucket: &BucketLocation| BucketLocation {
             address: bucket.address.with_key(&joined(bucket.address.key(), name)),
@@ -128,7 +126,6 @@ impl Location {
         durable_fs::sync_dir(&self.dir).map_err(Error::io(&self.dir, "synced"))
     }
 
-    /// Whether a file is there.
     pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
         Ok(self.length(&self.dir.join(name))?.is_some())
     }
@@ -209,7 +206,6 @@ impl Location {
         }
     }
 
-    /// Deletes a file.
     pub(crate) fn delete(&self, path: &Path) -> Result<(), Error> {
         match &self.bucket {
             Some(bucket) => Ok(bucket
@@ -243,7 +239,6 @@ impl Location {
 }
 
 impl BucketLocation {
-    /// Asks for one key.
     fn request<T>(
         &self,
         key: &str,

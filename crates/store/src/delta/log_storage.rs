@@ -29,9 +29,7 @@ use futures::stream::{self, BoxStream};
 
 use crate::delta::durable_fs::{self, Entry};
 
-/// Folder of the log.
 pub(crate) const LOG: &str = "_delta_log";
-/// Folder of the digests.
 pub(crate) const DIGESTS: &str = "_digests";
 /// Digits of the version at the beginning of a log file's name.
 const VERSION_DIGITS: usize = 20;

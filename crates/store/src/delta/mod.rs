@@ -8,6 +8,5 @@ pub(crate) mod location;
 pub(crate) mod log_digests;
 pub(crate) mod log_storage;
 pub(crate) mod snapshot;
-pub(crate) mod snapshot_cache;
 pub(crate) mod table;
 pub(crate) mod versioned;

@@ -22,15 +22,13 @@ use crate::delta::file_stats::Stats;
 use crate::delta::location::Location;
 use crate::delta::log_digests::{self, LogDigests};
 use crate::delta::log_storage::{LOG, log_file};
-use crate::delta::snapshot::{DataFile, Snapshot};
-use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
+use crate::delta::snapshot::{DataFile, Snapshot, SnapshotCache, commit_file};
 use crate::error::Error;
 
 /// Attempts at a change before its error is returned, each from a fresh snapshot.
 const ATTEMPTS: u32 = 5;
 /// The same in a bucket, where no lock keeps others away.
 const ATTEMPTS_WITHOUT_LOCK: u32 = 30;
-/// The longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// The pause after the first attempt; it doubles.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -44,7 +42,6 @@ const CHECKPOINT: &str = "20";
 /// snapshot would both land and double their rows. Two transactions of one name never both land.
 const REWRITE: &str = "freeplay.rewrite";
 
-/// A table of the store.
 #[derive(Debug, Clone)]
 pub(crate) struct Table {
     pub(crate) name: &'static str,
@@ -53,14 +50,12 @@ pub(crate) struct Table {
     latest: SnapshotCache,
 }
 
-/// What a commit does.
 #[derive(Default)]
 pub(crate) struct Change<'a> {
     pub(crate) add: Vec<Add>,
     pub(crate) remove: Vec<&'a DataFile>,
     /// True for compaction: rows are moved, not changed.
     pub(crate) rearranges: bool,
-    /// The table's new description.
     pub(crate) describes: Option<Action>,
 }
 
@@ -102,7 +97,6 @@ impl Table {
         }
     }
 
-    /// A file without rows.
     fn empty(&self, version: u64) -> Result<Add, Error> {
         data_file::write(&self.location, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
     }
@@ -203,6 +197,7 @@ impl Table {
         &self,
         mut plan: impl FnMut(&Snapshot) -> Result<Change<'_>, Error>,
     ) -> Result<(), Error> {
+        let attempts = if self.location.is_bucket() { ATTEMPTS_WITHOUT_LOCK } else { ATTEMPTS };
         let mut pause = PAUSE;
         for attempt in 1.. {
             let snapshot = self.snapshot()?;
@@ -215,16 +210,12 @@ impl Table {
             }
             match self.commit(&snapshot, change) {
                 Ok(()) => break,
-                Err(error) if attempt < self.attempts() && is_conflict(&error) => std::thread::sleep(pause),
+                Err(error) if attempt < attempts && is_conflict(&error) => std::thread::sleep(pause),
                 Err(error) => return Err(self.failed("committed to")(error)),
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
         }
         Ok(())
-    }
-
-    fn attempts(&self) -> u32 {
-        if self.location.is_bucket() { ATTEMPTS_WITHOUT_LOCK } else { ATTEMPTS }
     }
 
     fn commit(&self, snapshot: &Snapshot, change: Change<'_>) -> Result<(), DeltaTableError> {

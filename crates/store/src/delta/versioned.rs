@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use arrow::array::{Int64Array, RecordBatch};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use records::row_schema::{self, FromCells, Row};
 
 use crate::error::Error;
-use records::row_schema::{self, FromCells, Row};
 
 /// The column that orders versions of a row; clocks may go back, commit numbers do not.
 pub(crate) const COMMIT: &str = "commit";

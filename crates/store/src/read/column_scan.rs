@@ -22,8 +22,7 @@ use records::{GapRecord, Status};
 
 use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
-use crate::handle::Store;
-use crate::read::join::Join;
+use crate::handle::{Join, Store};
 use crate::read::query::Query;
 use crate::read::scan::{self, Condition};
 
@@ -32,7 +31,7 @@ const JOINED: [&str; 2] = ["part_number", "serial_number"];
 /// Columns that a join needs besides those that it supplies.
 const NEEDED: [&str; 4] = ["tail_number", "position", "departure_utc", "flight_id"];
 
-/// Files that may hold records that fit, of one version of the table.
+/// Scan of the files that may hold matching records, in one version of the table.
 #[derive(Debug)]
 pub struct ColumnScan {
     store: Store,
@@ -49,9 +48,7 @@ pub struct ColumnScan {
 }
 
 impl Store {
-    /// Some columns of the records that fit, in parts of a file each.
-    ///
-    /// `query.last` asks for an order and is not heard.
+    /// Some columns of the matching records, file by file. `query.last` has no effect, since a scan has no order.
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
@@ -62,7 +59,7 @@ impl Store {
         Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), &names)?))
     }
 
-    /// The same of one version of the table.
+    /// The scan of one version of the table.
     pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query, wanted: &SchemaRef) -> ColumnScan {
         let is_joined = |column: &str| self.join.is_some() && JOINED.contains(&column);
         let (joined, mut stored): (Vec<_>, Vec<_>) =
@@ -94,17 +91,17 @@ impl Store {
 }
 
 impl ColumnScan {
-    /// How many files there are to read.
+    /// Number of files to read.
     pub fn file_count(&self) -> usize {
         self.files.len()
     }
 
-    /// Version of the store that they are of.
+    /// Version of the table that is read.
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// The rows of one that fit, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.
+    /// The matching rows of one file, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.
     ///
     /// # Errors
     /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
@@ -118,7 +115,7 @@ impl ColumnScan {
         rows.into_iter().map(|batch| Ok(with_largest_gaps(batch, parts)?)).collect()
     }
 
-    /// The rows of all that fit, each with its own gap, in one batch or more.
+    /// The matching rows of all files, each with its own gap, in one batch or more.
     pub(crate) fn read_all(&self) -> Result<Vec<RecordBatch>, Error> {
         // A joined condition applies to each file as soon as it is read, or all rows of the store would be held.
         scan::read_each(&self.files, &self.wanted, |file| self.read_file(file))

@@ -16,9 +16,6 @@ use crate::error::Error;
 const ROW: &str = "row";
 
 /// The named columns of batches of one schema as a Polars frame; times are microseconds.
-///
-/// # Errors
-/// [`Error::Arrow`] for a column that is missing or cannot be converted to text.
 pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame, Error> {
     let height = batches.iter().map(RecordBatch::num_rows).sum();
     let columns = names.iter().map(|name| column(batches, name));
@@ -42,9 +39,6 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
 
 /// The rows of all batches, sorted by the columns of `order`; rows that are equal in these keep their order. If `last` is
 /// given, only this number of rows from the end.
-///
-/// # Errors
-/// As [`frame`].
 pub(crate) fn sorted(
     batches: &[RecordBatch],
     order: &[&str],
@@ -67,9 +61,6 @@ pub(crate) fn sorted(
 }
 
 /// The distinct texts of a column, and the number of rows of each.
-///
-/// # Errors
-/// [`Error::Frame`] when there is no such column of texts.
 pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize)>, Error> {
     let groups = frame.group_by([name])?;
     let (values, rows) = (groups.keys(), groups.get_groups().iter().map(|group| group.len()));
@@ -79,9 +70,6 @@ pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize
 }
 
 /// Number of distinct combinations of values in the named columns.
-///
-/// # Errors
-/// [`Error::Frame`] when there is no such column.
 pub(crate) fn distinct(frame: &DataFrame, names: &[&str]) -> Result<usize, Error> {
     Ok(frame.group_by(names.iter().copied())?.get_groups().len())
 }

@@ -7,19 +7,16 @@ use std::collections::BTreeMap;
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::Int64Type;
+use records::row_schema::{self, FromCells, Row};
 
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::scan::Condition;
-use records::row_schema::{self, FromCells, Row};
 
 impl Store {
     /// Of the rows that meet some conditions, the newest of each name, by name; files that cannot hold one are passed over.
-    ///
-    /// # Errors
-    /// As [`Store::records`].
     pub(crate) fn newest<R: Row + FromCells>(
         &self,
         table: &Table,

@@ -2,8 +2,6 @@
 
 pub(crate) mod column_scan;
 pub(crate) mod frame;
-pub(crate) mod join;
 pub(crate) mod latest_rows;
 pub(crate) mod query;
 pub(crate) mod scan;
-pub(crate) mod store_read;

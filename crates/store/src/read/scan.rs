@@ -102,10 +102,8 @@ impl Store {
         read_file(path, schema, conditions)
     }
 
-    /// The same of files of one table, in their order. They are read by as many threads as the machine has.
-    ///
-    /// # Errors
-    /// As [`Store::read_file`].
+    /// The wanted columns of the matching rows of several files of one table, in the order of the files. As many threads read
+    /// them as the machine has processors.
     pub(crate) fn read_files(
         &self,
         files: &[PathBuf],
@@ -116,10 +114,7 @@ impl Store {
     }
 }
 
-/// What a function reads of each file, in the order of the files, one empty batch where that is nothing.
-///
-/// # Errors
-/// The first of the function's errors.
+/// What a function reads of each file, in the order of the files, one empty batch where that is nothing; or its first error.
 pub(crate) fn read_each(
     files: &[PathBuf],
     schema: &SchemaRef,

@@ -9,7 +9,8 @@ use arrow::compute::kernels::cmp::distinct;
 use arrow::compute::{concat_batches, filter_record_batch, or};
 use arrow::datatypes::{Schema, SchemaRef, TimestampMicrosecondType};
 use arrow::error::ArrowError;
-use records::{GapRecord, Status, stored_row};
+use records::row_schema::{self, FromCells, Row, from_batch, to_batch};
+use records::{GapRecord, LogRecord, RecordKey, Status, stored_row};
 
 use crate::delta::data_file;
 use crate::delta::file_stats::Stats;
@@ -21,9 +22,6 @@ use crate::handle::Store;
 use crate::read::column_scan::not_withdrawn;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
-use records::LogRecord;
-use records::RecordKey;
-use records::row_schema::{self, FromCells, Row, from_batch, to_batch};
 
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]

@@ -20,18 +20,34 @@ fn codes(store: &Store) -> Vec<String> {
 }
 
 #[test]
-fn a_sound_store_has_no_findings_and_is_counted() {
-    let (_dir, mut writer) = filled();
-    writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
-    writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(1))).unwrap();
-    writer.end_run(&run("c", "2026-11-20T02:00:00Z", Some(130))).unwrap();
+fn a_sound_store_has_no_findings_and_is_counted_from_the_empty_one_on() {
+    let (_dir, writer) = fresh();
+    assert_eq!(writer.store().verify(), []);
+    let info = writer.store().info().unwrap();
+    assert_eq!((info.records, info.logs, info.last_departure_utc, info.last_completed), (0, 0, None, None));
+    let (_dir, writer) = filled();
     assert_eq!(writer.store().verify(), []);
     let info = writer.store().info().unwrap();
     assert_eq!((info.records, info.flights, info.serials, info.tails, info.logs), (36, 12, 6, 2, 12));
     // A new table has a file without rows, so that other engines always find one.
     assert_eq!((info.files, info.version), (7, 6));
     assert_eq!((info.first_departure_utc, info.last_departure_utc), (Some(departure(0)), Some(departure(5))));
-    assert_eq!(info.last_completed.unwrap().run_id, "b");
+}
+
+#[test]
+fn the_last_completed_run_is_not_hidden_by_runs_under_a_wrong_clock_and_by_those_that_did_not_complete() {
+    let (_dir, mut writer) = fresh();
+    for (run_id, at, exit_code, expected) in [
+        ("ahead", "2131-01-01T04:00:00Z", 0, "ahead"),
+        ("a", "2026-03-01T04:00:00Z", 0, "a"),
+        ("b", "2026-03-03T04:00:00Z", 1, "b"),
+        ("interrupted", "2026-03-04T04:00:00Z", 130, "b"),
+        ("ten years back", "2016-03-03T05:00:00Z", 0, "b"),
+    ] {
+        writer.end_run(&run(run_id, at, Some(exit_code))).unwrap();
+        let completed = writer.store().info().unwrap().last_completed.unwrap();
+        assert_eq!(completed.run_id, expected, "after {run_id}");
+    }
 }
 
 /// Two commits of one row each per run: after fifty runs the run table alone needs a compaction, and the first
@@ -48,15 +64,6 @@ fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
     writer.compact().unwrap();
     assert!(!writer.store().needs_compaction().unwrap());
     assert_eq!(writer.store().table_files("runs").unwrap().len(), 1);
-}
-
-#[test]
-fn an_empty_store_is_sound_and_counts_zero() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = Store::create_or_open(dir.path()).unwrap();
-    assert_eq!(store.verify(), []);
-    let info = store.info().unwrap();
-    assert_eq!((info.records, info.logs, info.last_departure_utc, info.last_completed), (0, 0, None, None));
 }
 
 #[test]

@@ -120,36 +120,30 @@ fn the_columns_are_those_of_the_contract_in_its_order() {
     assert_eq!(names[..known.len()], known);
 }
 
+/// A missing column, a time beyond the calendar, which never wraps, and flags of numbers, which no release has written.
 #[test]
-fn a_time_beyond_the_calendar_is_an_error_and_never_wraps() {
-    let batch = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
-    let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
+fn a_batch_that_holds_no_records_is_an_error_that_names_the_column() {
+    let sound = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
+    let with = |name: &str, array: ArrayRef| {
+        let at = sound.schema().index_of(name).unwrap();
+        let (mut fields, mut arrays) = (sound.schema().fields().to_vec(), sound.columns().to_vec());
+        fields[at] = Arc::new(Field::new(name, array.data_type().clone(), false));
+        arrays[at] = array;
+        RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap()
+    };
+    let mut without = sound.clone();
+    without.remove_column(2);
     let beyond = TimestampMicrosecondArray::from(vec![i64::MAX]).with_timezone("UTC");
-    arrays[5] = Arc::new(beyond);
-    let batch = RecordBatch::try_new(batch.schema(), arrays).unwrap();
-    let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
-    assert!(error.starts_with("column `departure_utc`, row 0: 9223372036854775807 µs since 1970"), "{error}");
-}
-
-#[test]
-fn a_missing_column_is_named() {
-    let mut batch = to_batch::<GapRecord>(&[]).unwrap();
-    batch.remove_column(2);
-    let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
-    assert_eq!(error, "column `part_number` is missing");
-}
-
-/// Flags of numbers, which no release has written: an error, and no empty list.
-#[test]
-fn a_list_of_other_elements_is_refused() {
-    let batch = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
-    let at = batch.schema().index_of("flags").unwrap();
     let numbers = ListArray::from_iter_primitive::<Int64Type, _, _>([Some([Some(1)])]);
-    let mut fields = batch.schema().fields().to_vec();
-    fields[at] = Arc::new(Field::new("flags", numbers.data_type().clone(), false));
-    let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
-    arrays[at] = Arc::new(numbers);
-    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
-    let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
-    assert!(error.starts_with("column `flags` holds List"), "{error}");
+    for (batch, expected) in [
+        (without, "column `part_number` is missing"),
+        (
+            with("departure_utc", Arc::new(beyond)),
+            "column `departure_utc`, row 0: 9223372036854775807 µs since 1970",
+        ),
+        (with("flags", Arc::new(numbers)), "column `flags` holds List"),
+    ] {
+        let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
 }

@@ -21,7 +21,6 @@ const ABLE: (usize, usize) = (5, 3);
 const NEAR: usize = 8;
 const SHARP: f64 = 0.6;
 
-/// A step of one unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Found {
     /// Index of the unit.

@@ -37,7 +37,6 @@ pub struct FollowedQuantities {
     pub changes: Vec<QuantityChange>,
 }
 
-/// Follows all quantities of all units.
 pub(crate) fn follow(
     units: &FollowedUnits<'_>,
     fleet: &Units<'_>,

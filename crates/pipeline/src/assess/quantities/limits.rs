@@ -6,7 +6,6 @@ use records::Quantity;
 /// How a quantity is followed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Treatment {
-    /// What its limit is a share of.
     pub(crate) scale: Scale,
     /// Change from which there is a state, over the scale; none for a quantity that has no state.
     pub(crate) limit: Option<f64>,
@@ -37,7 +36,6 @@ impl Treatment {
         self.is_of_channel || self.is_of_position
     }
 
-    /// Treatment of a quantity under configured limits.
     pub(crate) fn of(quantity: Quantity, limits: &QuantityLimits) -> Self {
         let own = Self {
             scale: Scale::Median,

@@ -21,7 +21,6 @@ const COMPARED: [Quantity; 6] = [
     Quantity::LoadDelayS,
     Quantity::Nis,
 ];
-/// Fewest peers.
 const MIN_PEERS: usize = 6;
 /// Number of peers from which some of them are taken, evenly: they tell the median to a tenth of the spread, and a fleet of
 /// ten times as many units takes ten times as long, not a hundred times.
@@ -34,7 +33,6 @@ const LEAST_SPREAD: f64 = 0.7;
 /// Fewest units of a tail that make a difference the tail's, and their share.
 const TAIL: (usize, f64) = (3, 0.75);
 
-/// A unit's deviation from its peers.
 struct Deviation<'a> {
     row: &'a QuantityRow,
     quantity: Quantity,
@@ -74,7 +72,6 @@ pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> 
     tails.into_iter().chain(units).collect()
 }
 
-/// The deviations of the units that are asked for.
 fn deviations(
     rows: &[QuantityRow],
     quantity: Quantity,

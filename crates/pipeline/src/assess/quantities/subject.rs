@@ -16,9 +16,7 @@ use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// One quantity of one unit.
 pub(crate) struct Subject<'a> {
-    /// The unit.
     pub(crate) name: &'a UnitKey,
-    /// Its flights.
     unit: &'a FollowedFlights<'a>,
     pub(crate) quantity: Quantity,
     /// What limits are a share of, in the quantity's unit.
@@ -77,17 +75,8 @@ impl<'a> Subject<'a> {
             Scale::UsualLoad => unit.usual_load_n?,
             Scale::Median => median(values.iter().map(|v| v.value.abs()).collect()),
         };
-        let (fit, common) = (None, Vec::new());
-        (!values.is_empty() && scale > 0.0).then_some(Self {
-            name,
-            unit,
-            quantity,
-            scale,
-            treatment,
-            values,
-            fit,
-            common,
-        })
+        let (fit, common, is_followed) = (None, Vec::new(), !values.is_empty() && scale > 0.0);
+        is_followed.then_some(Self { name, unit, quantity, scale, treatment, values, fit, common })
     }
 
     /// Fits steps and drift to some values of the subject.
@@ -100,13 +89,11 @@ impl<'a> Subject<'a> {
         Some(self.treatment.limit? * self.scale)
     }
 
-    /// Name of a flight.
     pub(crate) fn flight_id(&self, departure_us: i64) -> Option<String> {
         let history = self.unit.history;
         history.flight_id(history.at(Timestamp::from_microsecond(departure_us).ok()?)?).map(str::to_owned)
     }
 
-    /// The tail at a departure.
     pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&'a str> {
         let at = self.unit.flights.partition_point(|(flown, _)| flown.departure_us() < departure_us);
         self.unit.place(self.unit.flights.get(at)?.0).tail_number.as_deref()
@@ -117,7 +104,6 @@ impl<'a> Subject<'a> {
         Some(self.unit.place(self.unit.flights.last()?.0))
     }
 
-    /// Tail of the last flight.
     pub(crate) fn tail(&self) -> Option<&'a str> {
         self.last_place()?.tail_number.as_deref()
     }

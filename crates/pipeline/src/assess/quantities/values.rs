@@ -12,9 +12,8 @@ use trend::Series;
 
 use crate::error::Error;
 use crate::fleet::builder;
-use crate::fleet::flight_row::FlightRow;
+use crate::fleet::flight_row::{FlightRow, TailPosition, UnitKey};
 use crate::fleet::histories::{Histories, History};
-use crate::fleet::places::{TailPosition, UnitKey};
 use crate::fleet::unit_rows::{at, number, of_store};
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
@@ -60,7 +59,6 @@ impl FlightValues {
     }
 }
 
-/// The columns of the values in some rows.
 pub(crate) struct ValueColumns {
     reasons: StringColumn,
     covariates: [Float64Array; COVARIATES.len()],
@@ -68,13 +66,11 @@ pub(crate) struct ValueColumns {
 }
 
 impl ValueColumns {
-    /// Their names.
     pub(crate) fn names() -> impl Iterator<Item = &'static str> {
         let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
         COVARIATES.into_iter().chain(["reason"]).chain(numbers)
     }
 
-    /// Those of some rows of the store.
     pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
         let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
         let [temperatures, lows, highs] = COVARIATES.map(numbers);
@@ -84,7 +80,6 @@ impl ValueColumns {
         Ok(Self { reasons, covariates: [temperatures?, lows?, highs?], quantities })
     }
 
-    /// The values of a row.
     pub(crate) fn row(&self, row: usize) -> FlightValues {
         let [temperatures, lows, highs] = &self.covariates;
         let load_n = at(lows, row).zip(at(highs, row)).map(|(low, high)| low.abs().max(high.abs()));
@@ -159,7 +154,6 @@ impl<'a> FollowedFlights<'a> {
     }
 }
 
-/// Followed flights by unit.
 pub(crate) type FollowedUnits<'a> = BTreeMap<&'a UnitKey, FollowedFlights<'a>>;
 
 /// The flights of each unit in the three years before a date, with it.

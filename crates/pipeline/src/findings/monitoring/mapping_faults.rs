@@ -37,7 +37,6 @@ pub struct MappingFault {
 }
 
 impl MappingFault {
-    /// The affected scope as text.
     pub(crate) fn scope(&self) -> String {
         match (&self.part_number, &self.tail_number, &self.position) {
             (Some(part), _, _) => format!("all actuators of part {part}"),
@@ -47,7 +46,6 @@ impl MappingFault {
         }
     }
 
-    /// The code and its frequency.
     pub(crate) fn evidence(&self) -> String {
         format!("{} on {} of the latest {} flights", self.reason, self.refused, self.flights)
     }

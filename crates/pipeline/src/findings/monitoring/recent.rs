@@ -11,7 +11,6 @@ use crate::fleet::flight_row::FlightRow;
 /// Maximum age of the flights: some months.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 
-/// One flight of one place.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct RecentFlight<'a> {
     pub(crate) departure_utc: Timestamp,

@@ -39,20 +39,19 @@ pub(crate) fn detect(recent: &RecentFlights<'_>) -> Vec<RepeatedSamples> {
             }
         }
     }
-    let mut found = Vec::new();
-    for ((one, other), positions) in pairs {
-        let (own, others) =
-            positions.iter().map(|(own, other)| ((*own).to_owned(), (*other).to_owned())).unzip();
-        found.push(RepeatedSamples {
+    let repeated = |((one, other), positions): ((Flown<'_>, Flown<'_>), BTreeSet<(&str, &str)>)| {
+        let places = positions.into_iter().map(|(own, other)| (own.to_owned(), other.to_owned()));
+        let (positions, other_positions) = places.unzip();
+        RepeatedSamples {
             tail_number: one.0.to_owned(),
             flight_id: one.2.to_owned(),
-            positions: own,
+            positions,
             other_tail_number: other.0.to_owned(),
             other_flight_id: other.2.to_owned(),
-            other_positions: others,
-        });
-    }
-    found
+            other_positions,
+        }
+    };
+    pairs.into_iter().map(repeated).collect()
 }
 
 /// Both flights with their positions.

@@ -21,7 +21,6 @@ const MAX_COMPARED_DAYS: f64 = 30.0;
 /// length, m: joints beside the actuator and the force of the check account for less.
 const CONTRADICTION: (f64, f64) = (0.3, 30e-6);
 
-/// An inspection as the table has it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InspectionRow {
     pub(crate) part_number: Option<String>,
@@ -37,7 +36,6 @@ impl InspectionRow {
         self.serial_number == unit.1 && (self.part_number.is_none() || self.part_number == unit.0)
     }
 
-    /// When it was made.
     pub(crate) fn date(&self) -> DateAhead {
         DateAhead::new(self.part_number.clone(), self.serial_number.clone(), "date_utc", self.date_utc)
     }
@@ -63,13 +61,9 @@ impl InspectionRow {
         };
         match self.estimate_before(records).0.filter(contradicts) {
             Some(gap_m) => {
-                let read = gap_m * 1e6;
-                (
-                    format!(
-                        "{measured} where the records before it read {read:.1} µm: find out which is wrong"
-                    ),
-                    true,
-                )
+                let read =
+                    format!("the records before it read {:.1} µm: find out which is wrong", gap_m * 1e6);
+                (format!("{measured} where {read}"), true)
             }
             None => (measured, false),
         }
@@ -125,9 +119,6 @@ fn plausible_play(text: &str) -> Result<f64, String> {
     Err(format!("`{text}` is not between {least} and {most} m: 64 µm are 64e-6"))
 }
 
-/// The configured table of inspections; none where none is configured.
-///
-/// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be right.
 pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
     let Some(file) = &config.document.logs.inspections else { return Ok(None) };

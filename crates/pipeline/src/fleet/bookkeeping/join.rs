@@ -41,7 +41,6 @@ pub struct Bookkeeping {
     flights: Arc<Flights>,
     /// Configured parts: a misspelt part number takes no record away from its unit.
     parts: Arc<BTreeSet<String>>,
-    /// Digest of the tables.
     digest: String,
 }
 

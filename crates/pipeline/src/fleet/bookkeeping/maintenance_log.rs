@@ -39,7 +39,6 @@ pub fn read(config: &Config) -> Result<MaintenanceLog, Error> {
     Ok(maintenance)
 }
 
-/// The dates of all entries.
 pub(crate) fn dates(log: &MaintenanceLog) -> impl Iterator<Item = DateAhead> {
     log.iter().flat_map(|((part, serial), events)| {
         events.iter().filter_map(|event| {
@@ -51,12 +50,11 @@ pub(crate) fn dates(log: &MaintenanceLog) -> impl Iterator<Item = DateAhead> {
 
 /// A row of the maintenance or the inspections table about a unit that was never installed.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct UnknownUnit {
     /// File of the table.
     pub table: String,
-    /// Part number, where the table has one.
     pub part_number: Option<String>,
-    /// Serial number.
     pub serial_number: String,
 }
 

@@ -12,7 +12,6 @@ use crate::fleet::histories::History;
 /// Longest time between the departures of a flight and of its record: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
-/// Microseconds of a day.
 pub(crate) const DAY_US: i64 = 86_400_000_000;
 
 /// Whether a time is midnight UTC, as of a date without a time.

@@ -13,7 +13,6 @@ use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day, unlogged_fligh
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{History, UnitKey};
 
-/// The operator's tables about units and flights.
 pub(crate) struct OperatorTables<'a> {
     maintenance: maintenance_log::MaintenanceLog,
     flights: &'a Flights,

@@ -101,7 +101,7 @@ pub(super) fn actuator(opened: &FlightLog<'_>, of_log: &Actuator) -> Result<Actu
     let (id, at) = (&opened.identity, &of_log.columns);
     let (installation, part) = opened.unit(of_log)?;
     let base = |channel: &'static str, column: Option<&String>, unit: &'static str| ChannelCheck {
-        log: opened.display_name().to_owned(),
+        log: opened.display_name.clone(),
         tail_number: id.flight.tail_number.to_string(),
         flight_id: id.flight.flight_id.to_string(),
         position: at.position.to_string(),
@@ -112,16 +112,10 @@ pub(super) fn actuator(opened: &FlightLog<'_>, of_log: &Actuator) -> Result<Actu
         ..ChannelCheck::default()
     };
     if !at.lacking.is_empty() {
-        let note =
-            Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
-        return Ok(ActuatorCheck {
-            found: vec![ChannelCheck {
-                note,
-                remedy: rejection::remedy("channel_unmapped"),
-                ..base("all", at.columns[0].as_ref(), "")
-            }],
-            ..ActuatorCheck::default()
-        });
+        let note = format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", "));
+        let (all, remedy) = (base("all", at.columns[0].as_ref(), ""), rejection::remedy("channel_unmapped"));
+        let found = vec![ChannelCheck { note: Some(note), remedy, ..all }];
+        return Ok(ActuatorCheck { found, ..ActuatorCheck::default() });
     }
     let a = opened.channels(of_log, part)?;
     let slope = if a.output_locked {

@@ -19,20 +19,17 @@ pub use channels::{ChannelCheck, RATIO};
 
 /// What was found in one log.
 #[derive(Debug, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct LogCheck {
-    /// Its name.
     pub name: String,
     /// Tail number, flight and departure.
     pub flight: [String; 3],
-    /// Number of rows.
     pub rows: usize,
     /// Time bases of its actuators, as text; equal neighbours once.
     pub clocks: Vec<String>,
     /// Whether all pages have checksums; `None` when the page headers cannot be read.
     pub has_checksums: Option<bool>,
-    /// Its columns with their types.
     pub column_types: Vec<(String, String)>,
-    /// Its channels.
     pub channels: Vec<ChannelCheck>,
     diagnostics: Vec<Diagnostic>,
     identified: Vec<Identified>,
@@ -150,7 +147,7 @@ fn mapping_fault((part, codes): (&PartNumber, &Vec<Option<&'static str>>)) -> Op
 }
 
 fn check_log(opened: &FlightLog<'_>) -> LogCheck {
-    let (id, name) = (&opened.identity, opened.display_name());
+    let (id, name) = (&opened.identity, opened.display_name.as_str());
     let mut seen = LogCheck {
         name: name.to_owned(),
         flight: [
