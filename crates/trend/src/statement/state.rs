@@ -92,7 +92,6 @@ fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
 
-/// A length, µm.
 fn um(m: f64) -> String {
     format!("{:.1} µm", 1e6 * m)
 }
