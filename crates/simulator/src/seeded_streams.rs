@@ -11,7 +11,6 @@ pub(crate) fn seeded_rng(seed: u64, names: &[&str]) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(key)
 }
 
-/// A seed derived from a seed and a path of names.
 pub(crate) fn derive_seed(seed: u64, names: &[&str]) -> u64 {
     use rand::RngCore;
     seeded_rng(seed, names).next_u64()
