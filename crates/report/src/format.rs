@@ -5,10 +5,8 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use records::uncertainty::NORMAL_95;
 
-/// Text for a missing value.
 pub(crate) const NO_DATA: &str = "no data";
 
-/// A value as text, or "no data".
 pub(crate) fn or_no_data<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| NO_DATA.to_owned(), text)
 }

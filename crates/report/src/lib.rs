@@ -3,7 +3,6 @@
 //! A [`Report`] is rendered to [`Page`]s; this crate reads and writes no files and estimates nothing. Every
 //! number is in the page as text; scripts only magnify. Templates escape every external string.
 
-mod assets;
 mod charts;
 mod file_names;
 mod format;
@@ -13,11 +12,10 @@ mod pages;
 mod state_badge;
 mod stats;
 
-pub use assets::assets;
 pub use charts::estimate_plot::{EstimatePlot, estimate_plot_html, estimate_plot_svg, min_max_buckets};
 pub use charts::frame::Frame;
 pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
-pub use page::{Error, Page, flight_path, unit_path};
+pub use page::{Error, Page, assets, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
 pub use pages::part::part_pages;
 pub use pages::tail::tail_page;
