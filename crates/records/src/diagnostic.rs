@@ -127,13 +127,6 @@ fn readable(text: &str) -> String {
     escape_cell(&limit_length(&masked, MAX_FIELD_CHARS)).into_owned()
 }
 
-/// A hint as people see it. It may have several lines; those after the first are indented, so that none looks like
-/// another diagnostic.
-fn readable_hint(text: &str) -> String {
-    let masked = mask_credentials(text);
-    escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).replace('\n', "\n  ")
-}
-
 /// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -156,7 +149,10 @@ impl fmt::Display for Diagnostic {
             }
         }
         if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {}", readable_hint(hint))?;
+            // A hint may have several lines. Those after the first are indented, so that none looks like another diagnostic.
+            let masked = mask_credentials(hint);
+            let lines = escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).replace('\n', "\n  ");
+            write!(f, "\nhint: {lines}")?;
         }
         Ok(())
     }

@@ -5,7 +5,6 @@
 
 pub mod assessment;
 mod diagnostic;
-mod flight;
 mod follow_up;
 mod gap_record;
 pub mod ids;
@@ -25,11 +24,10 @@ pub use assessment::report_rows;
 pub use assessment::trend_row::{ChangePoint, TrendRow};
 pub use assessment::unit_state::UnitState;
 pub use diagnostic::Diagnostic;
-pub use flight::Flight;
 pub use follow_up::alert_record::{AlertRecord, AlertStatus};
 pub use follow_up::work_event::{WorkEvent, WorkEventKind};
 pub use follow_up::work_request::WorkRequest;
-pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
+pub use gap_record::{Flight, GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Alias, Installation, Installations};
 pub use log_record::{LogOutcome, LogRecord};
