@@ -137,9 +137,8 @@ fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let floor = low - 0.06 * (high - low);
     let mut frame = axes(size, (0.0, end_s), (floor - 0.04 * (high - low), high));
     frame.numbers(8, "");
-    let curve = |values: &[f64]| curve(values, |at| plot.time_s(at), to_um);
-    curve(&plot.dx_m).into_iter().for_each(|piece| frame.line(piece, PEER));
-    curve(&plot.s_m).into_iter().for_each(|piece| frame.line(piece, GAP));
+    draw_curve(&mut frame, plot, &plot.dx_m, to_um, PEER);
+    draw_curve(&mut frame, plot, &plot.s_m, to_um, GAP);
     if let Some((upper, lower)) = plot.bounds_m {
         for (bound, colour) in [(upper, UPPER), (lower, LOWER)] {
             let pen = format!(r#"stroke="{colour}" stroke-width="2" stroke-dasharray="8 4""#);
@@ -171,8 +170,7 @@ fn load(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
     let mut frame = axes(size, (0.0, end_s), (low, high));
     frame.numbers(8, "time [s]");
-    let curves = curve(&plot.load_n, |at| plot.time_s(at), kn);
-    curves.into_iter().for_each(|piece| frame.line(piece, r##"fill="none" stroke="#1C2530""##));
+    draw_curve(&mut frame, plot, &plot.load_n, kn, r##"fill="none" stroke="#1C2530""##);
     frame.coloured_text([62.0, 14.0], "#1C2530", "load [kN]");
     frame.finish("")
 }
@@ -275,14 +273,12 @@ fn bucket_positions(samples: usize, buckets: usize) -> impl Iterator<Item = f64>
     (0..2 * buckets).map(move |k| (k as f64 + 0.5) * half)
 }
 
-/// Segments without missing values of a downsampled curve, against time in s.
-fn curve(values: &[f64], time_s: impl Fn(f64) -> f64, scale: impl Fn(f64) -> f64) -> Vec<Vec<(f64, f64)>> {
+/// Draws a downsampled curve against time, s, in pieces without missing values.
+fn draw_curve(frame: &mut Frame, plot: &EstimatePlot, values: &[f64], scale: impl Fn(f64) -> f64, pen: &str) {
     let points = min_max_buckets(values, buckets(values.len()));
-    points
-        .split(|(_, v)| v.is_nan())
-        .filter(|piece| !piece.is_empty())
-        .map(|piece| piece.iter().map(|(at, v)| (time_s(*at), scale(*v))).collect())
-        .collect()
+    for piece in points.split(|(_, v)| v.is_nan()).filter(|piece| !piece.is_empty()) {
+        frame.line(piece.iter().map(|(at, v)| (plot.time_s(*at), scale(*v))), pen);
+    }
 }
 
 #[cfg(test)]

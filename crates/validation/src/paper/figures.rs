@@ -17,7 +17,6 @@ const ZOOM_S: (f64, f64) = (60.0, 62.0);
 const SETTLED: usize = 250;
 /// Differences below this are drawn at the edge, µm.
 const LEAST_UM: f64 = 1e-4;
-/// A curve.
 const THIN: Shape = Shape::Line(1.0);
 
 /// Every figure with the name of its file: one panel, or two side by side.
@@ -55,13 +54,11 @@ fn over_time(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
     points.into_iter().map(|(at, value)| (at * STEP_S, value * scale)).collect()
 }
 
-/// The samples of the zoom.
 fn zoomed(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
     let samples = (ZOOM_S.0 / STEP_S) as usize..(ZOOM_S.1 / STEP_S) as usize;
     samples.map(|k| (k as f64 * STEP_S, values[k] * scale)).collect()
 }
 
-/// Points of a series, scaled.
 type Thin = fn(&[f64], f64) -> Vec<(f64, f64)>;
 
 /// Curves over the whole flight on the left, and over two seconds on the right.
@@ -138,7 +135,6 @@ fn against_load(claims: &Claims) -> Panel {
     scatter(claims, "load [kN]", &claims.flight.load_n.iter().map(|f| 1e-3 * f).collect::<Vec<_>>())
 }
 
-/// Convergence from several starts.
 fn convergence(all: &[Convergence]) -> Panel {
     const SHOWN_S: f64 = 0.6;
     let curve = |(one, colour): (&Convergence, &'static str)| {
