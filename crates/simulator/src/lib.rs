@@ -25,7 +25,7 @@ pub use error::Error;
 pub use fleet::fleet_events::{
     FaultKind, LogFault, Place, PlantedChange, PlayCheck, Replacement, Reshim, Swap,
 };
-pub use fleet::fleet_plan_types::{
+pub use fleet::fleet_plan::{
     ActuatorLog, ChannelUnit, Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
     SimulatedFlight,
 };

@@ -13,9 +13,9 @@ use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
 use crate::pages::work_list::{Group, capital, grouped, work};
+use crate::peers::Peers;
+use crate::removal_forecast::removal_forecast;
 use crate::state_badge::StateBadge;
-use crate::stats::peers::Peers;
-use crate::stats::removal_forecast::removal_forecast;
 
 /// Maximum number of rows on one page of the work list or of tails.
 const ROWS: usize = 100;

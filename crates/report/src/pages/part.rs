@@ -9,7 +9,7 @@ use crate::format::{date, micrometres};
 use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};
 use crate::pages::work_list::what;
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 /// Maximum number of units on one page.
 const UNITS: usize = 200;

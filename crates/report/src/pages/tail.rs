@@ -10,7 +10,7 @@ use crate::page::{Error, Page, tail_path};
 use crate::pages::fleet::logged;
 use crate::pages::quantities::{self, Change};
 use crate::pages::work_list::Group;
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 #[derive(Template)]
 #[template(path = "tail.html")]

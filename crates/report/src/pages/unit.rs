@@ -14,7 +14,7 @@ use crate::model::{Head, Report, TimedInterval, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::quantities::{self, Change, Chart, Level};
 use crate::pages::work_list::{capital, what};
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 #[derive(Template)]
 #[template(path = "unit.html")]

@@ -8,9 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::Error;
 use crate::fleet::fleet_events::{LogFault, PlantedChange, Replacement};
-use crate::fleet::fleet_plan_types::{
-    Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
-};
+use crate::fleet::fleet_plan::{Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight};
 use crate::fleet::fleet_spec::{Position, Spec};
 use crate::fleet::wear::{self, WearLaw};
 use crate::seeded_streams::{derive_seed, seeded_rng};
@@ -19,7 +17,7 @@ const HOUR_US: f64 = 3.6e9;
 const DAY_US: f64 = 24.0 * HOUR_US;
 
 /// A calendar in the making.
-pub(crate) struct Planner<'a> {
+struct Planner<'a> {
     spec: &'a Spec,
     start_us: i64,
     /// The unit of each seat, an index into `units`.
@@ -30,9 +28,20 @@ pub(crate) struct Planner<'a> {
     plan: Plan,
 }
 
+impl Plan {
+    /// Lays out the calendar of a fleet and the truth of each of its actuators.
+    ///
+    /// # Errors
+    /// The first fault of the spec.
+    pub fn new(spec: &Spec) -> Result<Self, Error> {
+        spec.check()?;
+        Planner::new(spec)?.plan()
+    }
+}
+
 impl<'a> Planner<'a> {
     /// Every tail on the ground with its first units.
-    pub(crate) fn new(spec: &'a Spec) -> Result<Self, Error> {
+    fn new(spec: &'a Spec) -> Result<Self, Error> {
         let units = fleet_units(spec)?;
         let wear = units.iter().map(|unit| seeded_rng(spec.seed, &["wear", &unit.serial_number])).collect();
         let mut planner = Self {
@@ -49,7 +58,7 @@ impl<'a> Planner<'a> {
     }
 
     /// All flights, in order of their number: a unit may change tails between two of them.
-    pub(crate) fn plan(mut self) -> Result<Plan, Error> {
+    fn plan(mut self) -> Result<Plan, Error> {
         for number in 1..=self.spec.flights_per_tail {
             self.exchange(number)?;
             self.inspect(number);

@@ -2,7 +2,6 @@
 
 pub(crate) mod fleet_events;
 pub(crate) mod fleet_plan;
-pub(crate) mod fleet_plan_types;
 pub(crate) mod fleet_spec;
 pub(crate) mod wear;
 
