@@ -112,7 +112,6 @@ pub(crate) fn trace(
 
 /// Writes normalized logs below a folder.
 #[pyfunction]
-#[pyo3(signature = (logs, output, config, compatible, jobs))]
 pub(crate) fn normalize(
     py: Python<'_>,
     logs: Vec<PathBuf>,
@@ -174,7 +173,6 @@ pub(crate) fn run_summary(
 
 /// The nightly run on this machine; its summary as JSON.
 #[pyfunction]
-#[pyo3(signature = (config, jobs, redo, retry, wait_s))]
 pub(crate) fn run(
     py: Python<'_>,
     config: &Config,

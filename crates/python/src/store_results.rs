@@ -52,7 +52,6 @@ fn external(
 
 /// Stored records that fit.
 #[pyfunction]
-#[pyo3(signature = (config, texts, since, until, last))]
 pub(crate) fn records(
     py: Python<'_>,
     config: &Config,
@@ -81,7 +80,6 @@ pub(crate) fn records(
 
 /// Trends of the store, or of an external estimates table; one row for each unit, or for each query.
 #[pyfunction]
-#[pyo3(signature = (estimates, config, units, as_of, queries))]
 pub(crate) fn trend(
     py: Python<'_>,
     estimates: Option<&Bound<'_, PyAny>>,
@@ -106,7 +104,6 @@ pub(crate) fn trend(
 /// What `trend` shows besides the gap: every followed quantity of the selected units, or what changed on units, tails and
 /// parts.
 #[pyfunction]
-#[pyo3(signature = (config, units, as_of, only_changes))]
 pub(crate) fn followed(
     py: Python<'_>,
     config: &Config,

@@ -18,16 +18,16 @@ pub struct Diagnostic {
     #[serde(rename = "what", serialize_with = "serialize_masked")]
     pub message: String,
     /// The file: a log, a table, the configuration.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub file: Option<String>,
     /// Line and column in a text file, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<(usize, usize)>,
     /// The text of that line.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub text: Option<String>,
     /// The column of a table or log.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub column: Option<String>,
     /// The row: of a log from 0, of a table from 1, header excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -36,18 +36,17 @@ pub struct Diagnostic {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_group: Option<u64>,
     /// The value that was found.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub found: Option<String>,
     /// The value that was expected.
     #[serde(
-        default,
         rename = "wanted",
         skip_serializing_if = "Option::is_none",
         serialize_with = "serialize_masked_option"
     )]
     pub expected: Option<String>,
     /// Instruction that resolves the error.
-    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub hint: Option<String>,
 }
 
@@ -73,15 +72,13 @@ impl Diagnostic {
 
     /// Column, row and row group as one phrase; `None` when none is known.
     pub fn location(&self) -> Option<String> {
-        let parts: Vec<String> = [
+        let parts = [
             self.column.as_ref().map(|c| format!("column `{c}`")),
             self.row.map(|r| format!("row {r}")),
             self.row_group.map(|g| format!("row group {g}")),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        (!parts.is_empty()).then(|| parts.join(", "))
+        ];
+        let known: Vec<String> = parts.into_iter().flatten().collect();
+        (!known.is_empty()).then(|| known.join(", "))
     }
 }
 
@@ -130,13 +127,6 @@ fn readable(text: &str) -> String {
     escape_cell(&limit_length(&masked, MAX_FIELD_CHARS)).into_owned()
 }
 
-/// A hint as people see it. It may have several lines; those after the first are indented, so that none looks like
-/// another diagnostic.
-fn readable_hint(text: &str) -> String {
-    let masked = mask_credentials(text);
-    escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).replace('\n', "\n  ")
-}
-
 /// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -159,7 +149,10 @@ impl fmt::Display for Diagnostic {
             }
         }
         if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {}", readable_hint(hint))?;
+            // A hint may have several lines. Those after the first are indented, so that none looks like another diagnostic.
+            let masked = mask_credentials(hint);
+            let lines = escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).replace('\n', "\n  ");
+            write!(f, "\nhint: {lines}")?;
         }
         Ok(())
     }

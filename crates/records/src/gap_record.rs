@@ -5,10 +5,26 @@ use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize};
 use strum::{EnumString, IntoStaticStr};
 
-use crate::flight::Flight;
-use crate::ids::{PartNumber, Position, SerialNumber};
+use crate::ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 use crate::row_schema::{self, Cells as _, text_cell};
 use crate::stored_row;
+
+stored_row! {
+    /// Identity of a flight, and its hours if known.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    pub struct Flight {
+        /// The aircraft.
+        pub tail_number: TailNumber,
+        /// The operator's flight identifier, unique within the tail.
+        pub flight_id: FlightId,
+        /// Departure.
+        pub departure_utc: Timestamp,
+        /// Length of the flight, hours.
+        pub flight_hours: Option<f64>,
+        /// The tail's total hours after the flight.
+        pub tail_hours_end: Option<f64>,
+    }
+}
 
 /// Whether the flight allows an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr, EnumString)]

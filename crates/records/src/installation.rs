@@ -99,28 +99,21 @@ impl Installations {
     /// # Errors
     /// Every contradiction, in row order: see [`Error`].
     pub fn new(mut rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
-        let mut errors: Vec<Error> =
-            rows.iter().enumerate().filter_map(|(i, r)| reversed(i + 1, r)).collect();
-        errors.extend(clashes(&rows, |r| (&r.tail_number, &r.position)).into_iter().map(|(row, other)| {
-            let later = &rows[other - 1];
-            Error::PositionTaken {
-                row,
-                other,
-                tail: later.tail_number.clone(),
-                position: later.position.clone(),
-                at: later.installed_utc,
-            }
+        let reversed = |(row, of): (usize, &Installation)| {
+            let removed = of.removed_utc.filter(|removed| *removed < of.installed_utc)?;
+            let (serial, installed) = (of.serial_number.clone(), of.installed_utc);
+            Some(Error::Reversed { row, serial, installed, removed })
+        };
+        let mut errors: Vec<Error> = (1..).zip(&rows).filter_map(reversed).collect();
+        errors.extend(clashes(&rows, place).into_iter().map(|(row, other)| {
+            let Installation { tail_number: tail, position, installed_utc: at, .. } = rows[other - 1].clone();
+            Error::PositionTaken { row, other, tail, position, at }
         }));
         errors.extend(clashes(&rows, |r| (&r.part_number, &r.serial_number)).into_iter().map(
             |(row, other)| {
-                let later = &rows[other - 1];
-                Error::UnitTwice {
-                    row,
-                    other,
-                    part: later.part_number.clone(),
-                    serial: later.serial_number.clone(),
-                    at: later.installed_utc,
-                }
+                let Installation { part_number: part, serial_number: serial, installed_utc: at, .. } =
+                    rows[other - 1].clone();
+                Error::UnitTwice { row, other, part, serial, at }
             },
         ));
         if !errors.is_empty() {
@@ -183,8 +176,7 @@ impl Installations {
         position: &Position,
         at: Timestamp,
     ) -> Option<&Installation> {
-        let rows = self.of_position(tail.as_str(), position.as_str());
-        rows.iter().find(|installation| installation.covers(at))
+        self.of_position(tail.as_str(), position.as_str()).iter().find(|installation| installation.covers(at))
     }
 
     /// Every installation of a unit, the earliest first; where the part number is not known, of all units with the serial
@@ -256,8 +248,7 @@ fn follow_modifications(rows: &mut [Installation]) {
             && earlier.removed_utc == Some(next.installed_utc);
         if is_modified {
             let (part, serial) = next.unit();
-            let today = (part.clone(), serial.clone());
-            rows[later - 1].today = Some(today);
+            rows[later - 1].today = Some((part.clone(), serial.clone()));
         }
     }
 }
@@ -265,12 +256,6 @@ fn follow_modifications(rows: &mut [Installation]) {
 /// Start and end, the end of a unit that is still installed last: an installation without length is before one that follows.
 fn period(installation: &Installation) -> (Timestamp, Timestamp) {
     (installation.installed_utc, installation.removed_utc.unwrap_or(Timestamp::MAX))
-}
-
-fn reversed(row: usize, installation: &Installation) -> Option<Error> {
-    let removed = installation.removed_utc.filter(|removed| *removed < installation.installed_utc)?;
-    let serial = installation.serial_number.clone();
-    Some(Error::Reversed { row, serial, installed: installation.installed_utc, removed })
 }
 
 /// Pairs of row numbers, counted from 1, that claim the same key at the same time.

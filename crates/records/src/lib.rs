@@ -3,10 +3,9 @@
 //! This crate holds no mathematics and opens no file. Identifiers are distinct types, so a tail number cannot
 //! be passed where a serial number is expected.
 
+mod alert_record;
 pub mod assessment;
 mod diagnostic;
-mod flight;
-mod follow_up;
 mod gap_record;
 pub mod ids;
 pub mod installation;
@@ -16,7 +15,9 @@ mod run_record;
 pub mod sanitize;
 pub mod time;
 pub mod uncertainty;
+mod work_request;
 
+pub use alert_record::{AlertRecord, AlertStatus};
 pub use assessment::action::Action;
 pub use assessment::quantity_row::{
     ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep, significant,
@@ -25,13 +26,10 @@ pub use assessment::report_rows;
 pub use assessment::trend_row::{ChangePoint, TrendRow};
 pub use assessment::unit_state::UnitState;
 pub use diagnostic::Diagnostic;
-pub use flight::Flight;
-pub use follow_up::alert_record::{AlertRecord, AlertStatus};
-pub use follow_up::work_event::{WorkEvent, WorkEventKind};
-pub use follow_up::work_request::WorkRequest;
-pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
+pub use gap_record::{Flight, GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Alias, Installation, Installations};
 pub use log_record::{LogOutcome, LogRecord};
 pub use run_record::RunRecord;
 pub use time::sample_time_s;
+pub use work_request::{WorkEvent, WorkEventKind, WorkRequest};

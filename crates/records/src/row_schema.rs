@@ -387,8 +387,8 @@ cell!(Option<String>, DataType::Utf8, nullable: true, |cells| cells
     .iter()
     .map(|c| c.as_deref())
     .collect::<StringArray>());
-cell!(Vec<String>, DataType::List(list_element()), nullable: false, |cells| texts(cells));
-cell!(Vec<f64>, DataType::List(number_element()), nullable: true, |cells| numbers(cells));
+cell!(Vec<String>, DataType::List(element(DataType::Utf8)), nullable: false, |cells| texts(cells));
+cell!(Vec<f64>, DataType::List(element(DataType::Float64)), nullable: true, |cells| numbers(cells));
 cell!(f64, DataType::Float64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Float64Array>());
 cell!(Option<f64>, DataType::Float64, nullable: true, |cells| cells
     .iter()
@@ -463,9 +463,9 @@ impl<T> Cells for NoColumn<T> {
     }
 }
 
-/// Element of a list of texts, as Delta Lake names it.
-fn list_element() -> Arc<Field> {
-    Arc::new(Field::new("element", DataType::Utf8, true))
+/// Element of a list, as Delta Lake names it.
+fn element(data_type: DataType) -> Arc<Field> {
+    Arc::new(Field::new("element", data_type, true))
 }
 
 /// Type of every time: microseconds, UTC.
@@ -480,19 +480,15 @@ fn times(times: impl Iterator<Item = Option<Timestamp>>) -> TimestampMicrosecond
 
 /// Lists of numbers; an empty one is a null.
 fn numbers(cells: &[&Vec<f64>]) -> ListArray {
-    let mut lists = ListBuilder::new(Float64Builder::new()).with_field(number_element());
+    let mut lists = ListBuilder::new(Float64Builder::new()).with_field(element(DataType::Float64));
     for numbers in cells {
         lists.append_option((!numbers.is_empty()).then(|| numbers.iter().map(|number| Some(*number))));
     }
     lists.finish()
 }
 
-fn number_element() -> Arc<Field> {
-    Arc::new(Field::new("element", DataType::Float64, true))
-}
-
 fn texts(cells: &[&Vec<String>]) -> ListArray {
-    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(list_element());
+    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(element(DataType::Utf8));
     for texts in cells {
         lists.append_value(texts.iter().map(Some));
     }

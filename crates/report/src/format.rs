@@ -5,10 +5,8 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use records::uncertainty::NORMAL_95;
 
-/// Text for a missing value.
 pub(crate) const NO_DATA: &str = "no data";
 
-/// A value as text, or "no data".
 pub(crate) fn or_no_data<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| NO_DATA.to_owned(), text)
 }
@@ -123,15 +121,9 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_value_reads_no_data() {
-        assert_eq!(level(None, Some(1e-6)), "no data");
-        assert_eq!(micrometres_or(None), "no data");
-    }
-
-    #[test]
-    fn months_follow_the_calendar_across_the_year() {
+    fn a_missing_value_reads_no_data_and_months_follow_the_calendar_across_the_year() {
+        assert_eq!([level(None, Some(1e-6)), micrometres_or(None)], ["no data"; 2]);
         let t: Timestamp = "2026-11-30T23:59:00Z".parse().unwrap();
-        let day = |months| date(month(t, months).unwrap());
-        assert_eq!((day(0), day(2)), ("2026-11-01".to_owned(), "2027-01-01".to_owned()));
+        assert_eq!([0, 2].map(|months| date(month(t, months).unwrap())), ["2026-11-01", "2027-01-01"]);
     }
 }

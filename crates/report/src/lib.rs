@@ -3,25 +3,24 @@
 //! A [`Report`] is rendered to [`Page`]s; this crate reads and writes no files and estimates nothing. Every
 //! number is in the page as text; scripts only magnify. Templates escape every external string.
 
-mod assets;
 mod charts;
 mod file_names;
 mod format;
 mod model;
 mod page;
 mod pages;
+mod peers;
+mod removal_forecast;
 mod state_badge;
-mod stats;
 
-pub use assets::assets;
 pub use charts::estimate_plot::{EstimatePlot, estimate_plot_html, estimate_plot_svg, min_max_buckets};
 pub use charts::frame::Frame;
 pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
-pub use page::{Error, Page, flight_path, unit_path};
+pub use page::{Error, Page, assets, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
 pub use pages::part::part_pages;
 pub use pages::tail::tail_page;
 pub use pages::unit::unit_page;
+pub use peers::Peers;
+pub use removal_forecast::removal_forecast;
 pub use state_badge::StateBadge;
-pub use stats::peers::Peers;
-pub use stats::removal_forecast::removal_forecast;

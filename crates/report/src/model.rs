@@ -11,7 +11,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 use crate::charts::frame::day;
-use crate::format::{level, or_no_data};
+use crate::format::or_no_data;
 use crate::state_badge::StateBadge;
 
 /// Content of a report. Serialised, it is `report.json`; field names there follow the first version.
@@ -173,11 +173,20 @@ impl Event {
     }
 }
 
+/// What every page has: the way to the folder of the report, its title and its footer.
+pub(crate) struct Head {
+    pub(crate) root: &'static str,
+    pub(crate) title: String,
+    pub(crate) footer: String,
+}
+
 impl Report {
-    /// Footer of a page: time, program and store version.
-    pub(crate) fn footer(&self) -> String {
+    /// Head of a page, with time, program and store version in its footer.
+    pub(crate) fn head(&self, root: &'static str, title: String) -> Head {
         let version = self.store_version.map_or_else(String::new, |v| format!(" from store version {v}"));
-        format!("Made {} UTC by {}{version}.", crate::format::minute(self.made_utc), self.program)
+        let footer =
+            format!("Made {} UTC by {}{version}.", crate::format::minute(self.made_utc), self.program);
+        Head { root, title, footer }
     }
 
     /// Units by part number; those without one under `–`.
@@ -200,7 +209,6 @@ impl Report {
 }
 
 impl UnitView {
-    /// Tail and position.
     pub(crate) fn place(&self) -> String {
         let words = [self.row.tail_number.as_deref(), self.row.position.as_deref()];
         words.into_iter().flatten().collect::<Vec<_>>().join(" ")
@@ -212,29 +220,14 @@ impl UnitView {
         self.flights.iter().filter_map(gap).collect()
     }
 
-    /// Gap divided by limit.
-    pub(crate) fn share(&self) -> Option<f64> {
-        Some(self.row.gap_m? / self.row.limit_m?)
-    }
-
     /// Gap divided by limit, as text.
     pub(crate) fn share_text(&self) -> String {
-        or_no_data(self.share(), |share| format!("{:.0} %", 100.0 * share))
+        let share = self.row.gap_m.zip(self.row.limit_m).map(|(gap_m, limit_m)| gap_m / limit_m);
+        or_no_data(share, |share| format!("{:.0} %", 100.0 * share))
     }
 
-    /// Gap with its 90 % interval, as text.
-    pub(crate) fn gap_text(&self) -> String {
-        level(self.row.gap_m, self.row.gap_se_m)
-    }
-
-    /// State to show.
     pub(crate) fn badge(&self) -> StateBadge {
         StateBadge::from_state(self.row.state)
-    }
-
-    /// Whether the unit belongs on the work list.
-    pub(crate) fn needs_work(&self) -> bool {
-        self.row.action.is_some() || self.open_request().is_some()
     }
 
     /// The latest work request that is not closed.

@@ -22,15 +22,22 @@ impl Page {
     }
 }
 
+/// The files shared by all pages: style sheet and script; and the licence of uPlot (MIT), which pages of single flights contain.
+pub fn assets() -> Vec<Page> {
+    let files = [
+        ("assets/report.css", include_str!("../assets/report.css")),
+        ("assets/report.js", include_str!("../assets/report.js")),
+        ("assets/uplot-LICENSE.txt", include_str!("../assets/uplot-LICENSE.txt")),
+    ];
+    files.map(|(path, body)| Page { path: path.to_owned(), body: body.into() }).into()
+}
+
 /// Why a page could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A template could not be rendered.
     #[error("a page cannot be written: {0}")]
     Template(#[from] askama::Error),
-    /// The data of a plot could not be serialised.
-    #[error("the data of a plot cannot be written: {0}")]
-    Json(#[from] serde_json::Error),
 }
 
 /// Path of a unit's page, relative to the report folder.

@@ -12,7 +12,6 @@ impl StateBadge {
         Self(word.map(|word| word.parse().unwrap_or(State::Unassessed)))
     }
 
-    /// Word shown to readers.
     pub(crate) fn word(self) -> &'static str {
         self.0.map_or("removed", State::as_str)
     }

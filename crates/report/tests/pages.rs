@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use records::assessment::action::Action;
-use records::report_rows::ReportTailRow;
+use records::report_rows::{ReportInspectionRow, ReportTailRow};
 use records::row_schema::NoColumn;
 use records::{TrendRow, WorkRequest};
 use report::{Page, Peers, Report, UnitView, fleet_pages, part_pages, tail_page, unit_page, unit_path};
@@ -133,15 +133,12 @@ fn an_open_request_is_on_the_work_list_and_on_the_page_of_its_unit() {
         tail_number: Some("N1".to_owned()),
         position: Some(HOSTILE.to_owned()),
         quantity: "gap".to_owned(),
-        finding: None,
         opened_utc: "2026-11-01T04:13:00Z".parse().unwrap(),
         by: Some(HOSTILE.to_owned()),
         reason: Some(HOSTILE.to_owned()),
         until_utc: Some("2027-01-31T00:00:00Z".parse().unwrap()),
-        due_utc: None,
         changed_utc: "2026-11-02T00:00:00Z".parse().unwrap(),
-        closed_by: None,
-        closed_utc: None,
+        ..WorkRequest::default()
     };
     let mut normal = unit("A", Some("normal"));
     normal.work_requests = vec![opened("W3", "closed"), opened("W8", "deferred")];
@@ -153,6 +150,23 @@ fn an_open_request_is_on_the_work_list_and_on_the_page_of_its_unit() {
     assert!(html.contains("W3") && html.contains(deferred), "{html}");
     assert!(!html.contains("<script>"));
     assert!(!unit_text(&report, 1).contains("ork request"));
+}
+
+/// Differences of 1, 2 and 3 µm: mean 2, standard deviation 1, half of the 90 % interval 1.645/√3, by hand.
+#[test]
+fn three_inspections_state_a_bias_and_two_do_not() {
+    let check = |um: f64| ReportInspectionRow {
+        play_m: 50e-6,
+        estimate_m: Some(50e-6 + 1e-6 * um),
+        ..ReportInspectionRow::default()
+    };
+    for (differences, words) in [(&[1.0, 2.0, 3.0][..], "3 pairs: 2.0 ± 0.9 µm"), (&[0.0, 0.0], "at least 3")]
+    {
+        let inspections = differences.iter().map(|um| check(*um)).collect();
+        let checked = UnitView { inspections, ..unit("A", Some("normal")) };
+        let html = index(&Report { inspections_given: true, ..report(vec![checked]) });
+        assert!(html.contains(words), "{html}");
+    }
 }
 
 #[test]

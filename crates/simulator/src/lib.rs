@@ -22,15 +22,16 @@ mod seeded_streams;
 mod sensors;
 
 pub use error::Error;
-pub use fleet::fleet_events::{FaultKind, LogFault, Place, PlayCheck, Replacement, Reshim, Swap};
-pub use fleet::fleet_plan_types::{
+pub use fleet::fleet_events::{
+    FaultKind, LogFault, Place, PlantedChange, PlayCheck, Replacement, Reshim, Swap,
+};
+pub use fleet::fleet_plan::{
     ActuatorLog, ChannelUnit, Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
     SimulatedFlight,
 };
 pub use fleet::fleet_spec::{
     MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
 };
-pub use fleet::planted_change::PlantedChange;
 pub use fleet::wear::WearLaw;
 pub use flight::{Flight, check, simulate};
 pub use load::flight_profile::Profile;

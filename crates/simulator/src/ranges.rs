@@ -1,63 +1,23 @@
-//! Ranges of the numbers of a specification: one table for all keys.
+//! Ranges of the numbers of a specification: one table, `ranges.toml`, for all keys.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use crate::error::Error;
 
-/// Keys whose numbers are above zero, by the ends of their paths.
-const POSITIVE: &str = "\
-    flights_per_tail flights_per_log days_between_flights flight_hours from_flight stroke_m \
-    hysteresis_length periodic.period lead_m reference_radius_m limit_m life_hours exponent stiffness_factor \
-    friction_factor force_n motor_mass_kg screw_mass_kg stiffness_n_per_m worn_at_m[1] depth_m \
-    reference_m grease_m_per_s warm_up_s travel_m speed_m_per_s position_hz speed_hz force_limit_n \
-    speed_limit_m_per_s";
+/// The table: ends of the paths of keys.
+#[derive(Deserialize)]
+struct Ranges {
+    positive: Vec<String>,
+    not_negative: Vec<String>,
+    between: BTreeMap<String, [f64; 2]>,
+}
 
-/// Keys whose numbers are zero or more.
-const NOT_NEGATIVE: &str = "\
-    tail_hours load_n rms lines.amplitude lines.phase_walk_rad noise_rms resolution spikes_per_minute \
-    freezes_per_minute freeze_s hysteresis clip coloured_rms jitter_s tick_s spread.load_bias_n \
-    spread.nonlinearity_m spread.drift_m wear_scatter_m rate_m_per_hour amplitude_m onset_hours \
-    load_factor unit_hours damping_n_s_per_m parts.gap_m units.gap_m \
-    replacements.gap_m reshims.gap_m worn_m dry_n viscous_n_s_per_m grease_n";
-
-/// Least and largest value of other keys. A number of no list must be finite.
-const RANGES: &[(&str, f64, f64)] = &[
-    ("flight_hours_spread", 0.0, 0.9),
-    ("duration_s", 5.0, 20e3),
-    ("sample_rate_hz", 10.0, 5e3),
-    ("gust_share", 0.0, 2.0),
-    ("gust_hz", 0.01, 20.0),
-    ("trim_share", 0.0, 0.2),
-    ("stick_share", 0.0, 0.5),
-    ("hinge_share", 0.0, 0.4),
-    ("rest_share", 0.0, 0.9),
-    ("rest_s", 1.0, 1e3),
-    ("low_hz", 0.5, 500.0),
-    ("high_hz", 0.5, 500.0),
-    ("lines.frequency_hz", 0.5, 500.0),
-    ("gain_error", -0.5, 0.5),
-    ("delay_s", -0.5, 0.5),
-    ("dropout_share", 0.0, 0.5),
-    ("lag_s", 0.0, 1.0),
-    ("rate_hz", 0.0, 5e3),
-    ("coloured_hz", 1e-3, 1e3),
-    ("spread.stiffness", 0.0, 0.3),
-    ("spread.load_gain", 0.0, 0.1),
-    ("spread.skew_s", 0.0, 0.05),
-    ("spread.friction", 0.0, 1.0),
-    ("spread.no_reversal_share", 0.0, 1.0),
-    ("share", 0.0, 1.0),
-    ("lower_stiffness_factor", 0.2, 5.0),
-    ("stiffness_drift", -0.5, 1.0),
-    ("gap_drift", -1.0, 10.0),
-    ("stiffness_phase_factors", 0.2, 5.0),
-    ("load_share", 0.0, 1.0),
-    ("backdriven_load_share", 0.0, 1.0),
-    ("asymmetry", -0.9, 0.9),
-    ("cold_factor", 0.1, 100.0),
-    ("ratio", 1.0, 10.0),
-];
+static RANGES: LazyLock<Result<Ranges, toml::de::Error>> =
+    LazyLock::new(|| toml::from_str(include_str!("ranges.toml")));
 
 /// Keys of one table of which the second is not below the first.
 const ORDERED: [(&str, &str); 2] = [("low_hz", "high_hz"), ("from_flight", "to_flight")];
@@ -100,12 +60,14 @@ fn check_value(path: &str, value: &Value) -> Result<(), Error> {
 fn check_number(path: &str, value: f64) -> Result<(), Error> {
     // Without the places in lists.
     let names: String = path.split(['[', ']']).step_by(2).collect();
-    let is = |key: &str| ends_with(path, key) || ends_with(&names, key);
-    let (is_in_range, must) = if let Some((_, least, most)) = RANGES.iter().find(|(key, ..)| is(key)) {
+    let is = |key: &String| ends_with(path, key) || ends_with(&names, key);
+    let ranges = RANGES.as_ref().map_err(|e| Error::Unwritable { problem: e.to_string() })?;
+    let (is_in_range, must) = if let Some((_, [least, most])) = ranges.between.iter().find(|(key, _)| is(key))
+    {
         ((*least..=*most).contains(&value), format!("between {least} and {most}"))
-    } else if POSITIVE.split(' ').any(is) {
+    } else if ranges.positive.iter().any(is) {
         (value > 0.0, "greater than zero and finite".to_owned())
-    } else if NOT_NEGATIVE.split(' ').any(is) {
+    } else if ranges.not_negative.iter().any(is) {
         (value >= 0.0, "zero or more and finite".to_owned())
     } else {
         (true, "finite".to_owned())
@@ -171,8 +133,8 @@ mod tests {
             let spec: Spec = toml::from_str(text).unwrap();
             paths("", &Value::try_from(spec).unwrap(), &mut found);
         }
-        let ranged = RANGES.iter().map(|(key, ..)| *key);
-        for key in ranged.chain(POSITIVE.split(' ')).chain(NOT_NEGATIVE.split(' ')) {
+        let Ranges { positive, not_negative, between } = RANGES.as_ref().unwrap();
+        for key in between.keys().chain(positive).chain(not_negative) {
             let key = key.trim_end_matches("[1]");
             assert!(found.iter().any(|path| ends_with(path, key)), "no key ends with {key}");
         }

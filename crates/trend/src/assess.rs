@@ -4,7 +4,6 @@ use crate::data::series::{DAY_US, Series};
 use crate::error::Error;
 use crate::math::{NORMAL_95, normal_cdf};
 use crate::measured::exceedance::Exceedance;
-use crate::measured::level::Level;
 use crate::measured::rise::Rise;
 use crate::prior::{FleetPrior, UsageAxis};
 use crate::settings::Settings;
@@ -43,9 +42,9 @@ pub fn assess(
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
     });
     let mut found = with_forecast(&unit, settings, elapsed_hours);
-    let earliest = found.crossing.and_then(|crossing| crossing.p05_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
     let growth_probability = rises.or(found.growth_probability).unwrap_or_default();
+    let earliest = found.crossing.and_then(|crossing| crossing.p05_hours);
     let earliest =
         earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
     (found.state, found.reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
@@ -61,8 +60,11 @@ pub fn assess(
         installation_sd_m: unit.prior.bias_sd_m,
         law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, found.wear == WearStatus::Wearing)),
         elapsed_hours,
-        over_limit_probability: over_limit(unit.measured.level, unit.prior.bias_sd_m, settings.limit_m)
-            .map(|measured| measured.max(by_forecast)),
+        over_limit_probability: unit.measured.level.map(|level| {
+            // The installation adds to the error of a measured level.
+            let error_m = level.se_m.hypot(unit.prior.bias_sd_m).max(f64::MIN_POSITIVE);
+            normal_cdf((level.gap_m - settings.limit_m) / error_m).max(by_forecast)
+        }),
         utilization,
         outliers_us: unit.outliers_us(),
         noise_factor: unit.history.noise_factor,
@@ -136,19 +138,16 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
         method: Some(fit.method),
         axis: Some(fit.prior.axis),
         rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
-        wear: wear_status(growth_probability),
+        wear: match growth_probability {
+            ..0.5 => WearStatus::Steady,
+            probability if probability > 0.95 => WearStatus::Wearing,
+            _ => WearStatus::Unknown,
+        },
         growth_probability: Some(growth_probability),
         check_probability: Some(remaining.hours.share_below(settings.check_interval_hours)),
         over_limit_probability: Some(remaining.hours.share_below(elapsed_hours)),
         ..Assessment::default()
     }
-}
-
-/// Probability that a measured level, with the spread that its installation adds, is at or above the limit.
-fn over_limit(level: Option<Level>, installation_sd_m: f64, limit_m: f64) -> Option<f64> {
-    let level = level?;
-    let error_m = level.se_m.hypot(installation_sd_m).max(f64::MIN_POSITIVE);
-    Some(normal_cdf((level.gap_m - limit_m) / error_m))
 }
 
 /// Probability that the line meets the limit within some hours: log-normal through its early and middle time.
@@ -158,13 +157,4 @@ fn chance_by(hours: f64, rise: &Rise) -> f64 {
     }
     let spread = (rise.p50_hours / rise.p05_hours.max(f64::MIN_POSITIVE)).ln() / NORMAL_95;
     normal_cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
-}
-
-/// Between one half and 95 % neither growth nor its absence is reported.
-fn wear_status(growth_probability: f64) -> WearStatus {
-    match growth_probability {
-        probability if probability > 0.95 => WearStatus::Wearing,
-        probability if probability < 0.5 => WearStatus::Steady,
-        _ => WearStatus::Unknown,
-    }
 }

@@ -123,7 +123,6 @@ fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
     (flights[0].departure_us, flights.len(), [last.hours, last.reversals, gaps].map(f64::to_bits))
 }
 
-/// Prior learned along one axis.
 #[derive(Clone)]
 struct AxisPrior<'a> {
     histories: Arc<[History<'a>]>,
@@ -193,7 +192,6 @@ impl<'a> AxisPrior<'a> {
     }
 }
 
-/// The segments of all units.
 fn segments<'a>(histories: &'a [History<'_>]) -> Vec<Segment<'a>> {
     histories.iter().flat_map(History::segments).collect()
 }
@@ -260,7 +258,6 @@ fn weights(unit: &Posterior, base: &FleetPrior, current: &FleetPrior) -> Vec<f64
     unit.components.iter().map(|n| n.weight * (now.of(n) - before.of(n)).exp()).collect()
 }
 
-/// Weighted mean and spread.
 struct WeightedMoments {
     count: f64,
     mean: f64,

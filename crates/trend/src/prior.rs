@@ -58,7 +58,6 @@ pub enum UsageAxis {
 }
 
 impl UsageAxis {
-    /// Every one of them.
     pub(crate) const ALL: [Self; 3] = [Self::Hours, Self::Flights, Self::Reversals];
 
     /// The usage of a unit up to a flight, in the axis' own unit.

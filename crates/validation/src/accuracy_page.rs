@@ -8,13 +8,19 @@ use crate::gear_bench::{GEAR_METHODS, GearBenchLog};
 use crate::methods::METHODS;
 use crate::metrics::{ErrorStats, FALSE_ALARMS};
 use crate::robot_logs::RobotRow;
-use crate::scenarios::Kind;
+
+const ROBOT_HEAD: &str =
+    "log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks";
 
 /// Fills the template's places with tables.
 pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
     let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
     let visible: Vec<&ErrorStats> = visible(stats).collect();
-    let (notable, quiet): (Vec<_>, Vec<_>) = visible.iter().partition(|t| is_notable(t));
+    // The page lists a class whose P95 error is at least one per cent or one micrometre, of whose intervals fewer than 90 % hold
+    // the true value, or of which a flight was refused.
+    let is_notable = |t: &&ErrorStats| t.errors[0].p95 >= 1.0 || t.coverage().0 < 0.9 || t.refused() > 0;
+    let (notable, quiet): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
+        visible.iter().copied().partition(is_notable);
     fill(
         include_str!("../accuracy.md.in"),
         &[
@@ -24,7 +30,7 @@ pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchL
             ("methods", methods(&visible)),
             ("alarms", alarms(&visible)),
             ("refusals", refusals(stats)),
-            ("robot", robot_table(robot)),
+            ("robot", table(ROBOT_HEAD, robot.iter().map(|row| row.join(" | ")))),
             ("gears", gears),
         ],
     )
@@ -38,13 +44,7 @@ pub fn tables(stats: &[ErrorStats]) -> String {
 
 /// The classes whose gap can be seen.
 fn visible(stats: &[ErrorStats]) -> impl Iterator<Item = &ErrorStats> {
-    stats.iter().filter(|t| !matches!(t.kind, Kind::Blind(_)))
-}
-
-/// Whether the page lists a class: its P95 error is at least one per cent or one micrometre, fewer than 90 % of its
-/// intervals hold the true value, or a flight was refused that shows its gap.
-fn is_notable(t: &ErrorStats) -> bool {
-    t.errors[0].p95 >= 1.0 || t.coverage().0 < 0.9 || t.false_refusals() > 0
+    stats.iter().filter(|t| t.must_refuse().is_none())
 }
 
 /// A table of Markdown; a row holds its cells between bars.
@@ -60,7 +60,7 @@ fn classes(stats: &[&ErrorStats]) -> String {
         let (share, _, _) = t.coverage();
         let coverage = if t.estimated == 0 { "–".to_owned() } else { format!("{:.0}", 100.0 * share) };
         let errors = [t.errors[0].median, t.errors[0].p95, t.errors[0].worst].map(digits).join(" | ");
-        format!("{} | {} | {errors} | {coverage} | {}", t.name, t.kind.unit(), t.false_refusals())
+        format!("{} | {} | {errors} | {coverage} | {}", t.name, t.unit(), t.refused())
     };
     table("scenario | unit | median | P95 | worst | 90 % coverage [%] | refused", stats.iter().map(row))
 }
@@ -89,7 +89,7 @@ pub fn csv(stats: &[ErrorStats]) -> String {
                 table,
                 "\"{}\",{method},{},{},{},{errors},{},{own}",
                 t.name,
-                t.kind.unit(),
+                t.unit(),
                 t.flights,
                 t.estimated,
                 held.join(",")
@@ -137,38 +137,27 @@ fn alarms(stats: &[&ErrorStats]) -> String {
     table("flag | false alarms | most in one scenario", FALSE_ALARMS.iter().enumerate().map(row))
 }
 
-/// The codes of estimates and refusals, with how often each was given, `expected` first.
-fn flags(stats: &ErrorStats, expected: &str) -> String {
-    let mut codes: Vec<_> = stats.codes.iter().collect();
-    codes.sort_by_key(|(code, _)| code.as_str() != expected);
-    codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect::<Vec<_>>().join(", ")
-}
-
 /// Flights that cannot show a gap with the codes given, and the false refusals of all others.
 fn refusals(stats: &[ErrorStats]) -> String {
     let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
         stats.iter().partition(|t| t.must_refuse().is_some());
     let row = |t: &&ErrorStats| {
-        let codes = flags(t, t.must_refuse()?);
-        Some(format!("{} | {} of {} | {codes}", t.name, t.missed_refusals(), t.flights))
+        let mut codes: Vec<_> = t.codes.iter().collect();
+        codes.sort_by_key(|(code, _)| Some(code.as_str()) != t.must_refuse());
+        let codes: Vec<String> = codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
+        format!("{} | {} of {} | {}", t.name, t.estimated, t.flights, codes.join(", "))
     };
     let head = "flights that cannot show a gap | estimated | codes given, the expected one first";
-    let table = if blind.is_empty() { String::new() } else { table(head, blind.iter().filter_map(row)) };
+    let table = if blind.is_empty() { String::new() } else { table(head, blind.iter().map(row)) };
     let sum =
         |of: &[&ErrorStats], count: fn(&ErrorStats) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
     format!(
         "{table}\nMissed refusals: {} of {}. False refusals: {} of {}.\n",
-        sum(&blind, ErrorStats::missed_refusals),
+        sum(&blind, |t| t.estimated),
         sum(&blind, |t| t.flights),
-        sum(&sound, ErrorStats::false_refusals),
+        sum(&sound, ErrorStats::refused),
         sum(&sound, |t| t.flights),
     )
-}
-
-fn robot_table(rows: &[RobotRow]) -> String {
-    let head =
-        "log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks";
-    table(head, rows.iter().map(|row| row.join(" | ")))
 }
 
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.

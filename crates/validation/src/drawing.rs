@@ -20,19 +20,16 @@ const MARGINS: [f64; 4] = [36.0, 14.0, 34.0, 46.0];
 pub(crate) struct Axis {
     pub(crate) name: String,
     pub(crate) range: Range<f64>,
-    /// Whether it is logarithmic.
     pub(crate) is_log: bool,
     /// Names at values, instead of numbers; only of a vertical axis.
     pub(crate) labels: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// A linear axis.
     pub(crate) fn new(name: &str, range: Range<f64>) -> Self {
         Self { name: name.to_owned(), range, is_log: false, labels: Vec::new() }
     }
 
-    /// A logarithmic axis.
     pub(crate) fn log(name: &str, range: Range<f64>) -> Self {
         Self { is_log: true, ..Self::new(name, range) }
     }
@@ -60,7 +57,6 @@ impl Axis {
 pub(crate) enum Shape {
     /// A line of a width, px, through the points.
     Line(f64),
-    /// A dashed line.
     Dashed,
     /// Discs of a radius, px.
     Dots(f64),
@@ -77,12 +73,10 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    /// Points without a name.
     pub(crate) fn new(colour: &'static str, shape: Shape, points: Vec<(f64, f64)>) -> Self {
         Self { name: String::new(), colour, shape, points }
     }
 
-    /// The same with a name.
     pub(crate) fn named(self, name: &str) -> Self {
         Self { name: name.to_owned(), ..self }
     }
@@ -97,7 +91,6 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    /// A panel without a title.
     pub(crate) fn new(x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Self { title: String::new(), x, y, series }
     }
@@ -126,11 +119,9 @@ impl Panel {
                 }
             }
         }
-        let mut named = 0.0;
-        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
+        for (k, series) in self.series.iter().filter(|series| !series.name.is_empty()).enumerate() {
             let x = size[0] - right - CHAR_PX * series.name.chars().count() as f64;
-            frame.coloured_text([x, above + 14.0 + 15.0 * named], series.colour, &series.name);
-            named += 1.0;
+            frame.coloured_text([x, above + 14.0 + 15.0 * k as f64], series.colour, &series.name);
         }
         frame.finish("")
     }

@@ -64,7 +64,9 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> Result<(), String> {
     if let Some(folder) = &args.paper {
-        return write_paper(folder);
+        let claims = Claims::measure().map_err(|e| e.to_string())?;
+        write(folder, "paper.md", &paper::page(&claims))?;
+        return write_pictures(folder, paper::pictures(&claims));
     }
     let is_wanted = |class: &&Class| args.only.as_ref().is_none_or(|text| class.name.contains(text));
     let wanted: Vec<&Class> = classes().iter().filter(is_wanted).collect();
@@ -87,13 +89,6 @@ fn run(args: &Args) -> Result<(), String> {
             Ok(())
         }
     }
-}
-
-/// The paper reproduced: a page with its claims, and its figures.
-fn write_paper(folder: &Path) -> Result<(), String> {
-    let claims = Claims::measure().map_err(|e| e.to_string())?;
-    write(folder, "paper.md", &paper::page(&claims))?;
-    write_pictures(folder, paper::pictures(&claims))
 }
 
 fn write_pictures(

@@ -1,15 +1,15 @@
 //! The methods compared: contact regression, the paper's statistic and two baselines.
 
 use estimator::{ActuatorModel, InitialVariances, NoiseModel, SensorNoise};
+use ingest::Geometry;
 use ingest::log::in_memory::ChannelArrays;
-use ingest::{ActuatorChannels, Geometry};
 use job::Part;
 use job::config::EstimateSettings;
 use job::config::part::PartSettings;
 use records::Position;
 use simulator::Sensors;
 
-use crate::scenarios::{Case, Class, FlownCase};
+use crate::scenarios::Class;
 
 /// The results of every method for one flight, m; NaN where a method gave no number.
 #[derive(Debug, Clone)]
@@ -41,14 +41,28 @@ const BANDWIDTH_HZ: f64 = 10.0;
 /// # Errors
 /// The error of the simulator, of reading the channels or of the estimator as text, after the class.
 pub fn estimate_flight(class: &Class, index: u64) -> Result<MethodResults, String> {
-    let in_class = |error: String| format!("{} {index}: {error}", class.name);
-    let flown = class.fly(index).map_err(|e| in_class(e.to_string()))?;
-    apply_methods(&flown, index).map_err(in_class)
+    apply_methods(class, index).map_err(|error| format!("{} {index}: {error}", class.name))
 }
 
-fn apply_methods(flown: &FlownCase, index: u64) -> Result<MethodResults, String> {
-    let part = part(&flown.case).map_err(|e| e.to_string())?;
-    let channels = channels(flown)?;
+fn apply_methods(class: &Class, index: u64) -> Result<MethodResults, Box<dyn std::error::Error>> {
+    let case = class.case(index);
+    let flight = case.fly()?;
+    // The part as a fleet would configure it: the assumed stiffness and the true sensor noise.
+    let part = Part {
+        actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
+        geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
+        noise: expected_noise(&case.sensors),
+        initial: InitialVariances::default(),
+        settings: PartSettings::default(),
+    };
+    // The flight's channels as the estimator gets them from a log.
+    let arrays = ChannelArrays {
+        time_s: &flight.time_s,
+        motor_m: &flight.motor_m,
+        screw_m: &flight.screw_m,
+        load_n: &flight.load_n,
+    };
+    let channels = arrays.to_channels(Position::new("actuator")?).map_err(|e| e.diagnostic().to_string())?;
     let found =
         job::estimate::estimate(&channels, &part, &EstimateSettings::default()).map_err(|e| e.to_string())?;
     let contact = match (found.gap_m, found.gap_p05_m, found.gap_p95_m) {
@@ -59,29 +73,13 @@ fn apply_methods(flown: &FlownCase, index: u64) -> Result<MethodResults, String>
     if contact.is_none() {
         codes = found.reason.into_iter().collect();
     }
-    let lines_m = load_lines_m(&channels.dx_m, &channels.load_n);
-    let spread_m = spread_m(&channels.dx_m);
-    let ours_m = contact.map_or(f64::NAN, |(gap_m, ..)| gap_m);
-    Ok(MethodResults {
-        index,
-        truth_m: flown.extrapolated_gap_m,
-        contact,
-        codes,
-        by_method_m: [ours_m, found.gap_midrange_m.unwrap_or(f64::NAN), lines_m, spread_m],
-    })
-}
-
-/// The flight's channels as the estimator gets them from a log.
-fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
-    let flight = &flown.flight;
-    let arrays = ChannelArrays {
-        time_s: &flight.time_s,
-        motor_m: &flight.motor_m,
-        screw_m: &flight.screw_m,
-        load_n: &flight.load_n,
-    };
-    let position = Position::new("actuator").map_err(|e| e.to_string())?;
-    arrays.to_channels(position).map_err(|e| e.diagnostic().to_string())
+    let by_method_m = [
+        contact.map_or(f64::NAN, |(gap_m, ..)| gap_m),
+        found.gap_midrange_m.unwrap_or(f64::NAN),
+        load_lines_m(&channels.dx_m, &channels.load_n),
+        spread_m(&channels.dx_m),
+    ];
+    Ok(MethodResults { index, truth_m: case.extrapolated_gap_m(&flight), contact, codes, by_method_m })
 }
 
 /// The noise as a fleet would configure it: that of the sensors, and friction that it expects.
@@ -93,17 +91,6 @@ pub(crate) fn expected_noise(sensors: &Sensors) -> NoiseModel {
         motor_resolution_m: sensors.motor.resolution,
         unknown_force_n: UNKNOWN_FORCE_N,
         bandwidth_hz: BANDWIDTH_HZ,
-    })
-}
-
-/// The part as a fleet would configure it: the assumed stiffness and the true sensor noise.
-fn part(case: &Case) -> Result<Part, estimator::Error> {
-    Ok(Part {
-        actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
-        geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
-        noise: expected_noise(&case.sensors),
-        initial: InitialVariances::default(),
-        settings: PartSettings::default(),
     })
 }
 

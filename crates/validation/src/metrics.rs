@@ -18,18 +18,13 @@ pub(crate) const FALSE_ALARMS: [&str; 7] = [
     "soft_contact",
     "load_jumps",
 ];
-
-/// The least gap on which `below_detection` is a false alarm, m.
 const VISIBLE_GAP_M: f64 = 10e-6;
 
 /// The errors of every method over the flights of one class.
 #[derive(Debug, Clone)]
 pub struct ErrorStats {
-    /// The class.
     pub(crate) name: &'static str,
-    /// How it is judged.
     pub(crate) kind: Kind,
-    /// Flights flown.
     pub(crate) flights: usize,
     /// Errors of each method, in the unit of the class.
     pub(crate) errors: [Errors; METHODS.len()],
@@ -50,13 +45,9 @@ pub struct ErrorStats {
 /// Absolute errors: median, 95 % quantile, worst, and how many there are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Errors {
-    /// Median.
     pub(crate) median: f64,
-    /// 95 % quantile.
     pub(crate) p95: f64,
-    /// Maximum.
     pub(crate) worst: f64,
-    /// Flights with an estimate.
     pub(crate) count: usize,
 }
 
@@ -72,16 +63,10 @@ impl Errors {
     }
 }
 
-impl Kind {
-    /// The unit of the errors.
-    pub(crate) fn unit(self) -> &'static str {
-        if self == Self::Single { "%" } else { "µm" }
-    }
-}
-
 impl ErrorStats {
     /// Summarises the results of a class.
     pub fn new(class: &Class, results: &[MethodResults]) -> Self {
+        let case = class.case(0);
         let size = |a: &MethodResults, estimate_m: f64| {
             let unit_m = if class.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };
             (estimate_m - a.truth_m).abs() / unit_m
@@ -104,7 +89,7 @@ impl ErrorStats {
                 .filter(|(truth_m, (_, low_m, high_m))| (low_m..=high_m).contains(&truth_m))
                 .count(),
             codes,
-            false_alarms: (!class.has_spikes()).then(|| false_alarms(class, results)),
+            false_alarms: (!case.has_spikes()).then(|| false_alarms(case.has_soft_flanks(), results)),
             scatter_um: estimates()
                 .map(|(truth_m, (gap_m, ..))| (truth_m * 1e6, (gap_m - truth_m) * 1e6))
                 .collect(),
@@ -116,17 +101,17 @@ impl ErrorStats {
         }
     }
 
-    /// Flights refused although the gap can be seen.
-    pub(crate) fn false_refusals(&self) -> usize {
-        if self.must_refuse().is_some() { 0 } else { self.flights - self.estimated }
+    /// The unit of the errors.
+    pub(crate) fn unit(&self) -> &'static str {
+        if self.kind == Kind::Single { "%" } else { "µm" }
     }
 
-    /// Flights with an estimate although the gap cannot be seen.
-    pub(crate) fn missed_refusals(&self) -> usize {
-        if self.must_refuse().is_some() { self.estimated } else { 0 }
+    /// Flights without an estimate of contact regression.
+    pub(crate) fn refused(&self) -> usize {
+        self.flights - self.estimated
     }
 
-    /// The refusal code expected.
+    /// The refusal code that flights of the class must get, because they cannot show a gap.
     pub(crate) fn must_refuse(&self) -> Option<&'static str> {
         match self.kind {
             Kind::Blind(code) => Some(code),
@@ -140,11 +125,11 @@ impl ErrorStats {
     }
 }
 
-fn false_alarms(class: &Class, results: &[MethodResults]) -> [usize; FALSE_ALARMS.len()] {
+fn false_alarms(has_soft_flanks: bool, results: &[MethodResults]) -> [usize; FALSE_ALARMS.len()] {
     FALSE_ALARMS.map(|flag| {
         let is_false = |a: &&MethodResults| match flag {
             "below_detection" => a.truth_m >= VISIBLE_GAP_M,
-            "soft_contact" => !class.has_soft_flanks(),
+            "soft_contact" => !has_soft_flanks,
             _ => true,
         };
         let raised = |a: &&MethodResults| a.contact.is_some() && a.codes.iter().any(|code| code == flag);

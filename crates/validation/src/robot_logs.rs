@@ -1,7 +1,7 @@
 //! Logs of a real machine: a robot whose play is near zero and whose channels are 3 ms apart.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ingest::{ActuatorChannels, LogFiles};
 use job::flight_log::read_as_part;
@@ -19,28 +19,19 @@ pub type RobotRow = [String; 8];
 /// # Errors
 /// A configuration or a log that cannot be read, as text.
 pub fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
-    let config = Config::read(&folder.join("pipeline.toml")).map_err(|all| join_diagnostics(&all))?;
+    let texts = |all: Vec<Diagnostic>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    let config = Config::read(&folder.join("pipeline.toml")).map_err(texts)?;
     let mut rows = Vec::new();
-    for axis in ["AX1", "AX2", "AX3"] {
-        let log = folder.join(format!("KR300-{axis}_trajC.parquet"));
-        rows.extend(estimate_log(&log, &config, &format!("KR300-{axis}"))?);
+    for axis in ["KR300-AX1", "KR300-AX2", "KR300-AX3"] {
+        let name = format!("{axis}_trajC");
+        let number = PartNumber::new(axis).map_err(|e| format!("{axis}: {e}"))?;
+        let log = folder.join(format!("{name}.parquet"));
+        read_as_part(&LogFiles::one(&log), &name, &config, &number, |channels, part| {
+            rows.push(row(&name, &channels, part, &config)?);
+            Ok(())
+        })
+        .map_err(|diagnostic| diagnostic.to_string())?;
     }
-    Ok(rows)
-}
-
-fn join_diagnostics(diagnostics: &[Diagnostic]) -> String {
-    diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
-}
-
-fn estimate_log(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RobotRow>, String> {
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
-    let mut rows = Vec::new();
-    read_as_part(&LogFiles::one(path), &name, config, &number, |channels, part| {
-        rows.push(row(&name, &channels, part, config)?);
-        Ok(())
-    })
-    .map_err(|diagnostic| diagnostic.to_string())?;
     Ok(rows)
 }
 

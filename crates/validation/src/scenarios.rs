@@ -15,51 +15,16 @@ use simulator::{
 /// A flight to be simulated, and the assumptions of its estimator.
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
-    /// What moves.
     pub(crate) plant: Plant,
-    /// What the flight asks of it.
     pub(crate) profile: Profile,
-    /// What reads it.
     pub(crate) sensors: Sensors,
     /// Stiffness assumed over the true one.
     pub(crate) assumed_factor: f64,
-    /// How the channels were mapped.
-    pub(crate) mapping: Mapping,
-    /// Seed of the flight.
+    /// What a wrong mapping makes of the channels.
+    pub(crate) mapping_fault: Option<fn(&mut Flight)>,
+    /// Seed of the flight whose load is mapped by mistake.
+    pub(crate) other_load_seed: Option<u64>,
     pub(crate) seed: u64,
-}
-
-/// A flown case.
-#[derive(Debug, Clone)]
-pub(crate) struct FlownCase {
-    /// The case.
-    pub(crate) case: Case,
-    /// The log as the estimator meets it, and the truth behind it.
-    pub(crate) flight: Flight,
-    /// The distance of the flanks, extrapolated to zero load by least squares over 30 to 100 % of the
-    /// flight's P95 load; equal to the gap for linear flanks, metres.
-    pub(crate) extrapolated_gap_m: f64,
-}
-
-/// Channels mapped correctly, or by mistake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Mapping {
-    /// Correctly.
-    Right,
-    /// The load has the wrong sign.
-    LoadFlipped,
-    /// Motor and screw are exchanged.
-    Swapped,
-    /// The screw's lead is two per cent off.
-    Ratio,
-    /// The load of another actuator, in another flight.
-    OtherLoad,
-    /// A channel that repeats its first value.
-    DeadLoad,
-    /// See [`Mapping::DeadLoad`].
-    DeadScrew,
-    /// See [`Mapping::DeadLoad`].
-    DeadMotor,
 }
 
 /// Which flights a class is judged with.
@@ -176,7 +141,10 @@ static CLASSES: &[Class] = &[
     mixed("vibration of 1000 N, 25 µm", 25.0, vibration::<1000>),
     mixed("vibration of 2000 N, 25 µm", 25.0, vibration::<2000>),
     drawn("no fault", nothing),
-    drawn("load-cell zero", load_zero),
+    drawn("load-cell zero", |c, rng| {
+        let sizes_n = [0.0, 200.0, 400.0, 800.0, 0.1 * c.profile.load_n];
+        c.sensors.load.bias = either(rng) * sizes_n[rng.random_range(0..sizes_n.len())];
+    }),
     drawn("load-cell zero that drifts", |c, rng| {
         c.sensors.load.drift = either(rng) * rng.random_range(0.02..0.1) * c.profile.load_n;
     }),
@@ -216,7 +184,10 @@ static CLASSES: &[Class] = &[
     drawn("long rests", |c, rng| {
         (c.profile.rest_share, c.profile.rest_s) = (rng.random_range(0.4..0.85), rng.random_range(8.0..30.0));
     }),
-    drawn("stiffness that moves", moving_stiffness),
+    drawn("stiffness that moves", |c, rng| {
+        c.plant.contact.stiffness_drift = rng.random_range(-0.1..0.1);
+        c.plant.contact.stiffness_phase_factors = std::array::from_fn(|_| rng.random_range(0.93..1.07));
+    }),
     drawn("unequal flanks", |c, rng| c.plant.contact.lower_stiffness_factor = log_uniform(rng, 0.7..1.4)),
     drawn("soft flanks, bilinear", |c, rng| soft(c, rng, bilinear)),
     drawn("soft flanks, Hertz", |c, rng| soft(c, rng, hertz)),
@@ -253,19 +224,29 @@ static CLASSES: &[Class] = &[
         c.profile.load_n = rng.random_range(2.5e3..4e3);
         c.sensors.load.bias = rng.random_range(0.25..0.4) * c.profile.load_n;
     }),
-    blind("load sign flipped", "load_sign_flipped", |c, _| c.mapping = Mapping::LoadFlipped),
-    blind("positions swapped", "positions_swapped", |c, _| c.mapping = Mapping::Swapped),
-    blind("screw position 2 % off its lead", "position_ratio", |c, _| c.mapping = Mapping::Ratio),
+    blind("load sign flipped", "load_sign_flipped", |c, _| {
+        c.mapping_fault = Some(|flight| flight.load_n.iter_mut().for_each(|f| *f = -*f));
+    }),
+    blind("positions swapped", "positions_swapped", |c, _| {
+        c.mapping_fault = Some(|flight| std::mem::swap(&mut flight.motor_m, &mut flight.screw_m));
+    }),
+    blind("screw position 2 % off its lead", "position_ratio", |c, _| {
+        c.mapping_fault = Some(|flight| flight.screw_m.iter_mut().for_each(|x| *x *= 1.02));
+    }),
     blind("10 samples a second", "rate_too_low", |c, _| c.profile.sample_rate_hz = 10.0),
     blind("eight seconds", "too_short", |c, _| c.profile.duration_s = 8.0),
     blind("airload below friction", "load_too_small", |c, _| c.profile.load_n = 100.0),
-    blind("another actuator's load", "motion_unexplained", |c, _| c.mapping = Mapping::OtherLoad),
+    blind("another actuator's load", "motion_unexplained", |c, _| c.other_load_seed = Some(c.seed + 899_000)),
     blind("the motor hardly moves", "travel_too_small", |c, _| {
         (c.profile.stroke_m, c.profile.stick_share, c.profile.trim_share) = (2e-5, 0.01, 0.003);
     }),
-    blind("load cell dead", "channel_constant", |c, _| c.mapping = Mapping::DeadLoad),
-    blind("screw channel dead", "channel_constant", |c, _| c.mapping = Mapping::DeadScrew),
-    blind("motor channel dead", "channel_constant", |c, _| c.mapping = Mapping::DeadMotor),
+    blind("load cell dead", "channel_constant", |c, _| c.mapping_fault = Some(|f| repeat(&mut f.load_n))),
+    blind("screw channel dead", "channel_constant", |c, _| {
+        c.mapping_fault = Some(|f| repeat(&mut f.screw_m));
+    }),
+    blind("motor channel dead", "channel_constant", |c, _| {
+        c.mapping_fault = Some(|f| repeat(&mut f.motor_m));
+    }),
 ];
 
 /// Several small faults at once, as in service.
@@ -329,11 +310,6 @@ fn service(case: &mut Case, rng: &mut ChaCha8Rng) {
 fn vibration<const RMS_N: u32>(case: &mut Case, _: &mut ChaCha8Rng) {
     case.profile.load_n = 7e3;
     case.profile.buffet = Vibration::band(5.0, 60.0, f64::from(RMS_N) / 7e3);
-}
-
-fn load_zero(case: &mut Case, rng: &mut ChaCha8Rng) {
-    let sizes_n = [0.0, 200.0, 400.0, 800.0, 0.1 * case.profile.load_n];
-    case.sensors.load.bias = either(rng) * sizes_n[rng.random_range(0..sizes_n.len())];
 }
 
 fn hysteresis(case: &mut Case, rng: &mut ChaCha8Rng) {
@@ -428,11 +404,6 @@ fn grease(case: &mut Case, rng: &mut ChaCha8Rng) {
     }
 }
 
-fn moving_stiffness(case: &mut Case, rng: &mut ChaCha8Rng) {
-    case.plant.contact.stiffness_drift = rng.random_range(-0.1..0.1);
-    case.plant.contact.stiffness_phase_factors = std::array::from_fn(|_| rng.random_range(0.93..1.07));
-}
-
 /// A screw that is worn where it works, the middle of that place off the middle of the stroke by a share of it.
 fn worn(case: &mut Case, rng: &mut ChaCha8Rng, off: f64) {
     let stroke_m = case.profile.stroke_m;
@@ -498,6 +469,7 @@ fn everything(case: &mut Case, rng: &mut ChaCha8Rng) {
     }
 }
 
+/// A dead channel, which repeats its first value.
 fn repeat(channel: &mut [f64]) {
     let first = channel.first().copied().unwrap_or(0.0);
     channel.fill(first);
@@ -510,18 +482,6 @@ fn name_seed(name: &str) -> u64 {
 }
 
 impl Class {
-    /// Whether its channels hold spikes or wrong channels.
-    pub(crate) fn has_spikes(&self) -> bool {
-        let case = self.case(0);
-        let channels = [&case.sensors.motor, &case.sensors.screw, &case.sensors.load];
-        case.mapping != Mapping::Right || channels.iter().any(|channel| channel.spikes_per_minute > 0.0)
-    }
-
-    /// Whether a flank is soft at low load.
-    pub(crate) fn has_soft_flanks(&self) -> bool {
-        self.case(0).has_soft_flanks()
-    }
-
     /// The case of an index; the same index gives the same case.
     pub(crate) fn case(&self, index: u64) -> Case {
         let own = if self.kind == Kind::Drawn { name_seed(self.name) } else { 0 };
@@ -531,7 +491,8 @@ impl Class {
             profile: Profile { duration_s: 120.0, ..Profile::default() },
             sensors: Sensors::default(),
             assumed_factor: 1.0,
-            mapping: Mapping::Right,
+            mapping_fault: None,
+            other_load_seed: None,
             seed: (own >> 20) + 1000 + index,
         };
         case.plant.contact.offset_m = rng.random_range(-3e-4..3e-4);
@@ -539,17 +500,19 @@ impl Class {
         (self.change)(&mut case, &mut rng);
         case
     }
-
-    /// Flies the flight of an index.
-    pub(crate) fn fly(&self, index: u64) -> Result<FlownCase, simulator::Error> {
-        self.case(index).fly()
-    }
 }
 
 /// The band of loads over which flanks are extrapolated, as shares of the P95 load.
 const STIFF_BAND: (f64, f64) = (0.3, 1.0);
 
 impl Case {
+    /// Whether its channels hold spikes or wrong channels.
+    pub(crate) fn has_spikes(&self) -> bool {
+        let channels = [&self.sensors.motor, &self.sensors.screw, &self.sensors.load];
+        let is_mapped_wrong = self.mapping_fault.is_some() || self.other_load_seed.is_some();
+        is_mapped_wrong || channels.iter().any(|channel| channel.spikes_per_minute > 0.0)
+    }
+
     /// Whether a flank is soft at low load.
     pub(crate) fn has_soft_flanks(&self) -> bool {
         let contact = &self.plant.contact;
@@ -561,38 +524,29 @@ impl Case {
         self.plant.contact.stiffness_n_per_m * self.assumed_factor
     }
 
-    /// Flies the case.
-    pub(crate) fn fly(self) -> Result<FlownCase, simulator::Error> {
-        let mut flight = simulate(&self.plant, &self.profile, &self.sensors, self.seed)?;
-        let p95_n = p95(flight.load_n.iter().map(|f| (f - self.sensors.load.bias).abs()));
-        match self.mapping {
-            Mapping::Right => (),
-            Mapping::LoadFlipped => flight.load_n.iter_mut().for_each(|f| *f = -*f),
-            Mapping::Swapped => std::mem::swap(&mut flight.motor_m, &mut flight.screw_m),
-            Mapping::Ratio => flight.screw_m.iter_mut().for_each(|x| *x *= 1.02),
-            Mapping::OtherLoad => {
-                let seed = self.seed + 899_000;
-                flight.load_n = simulate(&self.plant, &self.profile, &self.sensors, seed)?.load_n;
-            }
-            Mapping::DeadLoad => repeat(&mut flight.load_n),
-            Mapping::DeadScrew => repeat(&mut flight.screw_m),
-            Mapping::DeadMotor => repeat(&mut flight.motor_m),
+    /// Flies the case: the log as the estimator meets it, and the true gap.
+    pub(crate) fn fly(&self) -> Result<Flight, simulator::Error> {
+        let simulated = |seed| simulate(&self.plant, &self.profile, &self.sensors, seed);
+        let mut flight = simulated(self.seed)?;
+        if let Some(seed) = self.other_load_seed {
+            flight.load_n = simulated(seed)?.load_n;
         }
-        let contact = &self.plant.contact;
-        let extrapolated_gap_m = if self.has_soft_flanks() {
-            contact.extrapolated_gap_m(STIFF_BAND.0 * p95_n, STIFF_BAND.1 * p95_n)
-        } else {
-            flight.gap_m.max(0.0)
-        };
-        Ok(FlownCase { flight, extrapolated_gap_m, case: self })
+        self.mapping_fault.into_iter().for_each(|fault| fault(&mut flight));
+        Ok(flight)
     }
-}
 
-/// The 95 % quantile of the finite values; zero without any.
-fn p95(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted.get(sorted.len() * 95 / 100).copied().unwrap_or(0.0)
+    /// The distance of the flanks of a flight of the case, extrapolated to zero load by least squares over 30 to 100 % of the
+    /// flight's P95 load, m; equal to the gap for linear flanks.
+    pub(crate) fn extrapolated_gap_m(&self, flight: &Flight) -> f64 {
+        if !self.has_soft_flanks() {
+            return flight.gap_m.max(0.0);
+        }
+        let sizes_n = flight.load_n.iter().map(|f| (f - self.sensors.load.bias).abs());
+        let mut sizes_n: Vec<f64> = sizes_n.filter(|size_n| size_n.is_finite()).collect();
+        sizes_n.sort_unstable_by(f64::total_cmp);
+        let p95_n = sizes_n.get(sizes_n.len() * 95 / 100).copied().unwrap_or(0.0);
+        self.plant.contact.extrapolated_gap_m(STIFF_BAND.0 * p95_n, STIFF_BAND.1 * p95_n)
+    }
 }
 
 #[cfg(test)]
@@ -619,11 +573,11 @@ mod tests {
     fn a_toe_below_the_band_adds_to_the_gap_and_hard_flanks_do_not() {
         let mut case = case_of("soft flanks, 20 µm deep", 0);
         case.profile.duration_s = 60.0;
-        let flown = case.fly().unwrap();
-        assert!((flown.extrapolated_gap_m - flown.flight.gap_m - 24e-6).abs() < 1e-9);
+        let flight = case.fly().unwrap();
+        assert!((case.extrapolated_gap_m(&flight) - flight.gap_m - 24e-6).abs() < 1e-9);
         let mut hard = case_of("nominal", 0);
         hard.profile.duration_s = 5.0;
-        let flown = hard.fly().unwrap();
-        assert!((flown.extrapolated_gap_m - flown.flight.gap_m).abs() < 1e-15);
+        let flight = hard.fly().unwrap();
+        assert!((hard.extrapolated_gap_m(&flight) - flight.gap_m).abs() < 1e-15);
     }
 }

@@ -23,32 +23,6 @@ pub enum Action {
     SetLimit,
 }
 
-impl Action {
-    /// Its word in columns.
-    pub(crate) fn as_str(self) -> &'static str {
-        self.into()
-    }
-
-    /// The action that a state and its reason ask for, with the states of other quantities.
-    ///
-    /// `at_limit` is what the unit's part asks for in state `act`.
-    pub(crate) fn of(
-        state: Option<&str>,
-        reason_code: Option<&str>,
-        conditions: &[String],
-        at_limit: Self,
-    ) -> Option<Self> {
-        match state {
-            Some("act") => Some(at_limit),
-            Some("plan" | "watch") => Some(Self::Inspect),
-            Some("unassessed") if reason_code == Some("no_limit") => Some(Self::SetLimit),
-            Some("unassessed") => Some(Self::CheckLogs),
-            Some(_) if !conditions.is_empty() => Some(Self::Inspect),
-            _ => None,
-        }
-    }
-}
-
 /// Reasons whose inspection is due at once: the next record alone would be too late.
 const DUE_NOW: [&str; 4] = ["unconfirmed", "repeated", "jumped", "changed"];
 
@@ -59,8 +33,15 @@ impl TrendRow {
     /// which it reaches its limit.
     #[must_use]
     pub fn with_action(mut self, at_limit: Action) -> Self {
-        let action = Action::of(self.state, self.reason_code, &self.conditions, at_limit);
-        self.action = action.map(Action::as_str);
+        let action = match (self.state, self.reason_code) {
+            (Some("act"), _) => Some(at_limit),
+            (Some("plan" | "watch"), _) => Some(Action::Inspect),
+            (Some("unassessed"), Some("no_limit")) => Some(Action::SetLimit),
+            (Some("unassessed"), _) => Some(Action::CheckLogs),
+            (Some(_), _) if !self.conditions.is_empty() => Some(Action::Inspect),
+            _ => None,
+        };
+        self.action = action.map(Action::into);
         self.due_utc = match action {
             _ if self.state == Some("act") => Some(self.as_of_utc),
             Some(Action::Inspect) if self.reason_code.is_some_and(|code| DUE_NOW.contains(&code)) => {

@@ -1,7 +1,6 @@
 //! Rows of assessments: trend of a unit, followed quantities, inspection intervals, tables of a report.
 
 pub mod action;
-pub(crate) mod crossing;
 pub(crate) mod quantity_row;
 pub mod report_rows;
 pub(crate) mod statement;

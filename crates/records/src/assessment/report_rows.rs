@@ -122,7 +122,7 @@ row! {
 
 row! {
     /// An inspection, and the estimate to compare with it.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize)]
     pub struct ReportInspectionRow {
         /// Part number of the unit.
         pub part_number: Option<String>,

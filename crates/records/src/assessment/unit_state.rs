@@ -35,6 +35,7 @@ stored_row! {
 impl UnitState {
     /// The state of an assessed unit.
     pub fn of(row: &TrendRow, settings_digest: Option<String>, run_id: &str) -> Self {
+        let change_points = row.change_points.iter().map(|c| format!("{} {}", c.kind, c.departure_utc));
         Self {
             part_number: row.part_number.clone(),
             serial_number: row.serial_number.clone(),
@@ -43,11 +44,7 @@ impl UnitState {
             state: row.state.map(str::to_owned),
             limit_m: row.limit_m,
             settings_digest,
-            change_points: row
-                .change_points
-                .iter()
-                .map(|c| format!("{} {}", c.kind, c.departure_utc))
-                .collect(),
+            change_points: change_points.collect(),
             as_of_utc: row.as_of_utc,
             run_id: run_id.to_owned(),
         }

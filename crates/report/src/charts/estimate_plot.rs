@@ -68,29 +68,13 @@ pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> String {
 /// # Errors
 /// If the page cannot be rendered.
 pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) -> Result<String, Error> {
-    let sections = plots
-        .iter()
-        .map(|plot| {
-            Ok(Section {
-                title: &plot.title,
-                summary: &plot.summary,
-                over_time: over_time(plot),
-                flanks: flanks(plot),
-                data: data(plot)?,
-            })
-        })
-        .collect::<Result<_, Error>>()?;
-    let page = EstimatePlotPage {
-        back,
-        sections,
-        style: include_str!("../../assets/estimate_plot.css"),
-        chart_style: include_str!("../../assets/uplot.css"),
-        chart: include_str!("../../assets/uplot.js"),
-        glue: include_str!("../../assets/estimate_plot.js"),
-        script_hashes: SCRIPT_HASHES,
-    };
-    Ok(page.render()?)
+    Ok(EstimatePlotPage { back, plots }.render()?)
 }
+
+const STYLE: &str = include_str!("../../assets/estimate_plot.css");
+const CHART_STYLE: &str = include_str!("../../assets/uplot.css");
+const CHART: &str = include_str!("../../assets/uplot.js");
+const GLUE: &str = include_str!("../../assets/estimate_plot.js");
 
 /// SHA-256 of `uplot.js` and `estimate_plot.js`: the only scripts that a browser executes in the page
 /// (Content Security Policy Level 3, hash sources).
@@ -101,25 +85,12 @@ const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8
 #[template(path = "estimate_plot.html")]
 struct EstimatePlotPage<'a> {
     back: Option<(&'a str, &'a str)>,
-    sections: Vec<Section<'a>>,
-    style: &'static str,
-    chart_style: &'static str,
-    chart: &'static str,
-    glue: &'static str,
-    script_hashes: &'static str,
-}
-
-struct Section<'a> {
-    title: &'a str,
-    summary: &'a str,
-    over_time: String,
-    flanks: String,
-    data: String,
+    plots: &'a [EstimatePlot],
 }
 
 /// Curves as JSON for the script, in µm and kN, all downsampled to the same times. It contains no `<`, so it
 /// can be embedded in a script element.
-fn data(plot: &EstimatePlot) -> Result<String, Error> {
+fn data(plot: &EstimatePlot) -> String {
     let origin_m = origin_m(plot);
     let to_um = |v: f64| (!v.is_nan()).then(|| ((v - origin_m) * 1e9).round() / 1e3);
     let buckets = buckets(plot.s_m.len());
@@ -128,13 +99,14 @@ fn data(plot: &EstimatePlot) -> Result<String, Error> {
     };
     let time: Vec<f64> = bucket_positions(plot.s_m.len(), buckets).map(|k| plot.time_s(k)).collect();
     let kn = |v: f64| (!v.is_nan()).then(|| v.round() / 1e3);
-    Ok(serde_json::to_string(&serde_json::json!({
+    let curves = serde_json::json!({
         "time_s": time,
         "dx_um": pick(&plot.dx_m, &to_um),
         "s_um": pick(&plot.s_m, &to_um),
         "load_kn": pick(&plot.load_n, &kn),
         "bounds_um": plot.bounds_m.map(|(upper, lower)| [to_um(upper), to_um(lower)]),
-    }))?)
+    });
+    curves.to_string()
 }
 
 /// Heading, curves over time and flanks of a plot, `top` px below the upper edge of the picture.
@@ -165,9 +137,8 @@ fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let floor = low - 0.06 * (high - low);
     let mut frame = axes(size, (0.0, end_s), (floor - 0.04 * (high - low), high));
     frame.numbers(8, "");
-    let curve = |values: &[f64]| curve(values, |at| plot.time_s(at), to_um);
-    curve(&plot.dx_m).into_iter().for_each(|piece| frame.line(piece, PEER));
-    curve(&plot.s_m).into_iter().for_each(|piece| frame.line(piece, GAP));
+    draw_curve(&mut frame, plot, &plot.dx_m, to_um, PEER);
+    draw_curve(&mut frame, plot, &plot.s_m, to_um, GAP);
     if let Some((upper, lower)) = plot.bounds_m {
         for (bound, colour) in [(upper, UPPER), (lower, LOWER)] {
             let pen = format!(r#"stroke="{colour}" stroke-width="2" stroke-dasharray="8 4""#);
@@ -176,12 +147,8 @@ fn positions(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     }
     for contact in downsampled(touches(plot)) {
         let y = if contact.flank == Flank::Upper { floor } else { floor - 0.025 * (high - low) };
-        frame.dot(
-            (plot.time_s(contact.time_s / plot.step_s), y),
-            1.0,
-            &format!(r#"fill="{}""#, colour(contact)),
-            "",
-        );
+        let fill = format!(r#"fill="{}""#, colour(contact));
+        frame.dot((plot.time_s(contact.time_s / plot.step_s), y), 1.0, &fill, "");
     }
     let legend = [
         ("backlash S, δX [µm]:", "#1C2530"),
@@ -203,8 +170,7 @@ fn load(plot: &EstimatePlot, end_s: f64, size: [f64; 2]) -> String {
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
     let mut frame = axes(size, (0.0, end_s), (low, high));
     frame.numbers(8, "time [s]");
-    let curves = curve(&plot.load_n, |at| plot.time_s(at), kn);
-    curves.into_iter().for_each(|piece| frame.line(piece, r##"fill="none" stroke="#1C2530""##));
+    draw_curve(&mut frame, plot, &plot.load_n, kn, r##"fill="none" stroke="#1C2530""##);
     frame.coloured_text([62.0, 14.0], "#1C2530", "load [kN]");
     frame.finish("")
 }
@@ -218,9 +184,8 @@ fn flanks(plot: &EstimatePlot) -> String {
     let mut frame = axes([SIZE[0] - TIME_PLOTS_WIDTH, SIZE[1] - HEADING], (left, right), (low, high));
     frame.numbers(6, "coupling force [kN]");
     for is_used in [false, true] {
-        for contact in downsampled(touches(plot))
-            .filter(|contact| contact.trust.is_some_and(|trust| trust > 0.0) == is_used)
-        {
+        let is_drawn = |contact: &&Touch| contact.trust.is_some_and(|trust| trust > 0.0) == is_used;
+        for contact in downsampled(touches(plot)).filter(is_drawn) {
             let fill = if is_used { colour(contact) } else { FAINT };
             let fill = format!(r#"fill="{fill}" fill-opacity="0.55""#);
             frame.dot((contact.force_n / 1e3, to_um(contact.dx_m)), 2.0, &fill, "");
@@ -244,7 +209,6 @@ fn colour(contact: &Touch) -> &'static str {
     if contact.flank == Flank::Upper { UPPER } else { LOWER }
 }
 
-/// The stretches in contact.
 fn touches(plot: &EstimatePlot) -> &[Touch] {
     plot.contact.as_ref().map_or(&[], |contact| &contact.touches)
 }
@@ -309,14 +273,12 @@ fn bucket_positions(samples: usize, buckets: usize) -> impl Iterator<Item = f64>
     (0..2 * buckets).map(move |k| (k as f64 + 0.5) * half)
 }
 
-/// Segments without missing values of a downsampled curve, against time in s.
-fn curve(values: &[f64], time_s: impl Fn(f64) -> f64, scale: impl Fn(f64) -> f64) -> Vec<Vec<(f64, f64)>> {
+/// Draws a downsampled curve against time, s, in pieces without missing values.
+fn draw_curve(frame: &mut Frame, plot: &EstimatePlot, values: &[f64], scale: impl Fn(f64) -> f64, pen: &str) {
     let points = min_max_buckets(values, buckets(values.len()));
-    points
-        .split(|(_, v)| v.is_nan())
-        .filter(|piece| !piece.is_empty())
-        .map(|piece| piece.iter().map(|(at, v)| (time_s(*at), scale(*v))).collect())
-        .collect()
+    for piece in points.split(|(_, v)| v.is_nan()).filter(|piece| !piece.is_empty()) {
+        frame.line(piece.iter().map(|(at, v)| (plot.time_s(*at), scale(*v))), pen);
+    }
 }
 
 #[cfg(test)]
@@ -359,7 +321,7 @@ mod tests {
     fn the_page_names_the_digests_of_its_scripts() {
         use base64::Engine;
         use sha2::Digest;
-        for script in [include_str!("../../assets/uplot.js"), include_str!("../../assets/estimate_plot.js")] {
+        for script in [CHART, GLUE] {
             let digest = base64::prelude::BASE64_STANDARD.encode(sha2::Sha256::digest(script));
             assert!(SCRIPT_HASHES.contains(&format!("'sha256-{digest}'")), "it is now {digest}");
         }
@@ -375,16 +337,12 @@ mod tests {
     }
 
     #[test]
-    fn foreign_text_is_never_markup() {
-        for text in [estimate_plot_svg(&[plot()]), estimate_plot_html(&[plot()], None).unwrap()] {
+    fn foreign_text_is_never_markup_and_the_page_needs_no_other_file() {
+        let page = estimate_plot_html(&[plot()], None).unwrap();
+        assert!(!page.contains("src=\"") && !page.contains("<link rel=\"stylesheet\""));
+        for text in [estimate_plot_svg(&[plot()]), page] {
             assert!(!text.contains("<script>alert"), "escaped");
             assert!(text.contains("&#60;script&#62;alert") || text.contains("&lt;script&gt;alert"));
         }
-    }
-
-    #[test]
-    fn the_page_needs_nothing_beside_it() {
-        let page = estimate_plot_html(&[plot()], None).unwrap();
-        assert!(!page.contains("src=\"") && !page.contains("<link rel=\"stylesheet\""));
     }
 }

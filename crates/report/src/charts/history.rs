@@ -7,7 +7,7 @@ use records::time::DAY_S;
 use crate::charts::frame::{BAR, DATA, Frame, GRID, INK, LIMIT, PEER, PLAN, THIN, WATCH, day, thinned};
 use crate::format::{date, micrometres};
 use crate::model::{TimedInterval, UnitView};
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 /// Maximum number of points in the chart; above it, each point is the mean of neighbouring flights.
 const MAX_POINTS: usize = 120;

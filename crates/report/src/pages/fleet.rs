@@ -6,16 +6,16 @@ use askama::Template;
 use records::assessment::action::{counts_text, state_rank};
 use records::report_rows::{ReportInspectionRow, ReportTailRow};
 use records::time::days_between;
+use records::uncertainty::NORMAL_95;
 
 use crate::format::{count, counted, date, micrometres, micrometres_or, or_no_data, rate, unbroken};
-use crate::model::{Report, UnitView};
+use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
 use crate::pages::work_list::{Group, capital, grouped, work};
+use crate::peers::Peers;
+use crate::removal_forecast::removal_forecast;
 use crate::state_badge::StateBadge;
-use crate::stats::agreement::Agreement;
-use crate::stats::peers::Peers;
-use crate::stats::removal_forecast::removal_forecast;
 
 /// Maximum number of rows on one page of the work list or of tails.
 const ROWS: usize = 100;
@@ -27,9 +27,7 @@ const LEAST_REMOVALS: f64 = 0.05;
 #[derive(Template)]
 #[template(path = "fleet.html")]
 struct FleetView<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     report: &'a Report,
     peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
@@ -43,9 +41,7 @@ struct FleetView<'a> {
 #[derive(Template)]
 #[template(path = "work.html")]
 struct WorkView<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     peers: &'a Peers<'a>,
     groups: Vec<Group<'a>>,
 }
@@ -53,9 +49,7 @@ struct WorkView<'a> {
 #[derive(Template)]
 #[template(path = "tails.html")]
 struct TailsView<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     map: Map<'a>,
 }
 
@@ -76,7 +70,7 @@ pub fn fleet_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Erro
     for (k, chunk) in rest.chunks(ROWS).enumerate() {
         let path = format!("work-{}.html", k + 2);
         let title = format!("Work list, page {} · actuator free play", k + 2);
-        let view = WorkView { root: "", title, footer: report.footer(), peers, groups: grouped(chunk) };
+        let view = WorkView { head: report.head("", title), peers, groups: grouped(chunk) };
         pages.push(Page::html(path.clone(), &view.render()?));
         more_work.push(path);
     }
@@ -84,15 +78,13 @@ pub fn fleet_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Erro
     for (k, chunk) in tails.chunks(ROWS).enumerate().filter(|_| tails.len() > FEW) {
         let path = format!("tails-{}.html", k + 1);
         let title = format!("All tails, page {} · actuator free play", k + 1);
-        let view = TailsView { root: "", title, footer: report.footer(), map: map(report, chunk) };
+        let view = TailsView { head: report.head("", title), map: map(report, chunk) };
         pages.push(Page::html(path.clone(), &view.render()?));
         tail_pages.push(path);
     }
     let quantity_changes = quantities::changes(report, "", |_| true);
     let view = FleetView {
-        root: "",
-        title: "Actuator free play".to_owned(),
-        footer: report.footer(),
+        head: report.head("", "Actuator free play".to_owned()),
         report,
         peers,
         groups: grouped(&work),
@@ -111,7 +103,6 @@ fn heading(report: &Report) -> String {
     or_no_data(report.as_of_utc, |at| at.strftime("%a %-d %b %Y %H:%M UTC").to_string())
 }
 
-/// Number of installed units for each action, as text.
 fn counts(report: &Report) -> String {
     match counts_text(report.units.iter().map(|unit| &unit.row)) {
         text if text.is_empty() => "No unit is installed.".to_owned(),
@@ -146,7 +137,6 @@ fn removed(report: &Report) -> Vec<(String, &str, String)> {
     report.units.iter().filter(of).take(FEW).map(row).collect()
 }
 
-/// The tails of the most urgent units.
 fn most_urgent_tails(report: &Report) -> Vec<&str> {
     let mut worst: BTreeMap<&str, u8> = BTreeMap::new();
     for unit in report.units.iter().filter(|unit| unit.row.removed_utc.is_none()) {
@@ -226,21 +216,25 @@ fn checks(report: &Report) -> Vec<(&UnitView, &ReportInspectionRow)> {
     checks.take(ROWS).collect()
 }
 
-/// Agreement of estimates with hangar inspections, in words.
+/// Agreement of estimates with hangar inspections, in words: the mean difference with the 90 % interval of that mean (Bland and
+/// Altman 1986).
 fn inspection_agreement(report: &Report) -> String {
     if !report.inspections_given {
         return "No data: no inspections table is configured (`logs.inspections`).".to_owned();
     }
     let checks = report.units.iter().flat_map(|unit| &unit.inspections);
     let differences: Vec<f64> = checks.filter_map(ReportInspectionRow::difference_m).collect();
-    let words = match Agreement::of(&differences) {
-        Some(found) => format!(
-            "Estimate minus inspection over {}: {} ± {} µm (90 %); no estimate is corrected by it.",
-            counted(differences.len(), "pair"),
-            micrometres(found.bias_m),
-            micrometres(found.half_width_m),
-        ),
-        None => format!("{}: at least 3 are needed to state a bias.", counted(differences.len(), "pair")),
+    let (n, pairs) = (differences.len() as f64, counted(differences.len(), "pair"));
+    let bias_m = differences.iter().sum::<f64>() / n;
+    let square: f64 = differences.iter().map(|difference| (difference - bias_m).powi(2)).sum();
+    let half_width_m = NORMAL_95 * (square / (n - 1.0) / n).sqrt();
+    let words = if differences.len() < 3 {
+        format!("{pairs}: at least 3 are needed to state a bias.")
+    } else {
+        let (bias, half_width) = (micrometres(bias_m), micrometres(half_width_m));
+        format!(
+            "Estimate minus inspection over {pairs}: {bias} ± {half_width} µm (90 %); no estimate is corrected by it."
+        )
     };
     match report.inspections_unmatched {
         0 => words,

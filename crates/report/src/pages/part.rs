@@ -6,10 +6,10 @@ use jiff::Timestamp;
 use crate::charts::frame::{day, thinned};
 use crate::charts::sparkline::sparkline;
 use crate::format::{date, micrometres};
-use crate::model::{Report, UnitView};
+use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};
 use crate::pages::work_list::what;
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 /// Maximum number of units on one page.
 const UNITS: usize = 200;
@@ -19,9 +19,7 @@ const MAX_POINTS: usize = 60;
 #[derive(Template)]
 #[template(path = "part.html")]
 struct View<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     part: &'a str,
     axes: Axes,
     units: &'a [&'a UnitView],
@@ -67,9 +65,7 @@ pub fn part_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Error
         let paths: Vec<String> = (0..units.len().div_ceil(UNITS)).map(|k| part_path(part, k)).collect();
         for (units, path) in units.chunks(UNITS).zip(&paths) {
             let view = View {
-                root: "../",
-                title: format!("{part} · actuator free play"),
-                footer: report.footer(),
+                head: report.head("../", format!("{part} · actuator free play")),
                 part,
                 axes,
                 units,

@@ -8,7 +8,6 @@ use crate::format::NO_DATA;
 use crate::model::{QuantityView, Report, UnitView};
 use crate::page::{tail_path, unit_path};
 
-/// A chart with its heading and description.
 pub(crate) struct Chart {
     pub(crate) heading: String,
     pub(crate) description: String,
@@ -54,12 +53,7 @@ pub(crate) fn unit_charts(unit: &UnitView) -> Vec<Chart> {
     unit.quantities.iter().filter_map(chart).collect()
 }
 
-/// Levels of all followed quantities of a unit.
-pub(crate) fn levels(unit: &UnitView) -> Vec<Level> {
-    unit.quantities.iter().filter_map(level).collect()
-}
-
-fn level(view: &QuantityView) -> Option<Level> {
+pub(crate) fn level(view: &QuantityView) -> Option<Level> {
     let (row, quantity) = (&view.row, Quantity::from_name(view.row.quantity)?);
     let (unit, factor) = quantity.display_unit();
     let shown = |value: Option<f64>| {

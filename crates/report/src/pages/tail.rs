@@ -5,19 +5,17 @@ use records::assessment::action::counts_text;
 use records::report_rows::{ReportLogErrorRow, ReportTailRow};
 
 use crate::format::{minute, minute_or, unbroken};
-use crate::model::{Report, UnitView};
+use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, tail_path};
 use crate::pages::fleet::logged;
 use crate::pages::quantities::{self, Change};
 use crate::pages::work_list::Group;
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 #[derive(Template)]
 #[template(path = "tail.html")]
 struct View<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     tail: &'a ReportTailRow,
     verdict: String,
     warnings: Vec<&'a str>,
@@ -38,9 +36,7 @@ pub fn tail_page(report: &Report, peers: &Peers<'_>, tail: &ReportTailRow) -> Re
     let (removed, units): (Vec<&UnitView>, Vec<&UnitView>) =
         of_tail.partition(|unit| unit.row.removed_utc.is_some());
     let view = View {
-        root: "../",
-        title: format!("{name} · actuator free play"),
-        footer: report.footer(),
+        head: report.head("../", format!("{name} · actuator free play")),
         tail,
         verdict: counts_text(units.iter().map(|unit| &unit.row)),
         warnings: report.warnings(Some(name)),

@@ -10,18 +10,16 @@ use crate::format::{
     NO_DATA, count, counted, date, hours, level, micrometres, micrometres_cell, micrometres_or, minute, rate,
     unbroken, whole_dates,
 };
-use crate::model::{Report, TimedInterval, UnitView};
+use crate::model::{Head, Report, TimedInterval, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::quantities::{self, Change, Chart, Level};
 use crate::pages::work_list::{capital, what};
-use crate::stats::peers::Peers;
+use crate::peers::Peers;
 
 #[derive(Template)]
 #[template(path = "unit.html")]
 struct View<'a> {
-    root: &'static str,
-    title: String,
-    footer: String,
+    head: Head,
     report: &'a Report,
     peers: &'a Peers<'a>,
     unit: &'a UnitView,
@@ -54,9 +52,7 @@ pub fn unit_page(report: &Report, peers: &Peers<'_>, unit: &UnitView) -> Result<
     };
     let is_due = row.action.is_some() && tail.is_some();
     let view = View {
-        root: "../",
-        title: format!("{} · actuator free play", unit.name()),
-        footer: report.footer(),
+        head: report.head("../", format!("{} · actuator free play", unit.name())),
         report,
         peers,
         unit,
@@ -75,7 +71,7 @@ pub fn unit_page(report: &Report, peers: &Peers<'_>, unit: &UnitView) -> Result<
             change.serial_number.as_ref() == Some(&row.serial_number) && change.part_number == row.part_number
         }),
         charts: quantities::unit_charts(unit),
-        levels: quantities::levels(unit),
+        levels: unit.quantities.iter().filter_map(quantities::level).collect(),
         drawn_forecast: drawn_forecast(unit),
     };
     Ok(Page::html(unit_path(unit), &view.render()?))
@@ -101,7 +97,10 @@ fn facts(peers: &Peers<'_>, unit: &UnitView) -> Vec<(&'static str, String)> {
     let largest = unit.flights.iter().rev().find_map(|f| Some((f.departure_utc, f.gap_largest_m.0?)));
     let largest = largest.filter(|_| !row.is_by_largest());
     let known = [
-        (if row.is_by_largest() { "Gap, largest along the stroke" } else { "Gap" }, Some(unit.gap_text())),
+        (
+            if row.is_by_largest() { "Gap, largest along the stroke" } else { "Gap" },
+            Some(level(row.gap_m, row.gap_se_m)),
+        ),
         ("Limit [µm]", row.limit_m.map(micrometres)),
         ("Largest along the stroke", largest.map(|(at, m)| format!("{} µm, {}", micrometres(m), date(at)))),
         ("Wear [µm/1000 FH], 90 %", rates),
@@ -117,32 +116,21 @@ fn trust(unit: &UnitView) -> Vec<String> {
     let (row, quality) = (&unit.row, &unit.quality);
     let mut lines = Vec::new();
     for check in &unit.inspections {
+        let (day, measured) = (date(check.date_utc), micrometres(check.play_m));
+        let flights = counted(check.estimates as usize, "flight");
         let estimated = check.estimate_m.map_or_else(
             || "no estimate shortly before".to_owned(),
-            |m| {
-                format!(
-                    "{} µm estimated from the {} before",
-                    micrometres(m),
-                    counted(check.estimates as usize, "flight")
-                )
-            },
+            |m| format!("{} µm estimated from the {flights} before", micrometres(m)),
         );
-        lines.push(format!(
-            "Hangar {}: {} µm measured, {estimated}.",
-            date(check.date_utc),
-            micrometres(check.play_m)
-        ));
+        lines.push(format!("Hangar {day}: {measured} µm measured, {estimated}."));
     }
     let held = unit.past_forecasts.iter().filter(|past| past.held()).count();
     if !unit.past_forecasts.is_empty() {
         let all = counted(unit.past_forecasts.len(), "earlier forecast");
         lines.push(format!("{held} of {all} for today contained the gap found."));
     }
-    lines.push(format!(
-        "{} used, {} rejected.",
-        counted(quality.estimated, "flight"),
-        count(quality.refused)
-    ));
+    let (used, rejected) = (counted(quality.estimated, "flight"), count(quality.refused));
+    lines.push(format!("{used} used, {rejected} rejected."));
     let reason = |(code, n): &(String, usize)| {
         let remedy = quality.remedies.get(code).map_or_else(String::new, |remedy| format!(": {remedy}"));
         format!("Rejected {} as {code}{remedy}.", count(*n))

@@ -37,7 +37,8 @@ impl<'a> Group<'a> {
 
 /// Units that need action or have an open work request, with the most urgent aircraft first.
 pub(crate) fn work(report: &Report) -> Vec<&UnitView> {
-    let mut units: Vec<&UnitView> = report.units.iter().filter(|unit| unit.needs_work()).collect();
+    let needs_work = |unit: &&UnitView| unit.row.action.is_some() || unit.open_request().is_some();
+    let mut units: Vec<&UnitView> = report.units.iter().filter(needs_work).collect();
     units.sort_by(|a, b| a.row.by_urgency(&b.row));
     let mut first: BTreeMap<Option<&str>, usize> = BTreeMap::new();
     for (rank, unit) in units.iter().enumerate() {

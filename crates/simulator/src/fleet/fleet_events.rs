@@ -1,8 +1,10 @@
-//! Events of a fleet's life in a [`Spec`](crate::Spec): exchanges, replacements, re-shims, inspections, faulty log files.
+//! Events of a fleet's life in a [`Spec`](crate::Spec): exchanges, replacements, re-shims, inspections, changes, faulty log files.
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 
 use crate::fleet::wear::WearLaw;
+use crate::load::vibration::Vibration;
 
 /// A tail and a position on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,6 +87,41 @@ pub struct PlayCheck {
     pub instrument: String,
     /// The force at which the play is read, N.
     pub force_n: f64,
+}
+
+/// A change of the actuators that meet all of its conditions; a condition that is left out holds for all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlantedChange {
+    /// The aircraft.
+    pub tail: Option<String>,
+    /// The place.
+    pub position: Option<String>,
+    /// The design.
+    pub part_number: Option<String>,
+    /// The unit, wherever it is installed.
+    pub serial_number: Option<String>,
+    /// First flight of a tail that shows the change, counted from 1. Default 1.
+    #[default(1)]
+    pub from_flight: usize,
+    /// Flight from which the whole change shows; in between it grows in proportion. Default `from_flight`: a step.
+    pub to_flight: Option<usize>,
+    /// Stiffness over that before. Default 1.
+    #[default(1.0)]
+    pub stiffness_factor: f64,
+    /// Dry and load-dependent friction over that before. Default 1.
+    #[default(1.0)]
+    pub friction_factor: f64,
+    /// Added to the gain error of the load cell. Default 0.
+    pub load_gain: f64,
+    /// Added to the zero error of the load cell, N. Default 0.
+    pub load_bias_n: f64,
+    /// Added to the delay of the screw channel, seconds. Default 0.
+    pub skew_s: f64,
+    /// Added to the delay of the load channel, seconds. Default 0.
+    pub load_delay_s: f64,
+    /// Vibration of the load in place of the profile's. Default the profile's.
+    pub buffet: Option<Vibration>,
 }
 
 /// A log file that does not arrive as it was recorded.

@@ -1,4 +1,4 @@
-//! Planning of a fleet: slots, departures, swaps, flight hours, wear, and the state of each actuator.
+//! Planning of a fleet: units, slots, departures, swaps, flight hours, wear, and the state of each actuator.
 
 use std::collections::BTreeSet;
 
@@ -7,21 +7,17 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::Error;
-use crate::fleet::fleet_events::LogFault;
-use crate::fleet::fleet_plan_types::{
-    Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
-};
-use crate::fleet::fleet_roster::{FleetUnit, fleet_units, seat};
+use crate::fleet::fleet_events::{LogFault, PlantedChange, Replacement};
+use crate::fleet::fleet_plan::{Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight};
 use crate::fleet::fleet_spec::{Position, Spec};
-use crate::fleet::planted_change::ActuatorFlight;
-use crate::fleet::wear;
+use crate::fleet::wear::{self, WearLaw};
 use crate::seeded_streams::{derive_seed, seeded_rng};
 
 const HOUR_US: f64 = 3.6e9;
 const DAY_US: f64 = 24.0 * HOUR_US;
 
 /// A calendar in the making.
-pub(crate) struct Planner<'a> {
+struct Planner<'a> {
     spec: &'a Spec,
     start_us: i64,
     /// The unit of each seat, an index into `units`.
@@ -32,9 +28,20 @@ pub(crate) struct Planner<'a> {
     plan: Plan,
 }
 
+impl Plan {
+    /// Lays out the calendar of a fleet and the truth of each of its actuators.
+    ///
+    /// # Errors
+    /// The first fault of the spec.
+    pub fn new(spec: &Spec) -> Result<Self, Error> {
+        spec.check()?;
+        Planner::new(spec)?.plan()
+    }
+}
+
 impl<'a> Planner<'a> {
     /// Every tail on the ground with its first units.
-    pub(crate) fn new(spec: &'a Spec) -> Result<Self, Error> {
+    fn new(spec: &'a Spec) -> Result<Self, Error> {
         let units = fleet_units(spec)?;
         let wear = units.iter().map(|unit| seeded_rng(spec.seed, &["wear", &unit.serial_number])).collect();
         let mut planner = Self {
@@ -51,7 +58,7 @@ impl<'a> Planner<'a> {
     }
 
     /// All flights, in order of their number: a unit may change tails between two of them.
-    pub(crate) fn plan(mut self) -> Result<Plan, Error> {
+    fn plan(mut self) -> Result<Plan, Error> {
         for number in 1..=self.spec.flights_per_tail {
             self.exchange(number)?;
             self.inspect(number);
@@ -107,7 +114,6 @@ impl<'a> Planner<'a> {
         Ok(())
     }
 
-    /// Tail and position of a seat.
     fn place(&self, seat: usize) -> (&'a String, &'a Position) {
         let positions = &self.spec.positions;
         (&self.spec.tails[seat / positions.len()], &positions[seat % positions.len()])
@@ -242,16 +248,7 @@ impl<'a> Planner<'a> {
         plant = plant.with_friction_factor((spread.friction * normal(&mut of_flight)).exp());
         let mut profile = spec.profile.clone();
         profile.load_n *= place.load_factor;
-        let flight = ActuatorFlight {
-            tail,
-            position: &place.position,
-            part_number: &spec.parts[unit.part].part_number,
-            serial_number: &unit.serial_number,
-            number,
-        };
-        spec.all_changes().for_each(|change| change.apply(&flight, &mut plant, &mut profile, &mut sensors));
-        profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
-        PlannedActuator {
+        let mut actuator = PlannedActuator {
             position: place.position.clone(),
             part: unit.part,
             serial_number: unit.serial_number.clone(),
@@ -259,6 +256,36 @@ impl<'a> Planner<'a> {
             plant,
             profile,
             sensors,
+        };
+        let part_number = &spec.parts[unit.part].part_number;
+        spec.all_changes().for_each(|change| change.apply(&mut actuator, tail, part_number, number));
+        actuator.profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
+        actuator
+    }
+}
+
+impl PlantedChange {
+    /// Applies the change to an actuator on a tail, as far as it has come in a flight of the tail, counted from 1.
+    fn apply(&self, actuator: &mut PlannedActuator, tail: &str, part_number: &str, number: usize) {
+        let conditions = [
+            (&self.tail, tail),
+            (&self.position, &actuator.position),
+            (&self.part_number, part_number),
+            (&self.serial_number, &actuator.serial_number),
+        ];
+        let is_meant = conditions.iter().all(|(wanted, is)| wanted.as_deref().is_none_or(|w| w == *is));
+        let Some(gone) = number.checked_sub(self.from_flight).filter(|_| is_meant) else { return };
+        let growing = self.to_flight.map_or(0, |to| to.saturating_sub(self.from_flight));
+        let share = if gone >= growing { 1.0 } else { (gone + 1) as f64 / (growing + 1) as f64 };
+        let PlannedActuator { plant, profile, sensors, .. } = actuator;
+        plant.contact.stiffness_n_per_m *= 1.0 + share * (self.stiffness_factor - 1.0);
+        *plant = plant.with_friction_factor(1.0 + share * (self.friction_factor - 1.0));
+        sensors.load.gain_error += share * self.load_gain;
+        sensors.load.bias += share * self.load_bias_n;
+        sensors.screw.delay_s += share * self.skew_s;
+        sensors.load.delay_s += share * self.load_delay_s;
+        if let Some(buffet) = &self.buffet {
+            profile.buffet = buffet.clone();
         }
     }
 }
@@ -266,4 +293,72 @@ impl<'a> Planner<'a> {
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let drawn: f64 = StandardNormal.sample(rng);
     drawn.clamp(-2.5, 2.5)
+}
+
+/// A unit as chance and the spec made it.
+#[derive(Debug, Clone)]
+struct FleetUnit {
+    /// Index into the spec's parts.
+    part: usize,
+    serial_number: String,
+    age_hours: f64,
+    gap_m: f64,
+    stiffness_factor: f64,
+    wear: WearLaw,
+}
+
+/// Every unit of the fleet, in order of tail and position at the start; then the spares, in the spec's order.
+fn fleet_units(spec: &Spec) -> Result<Vec<FleetUnit>, Error> {
+    let places = spec.tails.iter().flat_map(|tail| spec.positions.iter().map(move |place| (tail, place)));
+    let mut units: Vec<FleetUnit> = places
+        .enumerate()
+        .map(|(count, (tail, place))| unit(spec, tail, place, count))
+        .collect::<Result<_, _>>()?;
+    let spares: Vec<_> = spec.replacements.iter().map(|spare| spare_unit(spec, &units, spare)).collect();
+    units.extend(spares);
+    let names: Vec<_> = units.iter().map(|unit| (unit.part, unit.serial_number.as_str())).collect();
+    match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
+        Some((_, (_, name))) => Err(Error::Twice { kind: "serial number", name: (*name).to_owned() }),
+        None => Ok(units),
+    }
+}
+
+fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<FleetUnit, Error> {
+    let part = spec.part_of(place)?;
+    let chances = &spec.parts[part];
+    let mut rng = seeded_rng(spec.seed, &["unit", tail, &place.position]);
+    let mut between = |[least, greatest]: [f64; 2]| least + (greatest - least) * rng.random::<f64>();
+    let (gap_m, age_hours) = (between(chances.gap_m), between(chances.unit_hours));
+    let stiffness_factor = 1.0 + between([-spec.spread.stiffness, spec.spread.stiffness]);
+    let declared = spec.units.iter().find(|unit| unit.tail == tail && unit.position == place.position);
+    Ok(FleetUnit {
+        part,
+        serial_number: declared
+            .and_then(|u| u.serial_number.clone())
+            .unwrap_or(format!("S{}", 10_001 + count)),
+        age_hours: declared.and_then(|u| u.unit_hours).unwrap_or(age_hours),
+        gap_m: declared.and_then(|u| u.gap_m).unwrap_or(gap_m),
+        stiffness_factor: declared.and_then(|u| u.stiffness_factor).unwrap_or(stiffness_factor),
+        wear: declared.and_then(|u| u.wear).unwrap_or(chances.wear),
+    })
+}
+
+/// A spare of the part that its place holds, as stiff as the part.
+fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUnit {
+    let part = units[seat(spec, &spare.tail, &spare.position)].part;
+    FleetUnit {
+        part,
+        serial_number: spare.serial_number.clone(),
+        age_hours: spare.unit_hours,
+        gap_m: spare.gap_m,
+        stiffness_factor: 1.0,
+        wear: spare.wear.unwrap_or(spec.parts[part].wear),
+    }
+}
+
+/// Index of a place, counted by tail and then by position; the spec is checked before, so both names are found.
+fn seat(spec: &Spec, tail: &str, position: &str) -> usize {
+    let tail = spec.tails.iter().take_while(|known| *known != tail).count();
+    let position = spec.positions.iter().take_while(|known| known.position != position).count();
+    tail * spec.positions.len() + position
 }

@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
 use crate::error::Error;
-use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
-use crate::fleet::planted_change::PlantedChange;
+use crate::fleet::fleet_events::{LogFault, PlantedChange, PlayCheck, Replacement, Reshim, Swap};
 use crate::fleet::wear::WearLaw;
 use crate::load::flight_profile::Profile;
 use crate::plant::actuator_plant::Plant;
@@ -199,35 +198,29 @@ impl Spec {
         Ok(day.duration_since(Date::constant(1970, 1, 1)).as_micros() as i64)
     }
 
-    /// Where in `parts` the part of a name stands.
-    pub(crate) fn part_index(&self, place: &str, part_number: &str) -> Result<usize, Error> {
-        let mut names = self.parts.iter().map(|part| part.part_number.as_str());
-        let found = names.clone().position(|name| name == part_number);
-        found.ok_or_else(|| unknown(&format!("position \"{place}\""), "part", part_number, &mut names))
+    /// Index of the part of a position.
+    pub(crate) fn part_of(&self, place: &Position) -> Result<usize, Error> {
+        self.known_part(&format!("position \"{}\"", place.position), &place.part_number)
+    }
+
+    fn known_part(&self, who: &str, part_number: &str) -> Result<usize, Error> {
+        known(who, "part", part_number, self.parts.iter().map(|part| part.part_number.as_str()))
     }
 
     /// Checks that every number is in its range and every name is declared once.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.start_us()?;
-        self.check_names()?;
+        check_unique("tails", "tail", self.tails.iter().map(String::as_str))?;
+        check_unique("parts", "part", self.parts.iter().map(|part| part.part_number.as_str()))?;
+        check_unique("positions", "position", self.positions.iter().map(|of| of.position.as_str()))?;
         // Every seed is possible, but not every one is a number of TOML.
         ranges::check("", &Self { seed: 0, ..self.clone() })?;
         self.check_departures()?;
-        let mut positions = self.positions.iter();
-        positions.try_for_each(|place| self.part_index(&place.position, &place.part_number).map(drop))?;
+        self.positions.iter().try_for_each(|place| self.part_of(place).map(drop))?;
         self.units.iter().try_for_each(|unit| self.check_place("a unit", &unit.tail, &unit.position))?;
         self.check_events()?;
         self.log_faults.iter().try_for_each(|fault| self.check_log_fault(fault))?;
         self.all_changes().try_for_each(|change| self.check_change(change))
-    }
-
-    fn check_names(&self) -> Result<(), Error> {
-        let tails: Vec<&str> = self.tails.iter().map(String::as_str).collect();
-        let parts: Vec<&str> = self.parts.iter().map(|part| part.part_number.as_str()).collect();
-        let positions: Vec<&str> = self.positions.iter().map(|place| place.position.as_str()).collect();
-        check_unique("tails", "tail", &tails)?;
-        check_unique("parts", "part", &parts)?;
-        check_unique("positions", "position", &positions)
     }
 
     /// The longest flight fits between two departures.
@@ -254,12 +247,8 @@ impl Spec {
         let checks = checks.map(|of| ("a play check", of.before_flight, &of.tail, &of.position));
         swaps.chain(spares).chain(reshims).chain(checks).try_for_each(|(who, flight, tail, position)| {
             if !(2..=self.flights_per_tail).contains(&flight) {
-                let must = "between 2 and `flights_per_tail`".to_owned();
-                return Err(Error::Value {
-                    key: format!("before_flight of {who}"),
-                    value: flight as f64,
-                    must,
-                });
+                let (key, must) = (format!("before_flight of {who}"), "between 2 and `flights_per_tail`");
+                return Err(Error::Value { key, value: flight as f64, must: must.to_owned() });
             }
             self.check_place(who, tail, position)
         })
@@ -282,28 +271,25 @@ impl Spec {
         let tail = change.tail.as_deref().unwrap_or(&self.tails[0]);
         let position = change.position.as_deref().unwrap_or(&self.positions[0].position);
         self.check_place("a change", tail, position)?;
-        let part = change.part_number.as_deref().map(|part| self.part_index("a change", part));
-        part.transpose().map(|_| ())
+        change.part_number.iter().try_for_each(|part| self.known_part("a change", part).map(drop))
     }
 
     fn check_tail(&self, who: &str, tail: &str) -> Result<(), Error> {
-        if self.tails.iter().any(|known| known == tail) {
-            return Ok(());
-        }
-        Err(unknown(who, "tail", tail, self.tails.iter().map(String::as_str)))
+        known(who, "tail", tail, self.tails.iter().map(String::as_str)).map(drop)
     }
 
     fn check_place(&self, who: &str, tail: &str, position: &str) -> Result<(), Error> {
         self.check_tail(who, tail)?;
-        let mut positions = self.positions.iter().map(|place| place.position.as_str());
-        if positions.clone().all(|known| known != position) {
-            return Err(unknown(who, "position", position, &mut positions));
-        }
-        Ok(())
+        known(who, "position", position, self.positions.iter().map(|of| of.position.as_str())).map(drop)
     }
 }
 
-fn check_unique(key: &'static str, kind: &'static str, names: &[&str]) -> Result<(), Error> {
+fn check_unique<'a>(
+    key: &'static str,
+    kind: &'static str,
+    names: impl Iterator<Item = &'a str>,
+) -> Result<(), Error> {
+    let names: Vec<&str> = names.collect();
     if names.is_empty() || names.contains(&"") {
         return Err(Error::Empty { key });
     }
@@ -311,7 +297,18 @@ fn check_unique(key: &'static str, kind: &'static str, names: &[&str]) -> Result
     again.map_or(Ok(()), |(_, name)| Err(Error::Twice { kind, name: (*name).to_owned() }))
 }
 
-fn unknown<'a>(place: &str, kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Error {
-    let known = known.collect::<Vec<_>>().join(", ");
-    Error::Unknown { place: place.to_owned(), kind, name: name.to_owned(), known }
+/// Index of a name among the declared ones; `who` uses it.
+fn known<'a>(
+    who: &str,
+    kind: &'static str,
+    name: &str,
+    declared: impl Iterator<Item = &'a str>,
+) -> Result<usize, Error> {
+    let declared: Vec<&str> = declared.collect();
+    declared.iter().position(|known| *known == name).ok_or_else(|| Error::Unknown {
+        place: who.to_owned(),
+        kind,
+        name: name.to_owned(),
+        known: declared.join(", "),
+    })
 }

@@ -2,10 +2,7 @@
 
 pub(crate) mod fleet_events;
 pub(crate) mod fleet_plan;
-pub(crate) mod fleet_plan_types;
 pub(crate) mod fleet_spec;
-pub(crate) mod planted_change;
 pub(crate) mod wear;
 
 mod fleet_planner;
-mod fleet_roster;

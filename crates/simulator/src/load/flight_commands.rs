@@ -64,7 +64,10 @@ impl CommandProfile {
         let stick = path(&stick_moves(profile, &mut draw("stick")), points);
         let trim = coloured(TRIM_HZ, points, &mut draw("trim"));
         let manoeuvre = path(&manoeuvres(profile.duration_s, &mut draw("manoeuvre")), points);
-        let gust = gusts(profile, points, &mut draw("gust"));
+        let gust: Vec<f64> = match profile.gust_form.noise(profile.gust_hz, GRID_S, draw("gust")) {
+            Some(mut noise) => (0..points).map(|_| noise.next()).collect(),
+            None => coloured(profile.gust_hz, points, &mut draw("gust")),
+        };
         let side = profile
             .reversals
             .map(|count| path(&sides(profile.duration_s, count, &mut draw("sides")), points));
@@ -75,7 +78,8 @@ impl CommandProfile {
             let pressure = pressure(time_s(k) / profile.duration_s);
             let air = match &side {
                 Some(side) => -side[k] * one_sided(profile, pressure, manoeuvre[k], gust[k]),
-                None => airload(profile, pressure, manoeuvre[k], gust[k]),
+                None if profile.no_reversal => one_sided(profile, pressure, manoeuvre[k], gust[k]),
+                None => pressure * (MANOEUVRE_SHARE * manoeuvre[k] + profile.gust_share * gust[k]),
             };
             CommandSample {
                 command_m: profile.stroke_m * asked[k].clamp(-1.0, 1.0),
@@ -104,14 +108,6 @@ fn time_s(index: usize) -> f64 {
     index as f64 * GRID_S - LEAD_IN_S
 }
 
-/// Load at zero deflection over `load_n`.
-fn airload(profile: &Profile, pressure: f64, manoeuvre: f64, gust: f64) -> f64 {
-    if profile.no_reversal {
-        return one_sided(profile, pressure, manoeuvre, gust);
-    }
-    pressure * (MANOEUVRE_SHARE * manoeuvre + profile.gust_share * gust)
-}
-
 /// Load at zero deflection over `load_n` of a surface that is sucked one way, even on the ground: the
 /// mean outweighs manoeuvre, gust and full deflection together.
 fn one_sided(profile: &Profile, pressure: f64, manoeuvre: f64, gust: f64) -> f64 {
@@ -131,14 +127,6 @@ pub(crate) fn phase_factor(progress: f64, factors: &[f64; PHASES.len()]) -> f64 
         (start, middle, factor) = (start + phase.share, next_middle, *next);
     }
     factor
-}
-
-/// Gusts of the profile's form, at unit variance.
-fn gusts(profile: &Profile, points: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    match profile.gust_form.noise(profile.gust_hz, GRID_S, rng.clone()) {
-        Some(mut noise) => (0..points).map(|_| noise.next()).collect(),
-        None => coloured(profile.gust_hz, points, rng),
-    }
 }
 
 /// Which side the load is on: a change of side at each of so many random times, well inside the log.
@@ -250,11 +238,8 @@ fn manoeuvres(duration_s: f64, rng: &mut ChaCha8Rng) -> Vec<MotionPrimitive> {
         if rng.random_bool(0.7) {
             side = -side;
         }
-        moves.push(MotionPrimitive {
-            start_s,
-            lasts_s: rng.random_range(0.6..1.6),
-            target: side * rng.random_range(0.0..1.0),
-        });
+        let (lasts_s, target) = (rng.random_range(0.6..1.6), side * rng.random_range(0.0..1.0));
+        moves.push(MotionPrimitive { start_s, lasts_s, target });
         start_s += rng.random_range(2.0..6.0);
     }
     moves

@@ -58,7 +58,6 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Samples in the log.
     pub(crate) fn samples(&self) -> usize {
         (self.duration_s * self.sample_rate_hz).round() as usize
     }

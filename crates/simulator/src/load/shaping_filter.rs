@@ -98,7 +98,6 @@ impl ShapedNoise {
         Self::new(sections, (5.0 / (low_hz * step_s)).ceil() as usize, rng)
     }
 
-    /// The next value.
     pub(crate) fn next(&mut self) -> f64 {
         let white: f64 = StandardNormal.sample(&mut self.rng);
         self.scale * self.filter(white)

@@ -47,7 +47,6 @@ impl Plant {
         self
     }
 
-    /// Whether anything changes during a log.
     pub(crate) fn is_varying(&self) -> bool {
         self.contact.is_varying() || self.motor_friction.is_warming() || self.screw_friction.is_warming()
     }

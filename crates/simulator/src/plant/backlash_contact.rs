@@ -74,14 +74,8 @@ impl ContactLaw {
     /// F′(p) / K.
     fn slope(&self, p: f64) -> f64 {
         match *self {
-            Self::Linear => 1.0,
-            Self::Soft { share, depth_m } => {
-                if p < depth_m {
-                    share
-                } else {
-                    1.0
-                }
-            }
+            Self::Soft { share, depth_m } if p < depth_m => share,
+            Self::Linear | Self::Soft { .. } => 1.0,
             Self::Hertz { share, reference_m } => 1.0 - share + share * 1.5 * (p / reference_m).sqrt(),
             Self::Toe { share, depth_m } => 1.0 - (1.0 - share) * (-p / depth_m).exp(),
         }
@@ -191,14 +185,16 @@ impl Contact {
     /// loads of the band; the result is the difference of the intercepts. For linear flanks it is the
     /// gap; a soft toe of less force than the band adds to it.
     pub fn extrapolated_gap_m(&self, from_n: f64, to_n: f64) -> f64 {
-        let (lower_law, lower_n_per_m) = self.lower();
-        let flanks = [(self.law, self.stiffness_n_per_m), (lower_law, lower_n_per_m)];
+        let flanks = [(self.law, self.stiffness_n_per_m), self.lower()];
         let intercept_m = |(law, stiffness_n_per_m): (ContactLaw, f64)| {
             let points: [(f64, f64); LINE_POINTS] = std::array::from_fn(|k| {
                 let load_n = from_n + (to_n - from_n) * k as f64 / (LINE_POINTS - 1) as f64;
                 (load_n, law.penetration_m(load_n / stiffness_n_per_m))
             });
-            intercept(&points)
+            let mean =
+                |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / LINE_POINTS as f64;
+            let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+            y - mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2)) * x
         };
         self.gap_m + flanks.map(intercept_m).iter().sum::<f64>()
     }
@@ -254,15 +250,6 @@ impl Contact {
         let damping = if q > 0.0 { self.damping_n_s_per_m } else { 0.0 };
         MeanForce { force_n, slope_n_s_per_m: stiffness_n_per_m * slope * step_s + damping }
     }
-}
-
-/// The intercept of the least-squares line of y on x.
-fn intercept(points: &[(f64, f64)]) -> f64 {
-    let n = points.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2));
-    y - slope * x
 }
 
 #[cfg(test)]

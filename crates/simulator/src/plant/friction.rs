@@ -85,7 +85,6 @@ impl Friction {
         self.viscous_n_s_per_m + 2.0 * self.grease_n / self.grease_m_per_s / (1.0 + u * u)
     }
 
-    /// Sliding friction under a load.
     pub(crate) fn sliding(&self, load_n: f64) -> Levels {
         // The load drives motion along its own sign.
         let driven = self.backdriven_load_share.unwrap_or(self.load_share);

@@ -14,7 +14,6 @@
 //! remains; Newton's method inside a bracket finds it in two or three turns.
 
 use crate::plant::actuator_plant::Plant;
-use crate::plant::friction::FrictionBody;
 
 /// The equation for U₂ − U₁ is solved to this, m/s: 10⁻¹⁷ m over a step of 10⁻⁴ s.
 const SPEED_TOLERANCE_M_PER_S: f64 = 1e-13;
@@ -69,57 +68,26 @@ impl State {
 
 /// The state one step later.
 pub fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64) -> State {
-    let motor_rate = 2.0 * plant.motor_mass_kg / step_s;
-    let screw_rate = 2.0 * plant.screw_mass_kg / step_s;
-    let body = |friction, speed, bend, rate| {
-        plant.friction_law.body(friction, forces.load_n, speed, bend, rate, step_s)
+    let body = |friction, mass_kg: f64, speed, bend, force_n: f64| {
+        let rate = 2.0 * mass_kg / step_s;
+        let body = plant.friction_law.body(friction, forces.load_n, speed, bend, rate, step_s);
+        (body, rate * speed + force_n)
     };
-    let motor = Mass {
-        body: body(&plant.motor_friction, state.motor_m_per_s, state.motor_bend, motor_rate),
-        push_n: motor_rate * state.motor_m_per_s + forces.drive_n,
-    };
-    let screw = Mass {
-        body: body(&plant.screw_friction, state.screw_m_per_s, state.screw_bend, screw_rate),
-        push_n: screw_rate * state.screw_m_per_s + forces.load_n,
-    };
-    let (u1, u2) = solve_step(plant, state, &forces, &motor, &screw, step_s);
-    State {
-        motor_m: state.motor_m + step_s * u1,
-        motor_m_per_s: after(state.motor_m_per_s, u1),
-        screw_m: state.screw_m + step_s * u2,
-        screw_m_per_s: after(state.screw_m_per_s, u2),
-        motor_bend: motor.body.bristle_update(u1),
-        screw_bend: screw.body.bristle_update(u2),
-    }
-}
-
-/// A mass and all that pushes it but the coupling.
-struct Mass {
-    body: FrictionBody,
-    push_n: f64,
-}
-
-/// The mean speeds at which both masses and the coupling agree.
-///
-/// The mismatch falls at least as fast as the relative speed rises, so the root lies between the
-/// guess and the guess plus the mismatch.
-fn solve_step(
-    plant: &Plant,
-    state: &State,
-    forces: &Forces,
-    motor: &Mass,
-    screw: &Mass,
-    step_s: f64,
-) -> (f64, f64) {
+    let (v1, v2) = (state.motor_m_per_s, state.screw_m_per_s);
+    let (motor, motor_push_n) =
+        body(&plant.motor_friction, plant.motor_mass_kg, v1, state.motor_bend, forces.drive_n);
+    let (screw, screw_push_n) =
+        body(&plant.screw_friction, plant.screw_mass_kg, v2, state.screw_bend, forces.load_n);
+    // The mean speeds at which both masses and the coupling agree. The mismatch falls at least as fast as the relative speed
+    // rises, so the root lies between the guess and the guess plus the mismatch.
     let delta_m = state.screw_m - state.motor_m - forces.shake_m;
-    let mut relative = state.screw_m_per_s - state.motor_m_per_s;
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    let mut speeds = (0.0, 0.0);
+    let (mut relative, mut low, mut high) = (v2 - v1, f64::NEG_INFINITY, f64::INFINITY);
+    let (mut u1, mut u2) = (0.0, 0.0);
     for _ in 0..TURNS {
         let coupling = plant.contact.mean_force(delta_m, relative - forces.shake_m_per_s, step_s);
-        let (u1, slope1) = motor.body.mean_velocity(motor.push_n + coupling.force_n);
-        let (u2, slope2) = screw.body.mean_velocity(screw.push_n - coupling.force_n);
-        speeds = (u1, u2);
+        let (slope1, slope2);
+        (u1, slope1) = motor.mean_velocity(motor_push_n + coupling.force_n);
+        (u2, slope2) = screw.mean_velocity(screw_push_n - coupling.force_n);
         let miss = u2 - u1 - relative;
         if miss.abs() < SPEED_TOLERANCE_M_PER_S {
             break;
@@ -132,7 +100,14 @@ fn solve_step(
         let newton = relative + miss / (1.0 + (slope1 + slope2) * coupling.slope_n_s_per_m);
         relative = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
     }
-    speeds
+    State {
+        motor_m: state.motor_m + step_s * u1,
+        motor_m_per_s: after(v1, u1),
+        screw_m: state.screw_m + step_s * u2,
+        screw_m_per_s: after(v2, u2),
+        motor_bend: motor.bristle_update(u1),
+        screw_bend: screw.bristle_update(u2),
+    }
 }
 
 /// A held mass has stopped; any other leaves the step by the midpoint rule.

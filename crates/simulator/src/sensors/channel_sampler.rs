@@ -9,9 +9,11 @@ pub(crate) struct ChannelSampler {
     samples: Vec<f64>,
     wanted: usize,
     rate_hz: f64,
-    delay_s: f64,
     step_s: f64,
-    sensor: SensorState,
+    channel: Channel,
+    /// The hysteretic error of the sensor, within ± `hysteresis`, and the output of its lag.
+    error: f64,
+    lagged: f64,
     /// What the sensor showed at the end of the last step.
     shown: f64,
     average: Option<BoxAverage>,
@@ -26,9 +28,10 @@ impl ChannelSampler {
             samples: Vec::with_capacity(wanted),
             wanted,
             rate_hz,
-            delay_s: channel.delay_s,
             step_s,
-            sensor: SensorState::new(channel, initial),
+            channel: channel.clone(),
+            error: 0.0,
+            lagged: initial,
             shown: initial,
             average: channel.box_average.then(BoxAverage::default),
         }
@@ -45,18 +48,18 @@ impl ChannelSampler {
 
     /// One step of the integrator, in which the quantity goes from one value to the next.
     pub(crate) fn pass(&mut self, from_s: f64, before: f64, after: f64) {
-        let (before, after) = if self.sensor.is_ideal() {
+        let (before, after) = if self.channel.hysteresis == 0.0 && self.channel.lag_s == 0.0 {
             (before, after)
         } else {
             let shown = self.shown;
-            self.shown = self.sensor.follow(before, after, self.step_s);
+            self.shown = self.follow(before, after);
             (shown, self.shown)
         };
         while !self.is_full() {
             // The first instant of an average ends no period: it opens the first one.
             let is_closed = self.average.as_ref().is_some_and(|average| !average.is_open);
             let instant = self.samples.len() as f64 - f64::from(u8::from(is_closed));
-            let part = (instant / self.rate_hz - self.delay_s - from_s) / self.step_s;
+            let part = (instant / self.rate_hz - self.channel.delay_s - from_s) / self.step_s;
             if part > 1.0 {
                 break;
             }
@@ -76,32 +79,12 @@ impl ChannelSampler {
             average.since = 0.0;
         }
     }
-}
-
-/// Hysteresis and lag of a sensor, both with a memory of their own.
-#[derive(Debug)]
-struct SensorState {
-    channel: Channel,
-    /// The hysteretic error, within ± `hysteresis`.
-    error: f64,
-    /// The output of the lag.
-    lagged: f64,
-}
-
-impl SensorState {
-    fn new(channel: &Channel, initial: f64) -> Self {
-        Self { channel: channel.clone(), error: 0.0, lagged: initial }
-    }
-
-    fn is_ideal(&self) -> bool {
-        self.channel.hysteresis == 0.0 && self.channel.lag_s == 0.0
-    }
 
     /// What the sensor shows after a step in which its input moves evenly between two values.
     ///
     /// The hysteretic error obeys `de = (H sgn dx − e) |dx|/ℓ`, and the lag `τ y' = x − y`; both are
     /// integrated exactly.
-    fn follow(&mut self, before: f64, after: f64, step_s: f64) -> f64 {
+    fn follow(&mut self, before: f64, after: f64) -> f64 {
         let Channel { hysteresis, hysteresis_length, lag_s, .. } = self.channel;
         let mut input = (before, after);
         if hysteresis > 0.0 {
@@ -114,8 +97,8 @@ impl SensorState {
             return input.1;
         }
         // The input is a ramp: the output trails it by τ times the slope, and forgets its start.
-        let trail = (input.1 - input.0) / step_s * lag_s;
-        let forgotten = (-step_s / lag_s).exp();
+        let trail = (input.1 - input.0) / self.step_s * lag_s;
+        let forgotten = (-self.step_s / lag_s).exp();
         self.lagged = input.1 - trail + (self.lagged - input.0 + trail) * forgotten;
         self.lagged
     }

@@ -105,15 +105,6 @@ pub struct Channel {
     pub coloured_form: NoiseColour,
 }
 
-/// The error of a channel whose nonlinearity is one: of a load over `load_n`, of a position over the stroke.
-fn nonlinearity_at(value: f64, profile: &Profile, name: &str) -> f64 {
-    if name == "load" {
-        return value * value.abs() / (profile.load_n * profile.load_n);
-    }
-    let u = (value / profile.stroke_m).clamp(-1.0, 1.0);
-    (u - u.powi(3)) / CUBIC_PEAK
-}
-
 /// Mean length of a burst of missing samples.
 const BURST: f64 = 5.0;
 
@@ -183,8 +174,16 @@ impl Channel {
     ) -> Vec<f64> {
         let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
         let last = (values.len().max(2) - 1) as f64;
+        // The error of a channel whose nonlinearity is one: of a load over `load_n`, of a position over the stroke.
+        let nonlinearity = |value: f64| match name {
+            "load" => value * value.abs() / (profile.load_n * profile.load_n),
+            _ => {
+                let u = (value / profile.stroke_m).clamp(-1.0, 1.0);
+                (u - u.powi(3)) / CUBIC_PEAK
+            }
+        };
         for (k, value) in values.iter_mut().enumerate() {
-            let bent = self.nonlinearity * nonlinearity_at(*value, profile, name)
+            let bent = self.nonlinearity * nonlinearity(*value)
                 + self.periodic.iter().map(|error| error.at(*value)).sum::<f64>()
                 + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);

@@ -5,4 +5,3 @@
 mod fleet;
 mod flight;
 mod physics;
-mod unchanged;

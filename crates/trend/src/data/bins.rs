@@ -39,12 +39,11 @@ pub(crate) fn bin(estimates: &[WeightedGap], count: usize) -> Vec<Bin> {
 fn mean(estimates: &[WeightedGap]) -> Bin {
     let weight: f64 = estimates.iter().map(|e| e.weight).sum();
     let sum = |f: fn(&WeightedGap) -> f64| estimates.iter().map(|e| e.weight * f(e)).sum::<f64>() / weight;
-    let installation = estimates[estimates.len() - 1].installation;
-    let departure_us = estimates.iter().map(|e| e.departure_us as f64).sum::<f64>() / estimates.len() as f64;
+    let departures_us = estimates.iter().map(|e| e.departure_us as f64);
     Bin {
         usage: sum(|e| e.usage),
-        departure_us,
-        installation,
+        departure_us: departures_us.sum::<f64>() / estimates.len() as f64,
+        installation: estimates[estimates.len() - 1].installation,
         gap_m: sum(|e| e.gap_m),
         variance_m2: weight.recip(),
     }

@@ -97,30 +97,29 @@ impl Noise {
 ///
 /// `usual` is assumed before any batch is seen.
 pub(crate) fn inflation(values: &[f64], errors: &[f64], usual: f64) -> f64 {
-    let (means, errors) = batches(values, errors);
-    let (found, seen) = (first_differences(&means, &errors, false).unwrap_or(0.0), comparisons(&means));
+    let (means, errors, seen) = batches(values, errors);
+    let found = first_differences(&means, &errors, false).unwrap_or(0.0);
     ((seen * found + PRIOR_BATCHES * usual) / (seen + PRIOR_BATCHES)).clamp(1.0, MAX_INFLATION)
 }
 
 /// The inflation as far as chance in a few batches does not explain it.
 pub(crate) fn certain_inflation(values: &[f64], errors: &[f64]) -> f64 {
-    let (means, errors) = batches(values, errors);
-    let (found, seen) = (successive(&means, &errors).unwrap_or(0.0), comparisons(&means));
+    let (means, errors, seen) = batches(values, errors);
+    let found = successive(&means, &errors).unwrap_or(0.0);
     (found / (1.0 + CERTAIN / seen.sqrt())).clamp(1.0, MAX_INFLATION)
 }
 
-/// Means of successive batches, with the errors that independent flights would give.
-fn batches(values: &[f64], errors: &[f64]) -> (Vec<f64>, Vec<f64>) {
+/// Means of successive batches, with the errors that independent flights would give, and the number of their differences.
+fn batches(values: &[f64], errors: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
     let mean = |(values, errors): (&[f64], &[f64])| {
         let weight: f64 = errors.iter().map(|error| error.powi(-2)).sum();
         let sum: f64 = values.iter().zip(errors).map(|(value, error)| value * error.powi(-2)).sum();
         (sum / weight, weight.recip().sqrt())
     };
-    values.chunks_exact(BATCH).zip(errors.chunks_exact(BATCH)).map(mean).unzip()
-}
-
-fn comparisons(means: &[f64]) -> f64 {
-    means.len().saturating_sub(1) as f64
+    let (means, errors): (Vec<f64>, Vec<f64>) =
+        values.chunks_exact(BATCH).zip(errors.chunks_exact(BATCH)).map(mean).unzip();
+    let differences = means.len().saturating_sub(1) as f64;
+    (means, errors, differences)
 }
 
 /// Found over stated variance from successive differences, drawn to one while they are few.

@@ -19,7 +19,6 @@ const STATED_COUNT: f64 = 4.0;
 /// One estimate that takes part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WeightedGap {
-    /// Index of its flight.
     pub(crate) flight: usize,
     pub(crate) installation: u32,
     pub(crate) departure_us: i64,

@@ -2,10 +2,7 @@
 
 use crate::error::Error;
 
-/// Microseconds of a day.
 pub(crate) const DAY_US: i64 = 86_400_000_000;
-
-/// Microseconds of an hour.
 const HOUR_US: f64 = 3.6e9;
 
 /// One flight of a unit, as a caller knows it; order does not matter.
@@ -278,7 +275,6 @@ struct UsageAccumulator {
 }
 
 impl UsageAccumulator {
-    /// Adds a flight.
     fn add_flight(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
         let metered = self.metered(row);

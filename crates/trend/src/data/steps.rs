@@ -6,8 +6,6 @@ use crate::data::outliers::WeightedGap;
 
 /// Numbers of estimates on each side of a candidate, from the shortest window to the longest.
 const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
-
-/// The longest of them.
 const FARTHEST: usize = 120;
 
 /// Distance between the places that are tested first.
@@ -94,12 +92,11 @@ pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f6
     let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
         .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
     changes.fold((0.0, 0.0), |(squares, count), at| {
-        let step = sums.offset(&(0..estimates.len()), at, SIDE);
-        let se_m = step.se_m();
-        if step.step_m.abs() > largest_m || se_m > 0.5 * largest_m {
+        let Offset { step_m, se_m, .. } = sums.offset(&(0..estimates.len()), at, SIDE);
+        if step_m.abs() > largest_m || se_m > 0.5 * largest_m {
             return (squares, count);
         }
-        (squares + step.step_m * step.step_m - se_m * se_m, count + 1.0)
+        (squares + step_m * step_m - se_m * se_m, count + 1.0)
     })
 }
 
@@ -122,13 +119,8 @@ struct Offset {
     at: usize,
     step_m: f64,
     variance: f64,
+    se_m: f64,
     slope: f64,
-}
-
-impl Offset {
-    fn se_m(&self) -> f64 {
-        self.variance.sqrt()
-    }
 }
 
 /// Variance, means and centred sums of squares of a range.
@@ -181,14 +173,14 @@ impl PrefixSums {
         let slope = (left.xy + right.xy) * slope_variance;
         let apart = right.x - left.x;
         let variance = left.variance + right.variance + apart * apart * slope_variance;
-        Offset { at, step_m: right.y - left.y - slope * apart, variance, slope }
+        Offset { at, step_m: right.y - left.y - slope * apart, variance, se_m: variance.sqrt(), slope }
     }
 
     /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
     fn is_beyond_wear(&self, range: &Range<usize>, step: &Offset) -> bool {
         let [left, right] = self.sides(range, step.at, NEAR);
         let worn_m = (step.slope * (right.x - left.x)).abs();
-        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m().powi(2) + self.wear_noise_m * worn_m)
+        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m.powi(2) + self.wear_noise_m * worn_m)
     }
 
     /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
@@ -215,7 +207,7 @@ impl PrefixSums {
     ///
     /// Every third place is tested first, then all places near those with half the required ratio.
     fn largest(&self, range: &Range<usize>, block: Range<usize>) -> Option<StepChange> {
-        let ratio = |step: &Offset| (step.step_m / step.se_m()).abs();
+        let ratio = |step: &Offset| (step.step_m / step.se_m).abs();
         let places = block.start.max(range.start + MIN_ESTIMATES)
             ..(range.end + 1).saturating_sub(MIN_ESTIMATES).min(block.end);
         let is_half = |at: usize, reach: usize| {
@@ -250,14 +242,9 @@ impl PrefixSums {
             before + after
         };
         let at = places.min_by(|a, b| squares(*a).total_cmp(&squares(*b))).unwrap_or(found);
-        let step = self.offset(range, at, reach);
-        let (jump_m, jump_se_m) = self.step_between_lines(range, at, step.slope);
-        StepChange { at, step_m: step.step_m, se_m: step.se_m(), jump_m, jump_se_m }
-    }
-
-    /// The step between the lines of both sides, each with a slope of its own, where they meet in time: the
-    /// growth from one flight to the next is no part of it.
-    fn step_between_lines(&self, range: &Range<usize>, at: usize, common: f64) -> (f64, f64) {
+        let Offset { step_m, se_m, slope: common, .. } = self.offset(range, at, reach);
+        // Where the lines of both sides, each with a slope of its own, meet in time: the growth from one flight to the next is
+        // no part of the jump.
         let x = self.usages[at - 1].midpoint(self.usages[at]);
         let end = |side: WindowStats| {
             let away = x - side.x;
@@ -265,7 +252,7 @@ impl PrefixSums {
             (side.y + away * self.slope(&side, common), variance)
         };
         let [(before_m, before_m2), (after_m, after_m2)] = self.sides(range, at, SIDE).map(end);
-        (after_m - before_m, (before_m2 + after_m2).sqrt())
+        StepChange { at, step_m, se_m, jump_m: after_m - before_m, jump_se_m: (before_m2 + after_m2).sqrt() }
     }
 }
 

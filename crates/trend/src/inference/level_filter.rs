@@ -79,7 +79,6 @@ impl Filter {
         Self { steps, log_variance, end_m2: p, start_m2: start_m2.max(0.0) }
     }
 
-    /// Runs a sequence through.
     pub(crate) fn pass(&self, values: impl Iterator<Item = f64>) -> Pass {
         let (mut end, mut start, mut square) = (0.0, 0.0, 0.0);
         let weighted = self.steps.iter().zip(values).map(|(step, value)| {

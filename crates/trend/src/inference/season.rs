@@ -45,6 +45,7 @@ pub(crate) fn learn_season(seasonal_fits: &[SeasonalFit], limit_m: f64) -> Seaso
         if total > 0.0 { (sum / total, 1.0 / total) } else { (0.0, f64::INFINITY) }
     };
     let ((x, x_m2), (y, y_m2)) = (mean(0, 0), mean(1, 2));
+    // The mean amplitude is zero unless the seasonal component is significant.
     let believed = x * x / x_m2 + y * y / y_m2 > 2.0 * BELIEVED * BELIEVED;
     let phase = if believed { y.atan2(x) } else { 0.0 };
     let (c, s) = (phase.cos(), phase.sin());
@@ -55,15 +56,12 @@ pub(crate) fn learn_season(seasonal_fits: &[SeasonalFit], limit_m: f64) -> Seaso
             (c * w.amplitude_m[0] + s * w.amplitude_m[1], c * c * xx + 2.0 * c * s * xy + s * s * yy)
         })
         .collect();
-    amplitude_distribution(phase, &along, believed, PSEUDO_SD * limit_m)
-}
-
-/// Mean and spread by expectation–maximisation; the mean is zero unless the seasonal component is significant.
-fn amplitude_distribution(phase: f64, along: &[(f64, f64)], believed: bool, pseudo_m: f64) -> SeasonParams {
+    // Mean and spread by expectation–maximisation.
+    let pseudo_m = PSEUDO_SD * limit_m;
     let (mut mean_m, mut sd_m) = (0.0, pseudo_m);
     for _ in 0..30 {
         let (mut sum, mut squares, mut count) = (0.0, PSEUDO_UNITS * pseudo_m.powi(2), PSEUDO_UNITS);
-        for &(amplitude_m, error_m2) in along {
+        for &(amplitude_m, error_m2) in &along {
             let share = sd_m * sd_m / (sd_m * sd_m + error_m2);
             let own = mean_m + share * (amplitude_m - mean_m);
             sum += own;

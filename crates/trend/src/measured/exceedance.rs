@@ -70,7 +70,9 @@ pub(crate) fn exceedance(
             ended_at = Some(k);
             // Nothing on record made the gap smaller. Records near the limit fall below it by their scatter.
             if records[k - 1].gap_m < HYSTERESIS * limit_m {
-                events.push(fall(&records, k - 1));
+                let [before, Record { departure_us, gap_m, error_m, .. }] = [records[k - 2], records[k - 1]];
+                let (kind, step_m) = (ChangePointKind::Reset, gap_m - before.gap_m);
+                events.push(ChangePoint { departure_us, kind, step_m, se_m: error_m, certainty: 1.0 });
             }
         } else {
             events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
@@ -117,14 +119,6 @@ fn before(records: &[Record], at: usize) -> Option<f64> {
     let period = records[at].period;
     let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);
     crate::math::median(near.map(|r| r.gap_m).collect())
-}
-
-/// The fall to the first of two records below the limit, which end an exceedance.
-fn fall(records: &[Record], at: usize) -> ChangePoint {
-    let Record { departure_us, gap_m, error_m, .. } = records[at];
-    let kind = ChangePointKind::Reset;
-    let step_m = gap_m - records[at - 1].gap_m;
-    ChangePoint { departure_us, kind, step_m, se_m: error_m, certainty: 1.0 }
 }
 
 fn event(first: &Record, run: &Run, kind: ChangePointKind) -> ChangePoint {

@@ -25,7 +25,6 @@ pub(crate) const RECALLED: usize = 24;
 /// One measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record {
-    /// Index of its flight.
     pub(crate) flight: usize,
     /// Departure of its flight, microseconds since 1970 UTC.
     pub departure_us: i64,

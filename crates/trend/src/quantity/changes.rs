@@ -101,7 +101,9 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
     let weights: Vec<f64> = errors.iter().map(|error| (inflation * error * error).recip()).collect();
     let mut model = Model::new(&sound, &weights);
     if sound.len() >= MIN_FLIGHTS {
-        model.select();
+        // Adds the regressor with the largest gain as long as one is significant, then removes those that are not.
+        while model.steps.len() < MAX_STEPS && model.add_best() {}
+        while model.remove_worst() {}
     }
     let (beta, covariance) = model.solve()?;
     let (x_first, x_last) = (model.row(0), model.row(sound.len().checked_sub(1)?));
@@ -227,14 +229,12 @@ impl<'a> Model<'a> {
         self.solve_with(true).filter(|_| self.half_span_hours > 0.0)
     }
 
-    /// Adds the regressor with the largest gain as long as one is significant, then removes those that are not.
-    fn select(&mut self) {
-        while self.steps.len() < MAX_STEPS && self.add_best() {}
-        while self.remove_worst() {}
-    }
-
+    /// Adds the regressor with the largest gain, if it is significant.
     fn add_best(&mut self) -> bool {
-        let drift_gain = if self.has_drift { 0.0 } else { self.drift_gain() };
+        // Squared t-value of a drift in addition to the present regressors.
+        let with_drift = self.solve_with_drift().filter(|_| !self.has_drift);
+        let drift_gain =
+            with_drift.map_or(0.0, |(beta, covariance)| beta[DRIFT].powi(2) / covariance[(DRIFT, DRIFT)]);
         let (step_gain, at) = self.best_step();
         // A drift explains with one number what steps would follow in stairs.
         let excess = (drift_gain / DRIFT_GAIN, step_gain / STEP_GAIN);
@@ -248,12 +248,6 @@ impl<'a> Model<'a> {
             self.steps.insert(before, self.sums_from(at));
         }
         true
-    }
-
-    /// Squared t-value of a drift in addition to the present regressors.
-    fn drift_gain(&self) -> f64 {
-        self.solve_with_drift()
-            .map_or(0.0, |(beta, covariance)| beta[DRIFT].powi(2) / covariance[(DRIFT, DRIFT)])
     }
 
     /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.

@@ -42,8 +42,16 @@ struct Deviation {
 impl CommonCurve {
     /// The curve of some units, each with the tail it flies on; zero with fewer than three tails.
     pub fn fit<'a>(units: impl Iterator<Item = (usize, &'a [QuantityValue])>) -> Self {
-        let mut cells: Vec<Cell> =
-            units.enumerate().flat_map(|(unit, (tail, values))| cells(unit, tail, values)).collect();
+        let mut cells: Vec<Cell> = Vec::new();
+        for (unit, (tail, values)) in units.enumerate() {
+            cells.extend(values.chunk_by(|a, b| week(a) == week(b)).map(|of_week| Cell {
+                week: week(&of_week[0]),
+                unit,
+                tail,
+                mean: of_week.iter().map(|v| v.value).sum::<f64>() / of_week.len() as f64,
+                deviation: 0.0,
+            }));
+        }
         let count = cells.last().map_or(0, |cell| cell.unit + 1);
         // A stable sort: within a week and tail, units stay in order.
         cells.sort_by_key(|cell| (cell.week, cell.tail));
@@ -53,7 +61,11 @@ impl CommonCurve {
             let weeks = cells.chunk_by_mut(|a, b| a.week == b.week);
             curve = weeks.filter_map(|of_week| deviation(of_week, &levels)).collect();
         }
-        Self { weeks: shrunk(curve) }
+        // The curve is drawn to zero by as much of its variance as its errors explain.
+        let noise: f64 = curve.iter().map(|week| week.variance).sum();
+        let seen: f64 = curve.iter().map(|week| week.value * week.value).sum();
+        let kept = if seen > 0.0 { (1.0 - noise / seen).max(0.0) } else { 0.0 };
+        Self { weeks: curve.into_iter().map(|week| (week.week, kept * week.value)).collect() }
     }
 
     /// Takes the curve off the values of a unit, in order of departure.
@@ -76,16 +88,6 @@ impl CommonCurve {
 
 fn week(value: &QuantityValue) -> i64 {
     value.departure_us.div_euclid(WEEK_US)
-}
-
-fn cells(unit: usize, tail: usize, values: &[QuantityValue]) -> impl Iterator<Item = Cell> {
-    values.chunk_by(|a, b| week(a) == week(b)).map(move |of_week| Cell {
-        week: week(&of_week[0]),
-        unit,
-        tail,
-        mean: of_week.iter().map(|v| v.value).sum::<f64>() / of_week.len() as f64,
-        deviation: 0.0,
-    })
 }
 
 /// Level of each unit: the median of its cells less the deviations of their weeks.
@@ -113,12 +115,4 @@ fn deviation(of_week: &mut [Cell], levels: &[f64]) -> Option<Deviation> {
     of_week.iter_mut().for_each(|cell| cell.deviation = value);
     let variance = (MEDIAN_SE * spread).powi(2) / tails.len() as f64;
     Some(Deviation { week: of_week[0].week, value, variance })
-}
-
-/// The curve drawn to zero by as much of its variance as its errors explain.
-fn shrunk(curve: Vec<Deviation>) -> BTreeMap<i64, f64> {
-    let noise: f64 = curve.iter().map(|week| week.variance).sum();
-    let seen: f64 = curve.iter().map(|week| week.value * week.value).sum();
-    let kept = if seen > 0.0 { (1.0 - noise / seen).max(0.0) } else { 0.0 };
-    curve.into_iter().map(|week| (week.week, kept * week.value)).collect()
 }

@@ -33,7 +33,6 @@ pub(crate) struct History<'a> {
     pub(crate) now: f64,
 }
 
-/// Where a segment begins.
 #[derive(Debug, Clone, Copy)]
 struct SegmentStart {
     estimate: usize,

@@ -92,7 +92,6 @@ fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
 
-/// A length, µm.
 fn um(m: f64) -> String {
     format!("{:.1} µm", 1e6 * m)
 }
@@ -134,11 +133,8 @@ impl fmt::Display for Reason {
                 }
             }
             Self::Repeated { limit_m, records, among } => {
-                write!(
-                    f,
-                    "{records} of the last {among} records are at or above the limit of {}",
-                    um(limit_m)
-                )
+                let limit = um(limit_m);
+                write!(f, "{records} of the last {among} records are at or above the limit of {limit}")
             }
             Self::CrossesSoon { p05_hours: ..0.5, planning_horizon_hours: horizon } => {
                 write!(f, "may already be at the limit (5 % point); planning horizon {horizon:.0} FH")
@@ -149,15 +145,10 @@ impl fmt::Display for Reason {
             ),
             Self::RisesToLimit { p05_hours, planning_horizon_hours: horizon, records: count, m_per_hour } => {
                 write!(f, "rises {:.2} µm/FH over the last {} and ", 1e6 * m_per_hour, records(count))?;
-                match p05_hours {
-                    ..0.5 => f.write_str("may be at the limit with the next flight"),
-                    hours => {
-                        write!(
-                            f,
-                            "could reach the limit within {hours:.0} FH; planning horizon {horizon:.0} FH"
-                        )
-                    }
+                if p05_hours < 0.5 {
+                    return f.write_str("may be at the limit with the next flight");
                 }
+                write!(f, "could reach the limit within {p05_hours:.0} FH; planning horizon {horizon:.0} FH")
             }
             Self::AtWatch { gap_m, watch_m, .. } if gap_m < watch_m => {
                 let (gap, watch, below) = (um(gap_m), um(watch_m), below(watch_m));

@@ -21,7 +21,6 @@ use std::sync::LazyLock;
 /// Age that a power law's amplitude refers to, hours.
 const REFERENCE_HOURS: f64 = 1000.0;
 
-/// Exponents of the power laws.
 const EXPONENTS: [f64; 14] =
     [0.5, 0.625, 0.75, 0.875, 1.0, 1.125, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0];
 
@@ -81,7 +80,6 @@ impl Grid {
     }
 }
 
-/// A law's form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WearLaw {
     /// No wear.

@@ -22,11 +22,8 @@ pub(crate) struct Component {
     /// Metres per unit of height.
     pub(crate) amplitude_m: f64,
     pub(crate) ln_life: f64,
-    /// The gap now, metres.
     pub(crate) level_m: f64,
-    /// The gap of this unit when new, metres.
     pub(crate) new_m: f64,
-    /// What had to be guessed of its age at first sight.
     pub(crate) age_assumption: AgeAssumption,
     /// Onset not seen yet: it comes after an exponential wait.
     pub(crate) onset_pending: bool,

@@ -41,8 +41,8 @@ pub(crate) struct Drawn {
     pub(crate) um: f64,
     /// Flights from one log to the next.
     pub(crate) every: i64,
-    flight: i64,
-    installation: u32,
+    pub(crate) flight: i64,
+    pub(crate) installation: u32,
 }
 
 impl Drawn {
@@ -86,7 +86,7 @@ impl Drawn {
     }
 
     /// Logs above the limit.
-    pub(crate) fn jump(&mut self, least: usize, most: usize) {
+    pub(crate) fn jump(&mut self, (least, most): (usize, usize)) {
         let um = self.between(155.0, 300.0).max(LIMIT_UM + 8.0 * self.error_um);
         let count = self.count(least, most);
         self.logs(count, |_| um);
@@ -105,12 +105,8 @@ impl Drawn {
         self.rows[from..].iter_mut().for_each(|row| row.is_doubtful = true);
     }
 
-    /// Refused flights, their number drawn between two.
-    pub(crate) fn refused(&mut self, least: usize, most: usize) {
-        (0..self.count(least, most)).for_each(|_| self.flown(None));
-    }
-
-    fn flown(&mut self, gap_um: Option<f64>) {
+    /// A flight with a log of this gap, or one that was refused.
+    pub(crate) fn flown(&mut self, gap_um: Option<f64>) {
         self.flight += self.every;
         self.rows.push(Observation {
             departure_us: self.flight * DAY_US / 2,
@@ -123,19 +119,6 @@ impl Drawn {
             gap_se_m: gap_um.map(|_| self.stated * self.error_um * 1e-6),
             is_doubtful: false,
         });
-    }
-
-    pub(crate) fn moved(&mut self) {
-        self.installation += 1;
-    }
-
-    pub(crate) fn reshimmed(&mut self) {
-        let utc_us = self.now_us() + DAY_US / 4;
-        self.maintenance.push(MaintenanceEvent { utc_us, renews: true });
-    }
-
-    pub(crate) fn paused(&mut self, days: i64) {
-        self.flight += 2 * days;
     }
 
     pub(crate) fn now_us(&self) -> i64 {

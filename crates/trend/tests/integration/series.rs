@@ -28,32 +28,22 @@ fn flights_without_a_row_count_through_the_hour_meter() {
     assert_eq!((last.hours, last.flights, last.reversals), (12.0, 6.0, 600.0));
 }
 
+/// The meter of another tail is never compared with that of the last one; a meter that is missing or runs backwards leaves the
+/// flight's own hours; and a refused flight is usage.
 #[test]
-fn another_tail_s_meter_is_never_compared_with_the_last_one_s() {
-    let rows = [
-        row(0, 1, Some(2.0), Some(102.0)),
-        row(1, 2, Some(3.0), Some(9000.0)),
-        row(2, 2, Some(1.0), Some(9004.0)),
-    ];
-    assert_eq!(hours(&rows), [2.0, 5.0, 9.0]);
-}
-
-#[test]
-fn a_meter_that_is_missing_or_runs_backwards_leaves_the_flight_s_own_hours() {
-    let rows = [
-        row(0, 1, Some(2.0), Some(102.0)),
-        row(1, 1, Some(2.0), None),
-        row(2, 1, Some(2.0), Some(106.5)),
-        row(3, 1, Some(2.0), Some(3.0)),
-        row(4, 1, None, None),
-    ];
-    assert_eq!(hours(&rows), [2.0, 4.0, 6.5, 8.5, 10.0]);
-}
-
-#[test]
-fn a_refused_flight_is_usage() {
-    let refused = Observation { gap_m: None, gap_se_m: None, ..row(1, 1, Some(2.0), None) };
-    assert_eq!(hours(&[row(0, 1, Some(2.0), None), refused, row(2, 1, Some(2.0), None)]), [2.0, 4.0, 6.0]);
+fn hours_follow_the_meter_of_one_installation_and_else_the_flights() {
+    let flown = |day, installation, meter| row(day, installation, Some(2.0), meter);
+    let refused = Observation { gap_m: None, gap_se_m: None, ..flown(1, 1, None) };
+    let unstated = row(4, 1, None, None);
+    let (first, unmetered) = (flown(0, 1, Some(102.0)), flown(1, 1, None));
+    let (back, late) = (flown(3, 1, Some(3.0)), flown(2, 1, Some(106.5)));
+    for (rows, expected) in [
+        (vec![first, flown(1, 2, Some(9000.0)), flown(2, 2, Some(9004.0))], vec![2.0, 4.0, 8.0]),
+        (vec![first, unmetered, late, back, unstated], vec![2.0, 4.0, 6.5, 8.5, 10.0]),
+        (vec![flown(0, 1, None), refused, flown(2, 1, None)], vec![2.0, 4.0, 6.0]),
+    ] {
+        assert_eq!(hours(&rows), expected);
+    }
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! States of drawn histories: none less urgent than due, and hardly a false alarm.
 
 use trend::State::{self, Act, Normal, Plan, Unassessed, Watch};
-use trend::{Observation, assess};
+use trend::{MaintenanceEvent, Observation, assess};
 
-use crate::histories::{Drawn, LIMIT_UM, prior, settings};
+use crate::histories::{DAY_US, Drawn, LIMIT_UM, prior, settings};
 
 /// A kind of history: its name, the state that is due at least (`Normal` where the records alone give it), and what happens
 /// to the unit, in order, in the words of [`happen`].
@@ -42,59 +42,48 @@ fn happen(d: &mut Drawn, step: &str) {
         "stay" => d.stay(count(), (n[2], n[3])),
         "above" => d.above(count(), (n[2], n[3])),
         "above_errors" => d.above(count(), (n[2] * d.error_um, n[3] * d.error_um)),
-        "jump" => d.jump(count().0, count().1),
+        "jump" => d.jump(count()),
         "rise" => d.rise(count(), (n[2], n[3]), (n[4], n[5])),
         "level" => d.logs(n[0] as usize, |_| n[1]),
         "back" => d.log(d.um),
         "off" => d.log(d.um + n[0] + n[1] * d.error_um.max(1.0)),
         "doubt" => d.doubt(d.rows.len().min(n[0] as usize)),
-        "refused" => d.refused(count().0, count().1),
-        "moved" => d.moved(),
-        "reshimmed" => d.reshimmed(),
-        "paused" => d.paused(n[0] as i64),
-        "wild_among_last_three" => one_of_the_last_three_is_wild(d),
-        "stairs" => rise_in_stairs(d),
-        "all_flagged" => all_flagged(d),
-        "jump_below_the_limit" => jump_below_the_limit(d),
-        "wild" => wild_records(d),
+        "refused" => (0..d.count(n[0] as usize, n[1] as usize)).for_each(|_| d.flown(None)),
+        "moved" => d.installation += 1,
+        "reshimmed" => {
+            let utc_us = d.now_us() + DAY_US / 4;
+            d.maintenance.push(MaintenanceEvent { utc_us, renews: true });
+        }
+        "paused" => d.flight += 2 * n[0] as i64,
+        "wild_among_last_three" => {
+            let (back, off_um) = (d.count(1, 3), 30.0 * (d.between(0.0, 2.0).floor() - 0.5));
+            let at = d.rows.len() - back;
+            d.rows[at].gap_m = d.rows[at].gap_m.map(|gap_m| gap_m + 1e-6 * off_um);
+        }
+        "stairs" => {
+            let (um, step_um, every) = (d.um, d.between(5.0, 12.0), d.count(2, 4));
+            let steps = ((0.93 * LIMIT_UM - um) / step_um) as usize;
+            (1..=steps).for_each(|step| d.logs(every, |_| um + step_um * step as f64));
+        }
+        "all_flagged" => {
+            let count = d.count(1, 6);
+            d.logs(count, |_| 70.0);
+            d.doubt(count);
+        }
+        "jump_below_the_limit" => {
+            let least_um = (0.15 * LIMIT_UM).max(6.0 * d.error_um) + 5.0 * d.error_um;
+            d.above((1, 10), (least_um, least_um.max(0.93 * LIMIT_UM - d.um)));
+        }
         "slow_wear" => d.rise((60, 300), (d.um / LIMIT_UM, (d.um + 10.0) / LIMIT_UM), (1.0, 1.0)),
+        // Single records above the limit, each followed by records below it.
         "in_turn" => {
-            for _ in 0..d.count(count().0, 20) {
-                d.jump(1, 1);
-                d.above((1, count().1), (0.0, 0.0));
+            let [least, most, least_below, most_below] = [0, 1, 2, 3].map(|k| n[k] as usize);
+            for _ in 0..d.count(least, most) {
+                d.jump((1, 1));
+                d.above((least_below, most_below), (0.0, 0.0));
             }
         }
         other => panic!("{other} happens to no unit"),
-    }
-}
-
-fn one_of_the_last_three_is_wild(d: &mut Drawn) {
-    let (back, off_um) = (d.count(1, 3), 30.0 * (d.between(0.0, 2.0).floor() - 0.5));
-    let at = d.rows.len() - back;
-    d.rows[at].gap_m = d.rows[at].gap_m.map(|gap_m| gap_m + 1e-6 * off_um);
-}
-
-fn rise_in_stairs(d: &mut Drawn) {
-    let (um, step_um, every) = (d.um, d.between(5.0, 12.0), d.count(2, 4));
-    let steps = ((0.93 * LIMIT_UM - um) / step_um) as usize;
-    (1..=steps).for_each(|step| d.logs(every, |_| um + step_um * step as f64));
-}
-
-fn all_flagged(d: &mut Drawn) {
-    let count = d.count(1, 6);
-    d.logs(count, |_| 70.0);
-    d.doubt(count);
-}
-
-fn jump_below_the_limit(d: &mut Drawn) {
-    let least_um = (0.15 * LIMIT_UM).max(6.0 * d.error_um) + 5.0 * d.error_um;
-    d.above((1, 10), (least_um, least_um.max(0.93 * LIMIT_UM - d.um)));
-}
-
-fn wild_records(d: &mut Drawn) {
-    for _ in 0..d.count(1, 3) {
-        d.jump(1, 1);
-        d.above((2, 60), (0.0, 0.0));
     }
 }
 

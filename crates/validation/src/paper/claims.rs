@@ -5,7 +5,7 @@ use estimator::{Filter, KalmanState};
 use rayon::prelude::*;
 use simulator::{Flight, Plant, Sensors};
 
-use crate::paper::{Assumed, GAP_M, STEP_S, backlash_m, filter, fly, gap, states};
+use crate::paper::{GAP_M, STEP_S, backlash_m, filter, fly, states};
 
 /// Seeds of the flights; the figures show the first.
 const SEEDS: [u64; 5] = [11, 12, 13, 14, 15];
@@ -112,14 +112,16 @@ impl Claims {
     pub fn measure() -> Result<Self> {
         let sensors = Sensors::default();
         let flights = fly_all(&sensors)?;
-        let usual = filter(Assumed::default(), &sensors, STEP_S)?;
+        let nominal = Plant::default();
+        let usual = filter(&nominal, 1.0, &sensors)?;
         let own = states(&usual, &flights[0], None)?;
         let converging = Converging { filter: &usual, flight: &flights[0], right: &own };
         let known_m: Vec<f64> = gaps_m(&usual, &flights)?;
-        let assume = |assumed: Assumed| gaps_m(&filter(assumed, &sensors, STEP_S)?, &flights);
-        let against_known = |factors: &[f64], assumed: fn(f64) -> Assumed| {
+        let against_known = |factors: &[f64], spoil: fn(&mut Plant, f64)| {
             let change = |&factor: &f64| {
-                let found_m = assume(assumed(factor))?;
+                let mut assumed = nominal;
+                spoil(&mut assumed, factor);
+                let found_m = gaps_m(&filter(&assumed, 1.0, &sensors)?, &flights)?;
                 let percent: Vec<f64> =
                     found_m.iter().zip(&known_m).map(|(gap, known)| 100.0 * (gap - known) / GAP_M).collect();
                 Ok(Change::of(factor, &percent))
@@ -127,7 +129,7 @@ impl Claims {
             factors.par_iter().map(change).collect::<Result<Vec<Change>>>()
         };
         let tuning = TUNINGS.par_iter().map(|&factor| {
-            Ok(Change::of(factor, &errors(&assume(Assumed { process_noise: factor, ..Assumed::default() })?)))
+            Ok(Change::of(factor, &errors(&gaps_m(&filter(&nominal, factor, &sensors)?, &flights)?)))
         });
         Ok(Self {
             gap: mid_range(&backlash_m(&own))?,
@@ -141,9 +143,9 @@ impl Claims {
             spreads: SPREADS.iter().map(|&factor| converging.with_spread(factor)).collect::<Result<_>>()?,
             noise: NOISES.par_iter().map(|&factor| noise(factor)).collect::<Result<_>>()?,
             tuning: tuning.collect::<Result<_>>()?,
-            damping: against_known(&DECADES, |damping| Assumed { damping, ..Assumed::default() })?,
-            mass: against_known(&DECADES, |mass| Assumed { mass, ..Assumed::default() })?,
-            stiffness: against_known(&TENTHS, |stiffness| Assumed { stiffness, ..Assumed::default() })?,
+            damping: against_known(&DECADES, |plant, factor| plant.contact.damping_n_s_per_m *= factor)?,
+            mass: against_known(&DECADES, |plant, factor| plant.screw_mass_kg *= factor)?,
+            stiffness: against_known(&TENTHS, |plant, factor| plant.contact.stiffness_n_per_m *= factor)?,
             varying: varying(&usual, &sensors)?,
             states: own,
             flight: flights.into_iter().next().ok_or(estimator::Error::NothingMeasured)?,
@@ -156,7 +158,8 @@ fn fly_all(sensors: &Sensors) -> Result<Vec<Flight>> {
 }
 
 fn gaps_m(filter: &Filter, flights: &[Flight]) -> Result<Vec<f64>> {
-    flights.iter().map(|flight| Ok(gap(filter, flight)?.gap_m)).collect()
+    let gap_m = |flight| Ok(mid_range(&backlash_m(&states(filter, flight, None)?))?.gap_m);
+    flights.iter().map(gap_m).collect()
 }
 
 /// Errors of gaps, % of the true one.
@@ -169,7 +172,7 @@ fn noise(factor: f64) -> Result<Change> {
     let mut sensors = Sensors::default();
     sensors.screw.noise_rms *= factor;
     sensors.motor.noise_rms *= factor;
-    let filter = filter(Assumed::default(), &sensors, STEP_S)?;
+    let filter = filter(&Plant::default(), 1.0, &sensors)?;
     Ok(Change::of(factor, &errors(&gaps_m(&filter, &fly_all(&sensors)?)?)))
 }
 

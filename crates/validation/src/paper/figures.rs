@@ -2,7 +2,7 @@
 
 use crate::drawing::{Axis, BLUE, GREEN, GREY, INK, ORANGE, Panel, Series, Shape, picture};
 use crate::paper::claims::{Change, Claims, Convergence};
-use crate::paper::{GAP_M, STEP_S, backlash_m};
+use crate::paper::{GAP_M, STEP_S, backlash_m, relative_position_m};
 
 const COLOURS: [&str; 5] = [BLUE, ORANGE, GREEN, GREY, "#7B4F9E"];
 /// Width and height of a figure, px.
@@ -17,18 +17,24 @@ const ZOOM_S: (f64, f64) = (60.0, 62.0);
 const SETTLED: usize = 250;
 /// Differences below this are drawn at the edge, µm.
 const LEAST_UM: f64 = 1e-4;
-/// A curve.
 const THIN: Shape = Shape::Line(1.0);
 
 /// Every figure with the name of its file: one panel, or two side by side.
 pub fn pictures(claims: &Claims) -> Vec<(&'static str, String)> {
+    let flight = &claims.flight;
+    let positions = [("motor", ORANGE, &flight.motor_m[..]), ("screw", BLUE, &flight.screw_m)];
+    let measured_m = relative_position_m(flight);
+    let estimated_m: Vec<f64> = claims.states.iter().map(|state| state.x[0]).collect();
+    let relative = [("measured", GREY, &measured_m[..]), ("estimated", BLUE, &estimated_m)];
+    let load = Series::new(BLUE, THIN, over_time(&flight.load_n, 1e-3));
+    let loads_kn: Vec<f64> = flight.load_n.iter().map(|f| 1e-3 * f).collect();
     let figures = [
-        ("paper-2-positions.svg", positions(claims)),
-        ("paper-3-load.svg", vec![load(claims)]),
-        ("paper-4-relative.svg", relative(claims)),
+        ("paper-2-positions.svg", whole_and_zoom(positions, "position [mm]", 1e3)),
+        ("paper-3-load.svg", vec![fitted(time(claims), "load [kN]", vec![load])]),
+        ("paper-4-relative.svg", whole_and_zoom(relative, "relative position [µm]", 1e6)),
         ("paper-5-backlash.svg", vec![backlash(claims)]),
         ("paper-6-speed.svg", vec![against_speed(claims)]),
-        ("paper-7-load.svg", vec![against_load(claims)]),
+        ("paper-7-load.svg", vec![scatter(claims, "load [kN]", &loads_kn)]),
         ("paper-convergence.svg", [&claims.starts, &claims.spreads].map(|all| convergence(all)).into()),
         ("paper-noise.svg", noises(claims)),
         ("paper-parameters.svg", parameters(claims)),
@@ -55,13 +61,11 @@ fn over_time(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
     points.into_iter().map(|(at, value)| (at * STEP_S, value * scale)).collect()
 }
 
-/// The samples of the zoom.
 fn zoomed(values: &[f64], scale: f64) -> Vec<(f64, f64)> {
     let samples = (ZOOM_S.0 / STEP_S) as usize..(ZOOM_S.1 / STEP_S) as usize;
     samples.map(|k| (k as f64 * STEP_S, values[k] * scale)).collect()
 }
 
-/// Points of a series, scaled.
 type Thin = fn(&[f64], f64) -> Vec<(f64, f64)>;
 
 /// Curves over the whole flight on the left, and over two seconds on the right.
@@ -73,24 +77,6 @@ fn whole_and_zoom(series: [(&str, &'static str, &[f64]); 2], name: &str, scale: 
         fitted(time, name, curves.into())
     };
     vec![panel(over_time), panel(zoomed)]
-}
-
-fn positions(claims: &Claims) -> Vec<Panel> {
-    let flight = &claims.flight;
-    let series = [("motor", ORANGE, &flight.motor_m[..]), ("screw", BLUE, &flight.screw_m)];
-    whole_and_zoom(series, "position [mm]", 1e3)
-}
-
-fn load(claims: &Claims) -> Panel {
-    let points = over_time(&claims.flight.load_n, 1e-3);
-    fitted(time(claims), "load [kN]", vec![Series::new(BLUE, THIN, points)])
-}
-
-fn relative(claims: &Claims) -> Vec<Panel> {
-    let measured = crate::paper::relative_position_m(&claims.flight);
-    let estimated: Vec<f64> = claims.states.iter().map(|state| state.x[0]).collect();
-    let series = [("measured", GREY, &measured[..]), ("estimated", BLUE, &estimated)];
-    whole_and_zoom(series, "relative position [µm]", 1e6)
 }
 
 fn end_s(claims: &Claims) -> f64 {
@@ -134,11 +120,6 @@ fn against_speed(claims: &Claims) -> Panel {
     scatter(claims, "motor speed [mm/s]", &(0..motor_m.len()).map(speed).collect::<Vec<_>>())
 }
 
-fn against_load(claims: &Claims) -> Panel {
-    scatter(claims, "load [kN]", &claims.flight.load_n.iter().map(|f| 1e-3 * f).collect::<Vec<_>>())
-}
-
-/// Convergence from several starts.
 fn convergence(all: &[Convergence]) -> Panel {
     const SHOWN_S: f64 = 0.6;
     let curve = |(one, colour): (&Convergence, &'static str)| {

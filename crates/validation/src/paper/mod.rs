@@ -8,9 +8,8 @@ pub use claims::Claims;
 pub use figures::pictures;
 pub use page::page;
 
-use estimator::gap::{GapStatistic, mid_range};
 use estimator::{ActuatorModel, Filter, KalmanState, NoiseModel};
-use simulator::{Flight, Plant, Profile, Sensors, simulate};
+use simulator::{Contact, Flight, Plant, Profile, Sensors, simulate};
 
 use crate::methods::expected_noise;
 
@@ -23,38 +22,13 @@ fn fly(plant: &Plant, sensors: &Sensors, seed: u64) -> Result<Flight, simulator:
     simulate(&plant.with_gap_m(GAP_M), &profile, sensors, seed)
 }
 
-/// What is assumed of actuator and noise, each as a factor on what is true.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Assumed {
-    /// Of the stiffness K.
-    stiffness: f64,
-    /// Of the damping f.
-    damping: f64,
-    /// Of the screw's mass m_s.
-    mass: f64,
-    /// Of W_d, with V_d as it is.
-    process_noise: f64,
-}
-
-impl Default for Assumed {
-    /// All is known.
-    fn default() -> Self {
-        Self { stiffness: 1.0, damping: 1.0, mass: 1.0, process_noise: 1.0 }
-    }
-}
-
-/// The filter of the nominal actuator under assumptions, at a step, s.
-fn filter(assumed: Assumed, sensors: &Sensors, step_s: f64) -> Result<Filter, estimator::Error> {
-    let plant = Plant::default();
-    let actuator = ActuatorModel::linear(
-        plant.contact.stiffness_n_per_m * assumed.stiffness,
-        plant.contact.damping_n_s_per_m * assumed.damping,
-        plant.screw_mass_kg * assumed.mass,
-    )?;
-    let usual = Filter::new(&actuator, step_s, &expected_noise(sensors))?;
-    let given =
-        NoiseModel::PerStep { w_d: usual.noise().w_d * assumed.process_noise, v_d_m2: usual.noise().v_d_m2 };
-    Filter::new(&actuator, step_s, &given)
+/// The filter of an actuator as it is assumed, with W_d times a factor and V_d as it is.
+fn filter(assumed: &Plant, w_d_factor: f64, sensors: &Sensors) -> Result<Filter, estimator::Error> {
+    let Contact { stiffness_n_per_m, damping_n_s_per_m, .. } = assumed.contact;
+    let actuator = ActuatorModel::linear(stiffness_n_per_m, damping_n_s_per_m, assumed.screw_mass_kg)?;
+    let usual = Filter::new(&actuator, STEP_S, &expected_noise(sensors))?;
+    let (w_d, v_d_m2) = (usual.noise().w_d * w_d_factor, usual.noise().v_d_m2);
+    Filter::new(&actuator, STEP_S, &NoiseModel::PerStep { w_d, v_d_m2 })
 }
 
 /// Relative position δX of a flight, m.
@@ -86,11 +60,6 @@ fn backlash_m(states: &[KalmanState]) -> Vec<f64> {
     states.iter().map(|state| state.x[2]).collect()
 }
 
-/// ΔS of a flight (29–31).
-fn gap(filter: &Filter, flight: &Flight) -> Result<GapStatistic, estimator::Error> {
-    mid_range(&backlash_m(&states(filter, flight, None)?))
-}
-
 /// Step of the flights, s.
 const STEP_S: f64 = 0.004;
 
@@ -101,14 +70,9 @@ mod tests {
     #[test]
     fn the_states_are_those_of_the_stream() {
         let sensors = Sensors::default();
-        let flight = simulate(
-            &Plant::default().with_gap_m(GAP_M),
-            &Profile { duration_s: 5.0, ..Profile::default() },
-            &sensors,
-            3,
-        )
-        .unwrap();
-        let filter = filter(Assumed::default(), &sensors, STEP_S).unwrap();
+        let (plant, profile) = (Plant::default(), Profile { duration_s: 5.0, ..Profile::default() });
+        let flight = simulate(&plant.with_gap_m(GAP_M), &profile, &sensors, 3).unwrap();
+        let filter = filter(&plant, 1.0, &sensors).unwrap();
         let mut stream = estimator::Stream::constant_time(&filter);
         let y_m = relative_position_m(&flight);
         for (k, state) in states(&filter, &flight, None).unwrap().iter().enumerate() {

@@ -1,5 +1,0 @@
-//! Statistics shown in the report, computed from the units' assessments.
-
-pub(crate) mod agreement;
-pub(crate) mod peers;
-pub(crate) mod removal_forecast;
