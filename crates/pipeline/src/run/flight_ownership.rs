@@ -65,6 +65,8 @@ pub(crate) struct OwnershipLedger<'a> {
     own: HashMap<RecordKey, OwnRecord>,
     /// Errors of each log that this run has processed.
     errors: BTreeMap<String, Vec<Diagnostic>>,
+    /// Logs that contradict the record of one which this run has not processed yet: it may be of another flight now.
+    waiting: BTreeMap<String, ProcessedLog>,
     /// Logs by the hash of their tail and flight id, unless the configuration declares whether they are pieces.
     same_id: HashMap<u64, Vec<String>>,
     /// Units whose records changed.
@@ -99,6 +101,7 @@ impl<'a> OwnershipLedger<'a> {
             accounts: HashMap::new(),
             own: HashMap::new(),
             errors: BTreeMap::new(),
+            waiting: BTreeMap::new(),
             same_id: HashMap::new(),
             touched: BTreeSet::new(),
             renamed: BTreeMap::new(),
@@ -184,6 +187,10 @@ impl<'a> OwnershipLedger<'a> {
             return Ok(self.refuse_pieces(account, diagnostics, pieces, report));
         }
         let held = self.held(&account, &records, writer)?;
+        if self.must_wait(&account, &records, &held) {
+            self.waiting.insert(account.log_path.clone(), ProcessedLog { account, records, diagnostics });
+            return Ok(Vec::new());
+        }
         let moved_from = self.moved_from(&account, &records, writer)?;
         let (mut kept, mut displaced) = (Vec::new(), BTreeMap::<String, bool>::new());
         let (mut copy_of, mut contradicts, mut worse_than) = (None, None, None);
@@ -195,11 +202,10 @@ impl<'a> OwnershipLedger<'a> {
             };
             let owner = other.log_path.clone();
             let new = HeldRecord::of(&record);
-            let is_held_by_run = self.own.contains_key(&key);
             let is_same = other.is_same_as(&new);
-            match self.claim(&account, &new, other, is_same, is_held_by_run) {
+            match self.claim(&account, &new, &key, other) {
                 Claim::Takes => {
-                    if is_held_by_run {
+                    if self.own.contains_key(&key) {
                         displaced.entry(owner).or_insert(is_same);
                     }
                     kept.push(record);
@@ -277,26 +283,63 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// What to do with a record of a log if the record of the same flight by another log is held.
-    fn claim(
-        &self,
-        account: &LogRecord,
-        new: &HeldRecord,
-        held: &HeldRecord,
-        is_same: bool,
-        is_held_by_run: bool,
-    ) -> Claim {
-        let holder = self.accounts.get(&held.log_path);
-        let is_gone = holder.is_none();
+    fn claim(&self, account: &LogRecord, new: &HeldRecord, key: &RecordKey, held: &HeldRecord) -> Claim {
+        let is_same = held.is_same_as(new);
+        let waiting = self.waiting.get(&held.log_path).map(|done| &done.account);
+        let holder = waiting.or_else(|| self.accounts.get(&held.log_path));
+        // A log that names another flight now has left this one.
+        let has_left = holder.is_none_or(|holder| {
+            let flight = holder.tail_number.as_ref().zip(holder.departure_utc);
+            flight.is_some_and(|(tail, departure)| {
+                *tail != key.tail_number || departure.as_microsecond() != key.departure_us
+            })
+        });
         // A log that broke speaks for no record any more; a copy of what it was takes its place.
         let is_broken = holder.is_some_and(|holder| holder.estimated + holder.refused == 0);
         match (new.is_estimated(), held.is_estimated()) {
             (true, false) => Claim::Takes,
             (false, true) => Claim::IsWorse,
-            _ if is_gone || (is_broken && is_same) => Claim::Takes,
-            _ if is_held_by_run && self.precedes(account, held) => Claim::Takes,
+            _ if has_left || (is_broken && is_same) => Claim::Takes,
+            _ if self.own.contains_key(key) && self.precedes(account, held) => Claim::Takes,
             _ if is_same => Claim::IsCopy,
             _ => Claim::Contradicts,
         }
+    }
+
+    /// Whether a record contradicts that of a log which this run is still to process.
+    fn must_wait(
+        &self,
+        account: &LogRecord,
+        records: &[GapRecord],
+        held: &BTreeMap<RecordKey, HeldRecord>,
+    ) -> bool {
+        let is_awaited = |log: &String| {
+            let is_processed = self.accounts.get(log).is_some_and(|holder| holder.run_id == account.run_id);
+            !is_processed && self.plan.work.iter().any(|work| work.log_path == *log)
+        };
+        records.iter().any(|record| {
+            let (key, new) = (RecordKey::of(record), HeldRecord::of(record));
+            held.get(&key).is_some_and(|other| {
+                matches!(self.claim(account, &new, &key, other), Claim::Contradicts)
+                    && is_awaited(&other.log_path)
+            })
+        })
+    }
+
+    /// Converts the outcomes that waited, after all others. One that waits for a log which the run did not reach is not
+    /// reached either.
+    pub(crate) fn resolve_waiting(
+        &mut self,
+        writer: &Writer,
+        report: &mut RunSummary,
+    ) -> Result<Vec<LogResult>, Error> {
+        let mut results = Vec::new();
+        for log in self.waiting.keys().cloned().collect::<Vec<_>>() {
+            if let Some(done) = self.waiting.remove(&log) {
+                results.extend(self.resolve(done, writer, report)?);
+            }
+        }
+        Ok(results)
     }
 
     /// Whether a log comes before the holder of its flight: the one that was stored before this run, else by name.
