@@ -3,7 +3,7 @@
 //! A change is relative to the table, not to a run: a run that is killed before the change is written finds it again,
 //! a run that is repeated finds none, and a state that leaves and returns within one back-fill is no change.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::{SignedDuration, Timestamp};
 use job::config::AlertChannel;
@@ -44,7 +44,8 @@ pub fn detect(
         return baseline(findings, channels, run_id, now);
     }
     let mut rows = Vec::new();
-    for finding in findings {
+    let gone = without_flights(&changes, findings);
+    for finding in findings.iter().chain(&gone) {
         let key = (finding.unit.0.as_deref(), finding.serial_number(), finding.quantity);
         let of_finding = changes.get(&key).map_or(&[][..], Vec::as_slice);
         let Some((number, from)) = before(of_finding, finding) else { continue };
@@ -57,6 +58,28 @@ pub fn detect(
         rows.push(change);
     }
     rows
+}
+
+/// Units whose gap has a known state, and of which no flight is left: they are not assessed any more.
+fn without_flights(changes: &KnownChanges<'_>, findings: &[Finding]) -> Vec<Finding> {
+    let Some(as_of_utc) = findings.first().map(|finding| finding.as_of_utc) else { return Vec::new() };
+    let gaps = findings.iter().filter(|finding| finding.quantity == GAP);
+    let present: BTreeSet<_> =
+        gaps.map(|finding| (finding.unit.0.as_deref(), finding.unit.1.as_str())).collect();
+    let gone = changes.iter().filter_map(|((part, serial, quantity), rows)| {
+        let unit = (*part, (*serial)?);
+        let last = rows.iter().max_by_key(|row| row.change_number).filter(|last| last.to_state.is_some())?;
+        (*quantity == GAP && !present.contains(&unit)).then(|| Finding {
+            unit: (part.map(str::to_owned), unit.1.to_owned()),
+            tail_number: last.tail_number.clone(),
+            position: last.position.clone(),
+            quantity: GAP,
+            reason: Some("no flight of it is left: see the installations table".to_owned()),
+            as_of_utc,
+            ..Finding::default()
+        })
+    });
+    gone.collect()
 }
 
 /// Number and state of the last of the known changes, unless the finding is known.

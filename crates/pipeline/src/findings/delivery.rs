@@ -10,6 +10,7 @@
 //! receiver may have the message. A channel that drops doubles, as a folder does, needs no claim: what was not marked
 //! is sent again.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use jiff::Timestamp;
@@ -21,6 +22,8 @@ use crate::findings::summary::AlertSummary;
 
 /// Failures in a row after which a channel is left until the next run.
 const MAX_FAILURES: usize = 3;
+/// Attempts after which a message that is not accepted no longer holds back later ones of its unit.
+const MAX_HOLDING: i64 = 5;
 /// Messages of a channel without claims that are marked in one commit.
 const MAX_MARKED: usize = 50;
 /// Time after which a channel is left until the next run.
@@ -79,8 +82,15 @@ pub fn deliver<C: Courier>(
     if !killed.is_empty() {
         courier.write(&killed)?;
     }
-    // A message that always fails must not keep others back.
-    rows.sort_by_cached_key(|row| (row.attempts, row.as_of_utc, row.change_number, row.alert_id.clone()));
+    // A message that always fails must not keep those of other units back; those of one unit keep their order.
+    let mut attempts: BTreeMap<Subject, i64> = BTreeMap::new();
+    for row in &rows {
+        let most = attempts.entry(subject(row)).or_default();
+        *most = row.attempts.max(*most);
+    }
+    rows.sort_by_cached_key(|row| {
+        (attempts[&subject(row)], row.as_of_utc, row.change_number, row.alert_id.clone())
+    });
     for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
         let due = rows.iter_mut().filter(|row| row.channel == *name && is_due(row, channel));
         send_due(due, channel, run_id, courier)?;
@@ -94,6 +104,14 @@ pub fn deliver<C: Courier>(
     }
     rows.retain(|row| row.run_id == run_id && row.error.is_some() && channel_of(row).is_some());
     Ok(rows)
+}
+
+/// Channel, part, serial number or tail, and quantity: the last message about them says the present state.
+type Subject = (String, Option<String>, Option<String>, String);
+
+fn subject(row: &AlertRecord) -> Subject {
+    let name = row.serial_number.as_ref().or(row.tail_number.as_ref());
+    (row.channel.clone(), row.part_number.clone(), name.cloned(), row.quantity.clone())
 }
 
 /// Whether a message waits to be sent.
@@ -121,7 +139,11 @@ fn send_due<'r, C: Courier>(
 ) -> Result<(), C::Error> {
     let (begun, mut failures) = (Instant::now(), 0);
     let mut marked: Vec<AlertRecord> = Vec::new();
+    let mut held: BTreeSet<Subject> = BTreeSet::new();
     for row in due {
+        if held.contains(&subject(row)) {
+            continue;
+        }
         if failures == MAX_FAILURES || begun.elapsed() >= MAX_CHANNEL_TIME || courier.is_stopped() {
             break;
         }
@@ -142,6 +164,10 @@ fn send_due<'r, C: Courier>(
             Attempt::Unknown(why) => (AlertStatus::Unconfirmed, Some(why)),
         };
         failures = if error.is_some() { failures + 1 } else { 0 };
+        // Else the older message would come last, in the next run.
+        if status == AlertStatus::Pending && row.attempts < MAX_HOLDING {
+            held.insert(subject(row));
+        }
         row.error = error;
         mark(row, status, run_id);
         marked.push(row.clone());

@@ -58,23 +58,30 @@ pub struct DuplicateLog {
 pub struct SilentTail {
     /// The aircraft.
     pub tail_number: String,
-    /// Its newest departure in the store.
+    /// Its newest departure in the store, or when its first unit was installed.
     pub since_utc: Timestamp,
 }
 
-/// Aircraft without data for longer than `days` before a date: the fleet's newest departure, or now.
+/// Aircraft without data for longer than `days` before a date: the fleet's newest departure, or now. An aircraft that never
+/// had a log has no data since its first unit was installed; one without a unit needs no data.
 fn quiet<'a>(
     accounts: impl Iterator<Item = &'a LogRecord>,
+    installations: &'a Installations,
     days: f64,
     last: Option<Timestamp>,
 ) -> Vec<SilentTail> {
+    let Some(last) = last else { return Vec::new() };
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
     for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
     }
-    let Some(last) = last else { return Vec::new() };
-    let is_late = |at: Timestamp| days_between(at, last) > days;
-    let late = newest.into_iter().filter(|(_, at)| is_late(*at));
+    let mut silent: BTreeMap<&str, Timestamp> = BTreeMap::new();
+    for installation in installations.iter().filter(|installation| installation.covers(last)) {
+        let tail = installation.tail_number.as_str();
+        let since_utc = newest.get(tail).copied().unwrap_or(installation.installed_utc);
+        silent.entry(tail).and_modify(|known| *known = (*known).min(since_utc)).or_insert(since_utc);
+    }
+    let late = silent.into_iter().filter(|(_, at)| days_between(*at, last) > days);
     late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
 }
 
@@ -241,8 +248,8 @@ impl RunSummary {
     ) {
         let days = config.document.trend.stale_after_days;
         self.newest_departure_utc = accounts.clone().filter_map(|account| account.departure_utc).max();
-        self.quiet = quiet(accounts.clone(), days, self.newest_departure_utc);
-        self.quiet_now = quiet(accounts.clone(), days, Some(Timestamp::now())).len();
+        self.quiet = quiet(accounts.clone(), installations, days, self.newest_departure_utc);
+        self.quiet_now = quiet(accounts.clone(), installations, days, Some(Timestamp::now())).len();
         self.notes.extend(coverage::departures_in_another_zone(config, accounts.clone()));
         self.notes.extend(coverage::logs_without_row(config, accounts.clone()));
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
