@@ -114,7 +114,8 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
     (is_large && (is_each || (is_steep && (line.explains() || is_even())))).then_some(line)
 }
 
-/// The records without outliers, which lie far from the line of the others, at most one in five; `None` without outliers.
+/// The records without outliers, which lie far from the line of the others, at most one in five; `None` without outliers, and
+/// where both of the last two would be outliers: two records have a new level.
 fn without_outliers(records: &[Record]) -> Option<Vec<Record>> {
     // One that lies far from the line of the others lies half as far from the line of all.
     let (line, last) = (Line::fit(records, false)?, records.last()?);
@@ -134,5 +135,7 @@ fn without_outliers(records: &[Record]) -> Option<Vec<Record>> {
         }
         kept = others;
     }
-    (kept.len() < records.len()).then_some(kept)
+    let [.., next_to_last, _] = records else { return None };
+    let reaches_end = kept.last().is_some_and(|record| record.hours >= next_to_last.hours);
+    (kept.len() < records.len() && reaches_end).then_some(kept)
 }

@@ -253,7 +253,12 @@ pub(crate) fn alert_state(
     if upper_m >= limit_m {
         return (State::Watch, Reason::Imprecise { gap_m, upper_m, limit_m });
     }
-    match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
+    // A renewal on record explains what came before it.
+    let renewals = measured.sound.last().map(|record| record.renewals);
+    let of_life = measured.sound.iter().rev().take_while(|record| Some(record.renewals) == renewals);
+    let begun_us = of_life.last().map_or(i64::MIN, |record| record.departure_us);
+    let is_open = |change: &&ChangePoint| change.kind.is_unexplained() && change.departure_us >= begun_us;
+    match changes.iter().rev().find(is_open) {
         // Counted to the last record: that no flight follows clears nothing.
         Some(change) if days_since(change.departure_us) - days.unwrap_or(0.0) <= CHANGE_WATCH_DAYS => {
             (State::Watch, Reason::Changed { kind: change.kind, days: days_since(change.departure_us) })
