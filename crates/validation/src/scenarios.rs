@@ -179,7 +179,16 @@ static CLASSES: &[Class] = &[
         c.plant = Plant { contact: c.plant.contact, ..Plant::default() }
             .with_friction_factor(rng.random_range(3.0..8.0));
     }),
-    drawn("grease film", grease),
+    drawn("grease film", |c, rng| {
+        let (factor, cold_factor) = (log_uniform(rng, 1.0..10.0), log_uniform(rng, 1.0..6.0));
+        let (grease_m_per_s, warm_up_s) = (log_uniform(rng, 5e-4..1e-2), log_uniform(rng, 30.0..600.0));
+        for friction in [&mut c.plant.motor_friction, &mut c.plant.screw_friction] {
+            friction.viscous_n_s_per_m *= factor;
+            friction.grease_n = log_uniform(rng, 30.0..400.0);
+            (friction.grease_m_per_s, friction.cold_factor, friction.warm_up_s) =
+                (grease_m_per_s, cold_factor, warm_up_s);
+        }
+    }),
     drawn("few reversals", |c, rng| c.profile.reversals = Some(rng.random_range(1..=6))),
     drawn("long rests", |c, rng| {
         (c.profile.rest_share, c.profile.rest_s) = (rng.random_range(0.4..0.85), rng.random_range(8.0..30.0));
@@ -390,17 +399,6 @@ fn power_flow(case: &mut Case, rng: &mut ChaCha8Rng) {
     for friction in [&mut case.plant.motor_friction, &mut case.plant.screw_friction] {
         friction.load_share = rng.random_range(0.0..0.12);
         friction.backdriven_load_share = Some(rng.random_range(0.0..0.12));
-    }
-}
-
-fn grease(case: &mut Case, rng: &mut ChaCha8Rng) {
-    let (factor, cold_factor) = (log_uniform(rng, 1.0..10.0), log_uniform(rng, 1.0..6.0));
-    let (grease_m_per_s, warm_up_s) = (log_uniform(rng, 5e-4..1e-2), log_uniform(rng, 30.0..600.0));
-    for friction in [&mut case.plant.motor_friction, &mut case.plant.screw_friction] {
-        friction.viscous_n_s_per_m *= factor;
-        friction.grease_n = log_uniform(rng, 30.0..400.0);
-        (friction.grease_m_per_s, friction.cold_factor, friction.warm_up_s) =
-            (grease_m_per_s, cold_factor, warm_up_s);
     }
 }
 

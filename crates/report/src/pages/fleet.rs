@@ -129,12 +129,8 @@ fn news(report: &Report) -> Vec<(String, String, String)> {
 
 /// Removed units: path, serial number, and when with the last gap.
 fn removed(report: &Report) -> Vec<(String, &str, String)> {
-    let of = |unit: &&UnitView| unit.row.removed_utc.is_some();
-    let row = |unit| {
-        let unit: &UnitView = unit;
-        (unit_path(unit), unit.row.serial_number.as_str(), unit.row.why_text())
-    };
-    report.units.iter().filter(of).take(FEW).map(row).collect()
+    let removed = report.units.iter().filter(|unit| unit.row.removed_utc.is_some()).take(FEW);
+    removed.map(|unit| (unit_path(unit), unit.row.serial_number.as_str(), unit.row.why_text())).collect()
 }
 
 fn most_urgent_tails(report: &Report) -> Vec<&str> {

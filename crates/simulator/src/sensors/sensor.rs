@@ -189,16 +189,12 @@ impl Channel {
             let white: f64 = StandardNormal.sample(rng);
             let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
             let most = if self.clip > 0.0 { self.clip } else { f64::INFINITY };
-            *value = self.rounded(level.clamp(-most, most) + self.noise_rms * white);
+            *value = rounded(level.clamp(-most, most) + self.noise_rms * white, self.resolution);
         }
         self.freeze(&mut values, rate_hz, rng);
         self.spike(&mut values, rate_hz, rng);
         self.drop_out(&mut values, rng);
         values
-    }
-
-    fn rounded(&self, value: f64) -> f64 {
-        if self.resolution > 0.0 { (value / self.resolution).round() * self.resolution } else { value }
     }
 
     fn freeze(&self, values: &mut [f64], rate_hz: f64, rng: &mut ChaCha8Rng) {
@@ -238,6 +234,11 @@ impl Channel {
     }
 }
 
+/// The nearest multiple of a step; any value where the step is zero.
+fn rounded(value: f64, step: f64) -> f64 {
+    if step > 0.0 { (value / step).round() * step } else { value }
+}
+
 /// The latest of a slow channel's samples at a sample of the log.
 fn held_index(sample: usize, log_rate_hz: f64, rate_hz: f64) -> usize {
     // A billionth of a sample forgives the rounding of commensurate rates.
@@ -261,8 +262,7 @@ impl Clock {
         let mut rng = seeded_rng(seed, &["clock"]);
         let stamp = |k: usize| {
             let white: f64 = StandardNormal.sample(&mut rng);
-            let time_s = k as f64 / rate_hz + self.jitter_s * white;
-            if self.tick_s > 0.0 { (time_s / self.tick_s).round() * self.tick_s } else { time_s }
+            rounded(k as f64 / rate_hz + self.jitter_s * white, self.tick_s)
         };
         (0..samples).map(stamp).collect()
     }

@@ -189,19 +189,9 @@ fn the_sample_fleet_is_what_its_description_promises() {
 #[test]
 fn events_happen_before_the_flight_that_they_name() {
     let events = r#"
-        [[replacements]]
-        before_flight = 3
-        tail = "B"
-        position = "left"
-        serial_number = "SPARE"
-        gap_m = 40e-6
-
-        [[reshims]]
-        before_flight = 4
-        tail = "A"
-        position = "right"
-        gap_m = 20e-6
-
+        replacements = [{ before_flight = 3, tail = "B", position = "left", serial_number = "SPARE", gap_m = 40e-6 }]
+        reshims = [{ before_flight = 4, tail = "A", position = "right", gap_m = 20e-6 }]
+        log_faults = [{ tail = "B", log = 2, fault = "truncated" }]
         [[play_checks]]
         before_flight = 4
         tail = "A"
@@ -209,11 +199,6 @@ fn events_happen_before_the_flight_that_they_name() {
         error_m = 5e-6
         instrument = "dial gauge"
         force_n = 200.0
-
-        [[log_faults]]
-        tail = "B"
-        log = 2
-        fault = "truncated"
     "#;
     let spec = Spec { flights_per_tail: 6, flights_per_log: 2, ..small_with(events) };
     let plan = Plan::new(&spec).unwrap();
@@ -274,17 +259,10 @@ fn a_planted_change_shows_on_the_actuators_that_it_names_and_from_its_flight_on(
     let planned = |tables: &str| Plan::new(&Spec { flights_per_tail: 4, ..small_with(tables) }).unwrap();
     let before = planned("");
     let changes = r#"
-        [[changes]]
-        tail = "B"
-        from_flight = 3
-        load_bias_n = 400.0
-        skew_s = 1e-3
-
-        [[changes]]
-        serial_number = "S10001"
-        from_flight = 1
-        to_flight = 4
-        stiffness_factor = 0.8
+        changes = [
+            { tail = "B", from_flight = 3, load_bias_n = 400.0, skew_s = 1e-3 },
+            { serial_number = "S10001", from_flight = 1, to_flight = 4, stiffness_factor = 0.8 },
+        ]
     "#;
     let after = planned(changes);
     let mut drift = Vec::new();

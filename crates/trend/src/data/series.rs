@@ -195,7 +195,9 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     rows.dedup_by(|next, kept| {
         let flight = |row: &Observation| (row.departure_us, row.installation, row.flight);
         let is_same = flight(next) == flight(kept);
-        if is_same && differ(next.gap_m, kept.gap_m) && !kept.is_doubtful {
+        // By more than single precision rounds.
+        let differ = |(one_m, other_m): (f64, f64)| (one_m - other_m).abs() > 1e-6 * other_m.abs();
+        if is_same && next.gap_m.zip(kept.gap_m).is_some_and(differ) && !kept.is_doubtful {
             kept.is_doubtful = true;
             faults.contradictions += 1;
         }
@@ -209,11 +211,6 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     };
     faults.overlaps = rows.array_windows().filter(is_in_flight).count();
     Ok((rows, faults))
-}
-
-/// Whether the gaps of two rows of one flight differ by more than single precision rounds.
-fn differ(one_m: Option<f64>, other_m: Option<f64>) -> bool {
-    one_m.zip(other_m).is_some_and(|(one_m, other_m)| (one_m - other_m).abs() > 1e-6 * other_m.abs())
 }
 
 /// Rejects values that are not finite, and errors that are not positive. Hours that no aircraft can have are left out, and a
