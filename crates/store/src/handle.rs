@@ -16,25 +16,11 @@ use crate::error::Error;
 
 const LOCK: &str = "lock";
 
-type Function = dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync;
+type JoinFunction = dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync;
 
-/// Join of bookkeeping to records: it replaces the bookkeeping columns among a batch's columns. The batch also has tail
-/// number, position, departure and flight.
+/// Join of bookkeeping to records.
 #[derive(Clone)]
-pub struct Join(Arc<Function>);
-
-impl Join {
-    /// A join by a function from a batch to one with the same columns.
-    pub fn new(
-        join: impl Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync + 'static,
-    ) -> Self {
-        Self(Arc::new(join))
-    }
-
-    pub(crate) fn apply(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
-        (self.0)(batch)
-    }
-}
+pub(crate) struct Join(pub(crate) Arc<JoinFunction>);
 
 impl std::fmt::Debug for Join {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -48,7 +48,7 @@ pub use admin::info::Info;
 pub use admin::withdraw::Withdrawal;
 pub use delta::foreign_table::live_files;
 pub use error::Error;
-pub use handle::{Join, Store};
+pub use handle::Store;
 pub use read::column_scan::ColumnScan;
 pub use read::query::Query;
 pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};

@@ -297,7 +297,8 @@ impl PartSettings {
 
     fn check_noise(&self, faults: &mut Faults<'_>) -> Option<estimator::NoiseModel> {
         let Some(noise) = &self.noise else {
-            let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
+            let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see \
+                        docs/configuration.md";
             let what = "the part has no `noise`, and there are no default levels";
             faults.report(&[], Diagnostic::new("key_missing", what).hint(hint));
             return None;

@@ -123,7 +123,10 @@ impl RowSources<'_> {
             state: removal.is_none().then(|| state.as_str()),
             reason_code: removal.is_none().then(|| cause.code()),
             reason: Some(match removal {
-                Some(installation) => removed(installation),
+                Some(Installation { position, tail_number, removed_utc, .. }) => {
+                    let date = removed_utc.map(|at| at.strftime("%Y-%m-%d").to_string()).unwrap_or_default();
+                    format!("removed from {position} of {tail_number} on {date}")
+                }
                 None => {
                     caveats.iter().fold(self.reason_of_state(cause), |all, caveat| format!("{all}; {caveat}"))
                 }
@@ -147,14 +150,16 @@ impl RowSources<'_> {
         let mapping = fault.map(|fault| format!("{} of {}", fault.evidence(), fault.scope()));
         let settings = history.settings.others().map(|(others, last, all)| {
             format!(
-                "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
+                "{others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay \
+                 run` makes them anew",
                 last.strftime("%Y-%m-%d")
             )
         });
         let (disputed, gaps) = history.disputed(*as_of, LATEST);
         let flagged = (disputed > 0).then(|| {
             format!(
-                "{disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
+                "{disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and \
+                 confirm nothing alone"
             )
         });
         let is_said = matches!(cause, Reason::Stale { .. });
@@ -250,10 +255,4 @@ fn inspected(row: TrendRow, inspection: Option<&InspectionRow>, records: &[Fligh
         return TrendRow { reason, caveats, ..row };
     }
     row
-}
-
-/// Why a removed unit has no state.
-fn removed(last: &Installation) -> String {
-    let date = last.removed_utc.map(|at| at.strftime("%Y-%m-%d").to_string()).unwrap_or_default();
-    format!("removed from {} of {} on {date}", last.position, last.tail_number)
 }

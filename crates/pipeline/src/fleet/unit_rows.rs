@@ -155,7 +155,6 @@ impl<R> Default for RowsByUnit<R> {
 impl<R> RowsByUnit<R> {
     /// Reads the rows of a table: `read` gets the number of a row, the rows of its unit, to which it adds, and the index of
     /// its place.
-    ///
     pub(crate) fn add_rows(
         &mut self,
         chunk: &TableBatch,

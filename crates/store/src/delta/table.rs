@@ -244,9 +244,7 @@ impl Table {
             self.keep(delta).map(drop)
         })
     }
-}
 
-impl Table {
     /// Deletes files that no snapshot younger than `kept` needs, and counts them.
     ///
     /// Ages are summed over the intervals between the table's commits, each counted as two days at most: a clock that

@@ -74,10 +74,14 @@ impl Store {
         ColumnScan { store, files, version, wanted: Arc::clone(wanted), read, stored, joined }
     }
 
-    /// The same store, which joins bookkeeping to every record that it reads.
+    /// The same store, which joins bookkeeping to every record that it reads. `join` replaces the bookkeeping columns among
+    /// a batch's columns; the batch also has tail number, position, departure and flight.
     #[must_use]
-    pub fn joined(mut self, join: Join) -> Self {
-        self.join = Some(join);
+    pub fn joined(
+        mut self,
+        join: impl Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync + 'static,
+    ) -> Self {
+        self.join = Some(Join(Arc::new(join)));
         self
     }
 
@@ -124,7 +128,7 @@ impl ColumnScan {
     fn read_file(&self, file: &Path) -> Result<Vec<RecordBatch>, Error> {
         let rows = self.store.read_file(file, &self.read, &self.stored)?;
         let Some(join) = &self.store.join else { return Ok(rows) };
-        rows.iter().map(|batch| Ok(self.finish(&join.apply(batch)?)?)).collect()
+        rows.iter().map(|batch| Ok(self.finish(&(join.0)(batch)?)?)).collect()
     }
 
     /// The matching rows and the wanted columns of a batch after the join.

@@ -186,7 +186,8 @@ fn consequence(quantity: Quantity) -> &'static str {
             "the model does not explain its measurements; avionics: check load cells and position sensors"
         }
         _ => {
-            "its sensors or recorder are the likelier cause, and its gaps are as uncertain; avionics: check the scale of load and positions"
+            "its sensors or recorder are the likelier cause, and its gaps are as uncertain; avionics: check the scale of \
+             load and positions"
         }
     }
 }

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use ingest::mapping::column_pattern::nearest;
 use jiff::Timestamp;
 use job::Config;
-
 use records::time::{day_text, days_between};
 use records::{Installation, Installations, PartNumber, TrendRow};
 use serde::Serialize;
@@ -100,7 +99,7 @@ fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
     let (tail, (end, latest)) = ends.iter().max_by_key(|(_, (end, latest))| latest.duration_since(*end))?;
     let day = |at: &Timestamp| at.strftime("%Y-%m-%d").to_string();
     let others = ends.keys().filter(|other| *other != tail).map(|other| format!(", {other}"));
-    let table = config.document.logs.flights.as_deref().unwrap_or_default();
+    let table = flights_table(config);
     Some(format!(
         "{table} ends before the logs of {tail}{}: of {tail}, the last row is of {} and the last log of {}; usage between them \
          is that of logged flights; bring the table up to date",
@@ -112,6 +111,15 @@ fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
 
 /// Days by which logs may go on after the end of the flights table.
 const QUIET_DAYS: f64 = 3.0;
+
+fn flights_table(config: &Config) -> &str {
+    config.document.logs.flights.as_deref().unwrap_or_default()
+}
+
+/// Tail, flight id and departure of a log that was identified.
+fn identity(account: &LogRecord) -> Option<(&str, &str, Timestamp)> {
+    Some((account.tail_number.as_deref()?, account.flight_id.as_deref()?, account.departure_utc?))
+}
 
 fn units(count: usize) -> String {
     if count == 1 { "1 unit".to_owned() } else { format!("{count} units") }
@@ -139,8 +147,7 @@ pub(crate) fn departures_in_another_zone<'a>(
     const ROUNDED_S: f64 = 60.0;
     const MIN_FLIGHTS: usize = 3;
     let offset = |account: &LogRecord| {
-        let (tail, id, at) =
-            (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
+        let (tail, id, at) = identity(account)?;
         Some(config.flights.of(tail, id, at)?.departure_utc.duration_since(at).as_secs())
     };
     let (mut by_offset, mut all) = (BTreeMap::<i64, usize>::new(), 0);
@@ -156,8 +163,7 @@ pub(crate) fn departures_in_another_zone<'a>(
     let flights: usize = by_offset.values().sum();
     (flights >= MIN_FLIGHTS && 2 * flights > all).then(|| {
         let hours: Vec<String> = by_offset.keys().map(|of| format!("{:+} h", *of as f64 / 4.0)).collect();
-        let (hours, table) =
-            (hours.join(" or "), config.document.logs.flights.as_deref().unwrap_or_default());
+        let (hours, table) = (hours.join(" or "), flights_table(config));
         format!(
             "{table}: {flights} of {all} departures are {hours} from those of the logs, which count; write them in UTC, or \
              with their offset (2026-10-01T08:00-05:00), since those of flights without a log may be on the wrong day"
@@ -172,12 +178,11 @@ pub(crate) fn logs_without_row<'a>(
     accounts: impl Iterator<Item = &'a LogRecord>,
 ) -> Option<String> {
     const MIN_LOGS: usize = 3;
-    let mut departures = BTreeMap::<String, Vec<Timestamp>>::new();
-    let mut has_row = |account: &LogRecord| {
-        let (tail, id, at) =
-            (account.tail_number.as_ref()?, account.flight_id.as_ref()?, account.departure_utc?);
+    let mut departures = BTreeMap::<&str, Vec<Timestamp>>::new();
+    let mut has_row = |account: &'a LogRecord| {
+        let (tail, id, at) = identity(account)?;
         let of_table = || config.flights.of_tail(tail).map(|flight| flight.departure_utc).collect();
-        let of_tail = departures.entry(tail.clone()).or_insert_with(of_table);
+        let of_tail = departures.entry(tail).or_insert_with(of_table);
         let is_in_period = (*of_tail.first()?..=*of_tail.last()?).contains(&at);
         let is_row = of_tail.binary_search(&at).is_ok() || config.flights.of(tail, id, at).is_some();
         is_in_period.then_some(is_row)
@@ -190,7 +195,7 @@ pub(crate) fn logs_without_row<'a>(
     }
     let lacking = by_tail.into_values().filter(|(all, without)| 2 * without > *all);
     let (all, without) = lacking.fold((0, 0), |sum, of_tail| (sum.0 + of_tail.0, sum.1 + of_tail.1));
-    let table = config.document.logs.flights.as_deref().unwrap_or_default();
+    let table = flights_table(config);
     (without >= MIN_LOGS).then(|| {
         format!(
             "{table}: {without} of {all} logs have no row by flight number or departure; a row within 12 hours of such a log \
@@ -284,7 +289,7 @@ pub(crate) fn unknown_tails<'a>(
         nearest: nearest(tail, known.iter().copied()).map(str::to_owned),
     };
     let mut found = BTreeSet::new();
-    let flights = config.document.logs.flights.as_deref().unwrap_or_default();
+    let flights = flights_table(config);
     let flown: BTreeSet<&str> = config.flights.iter().map(|flight| flight.tail_number.as_str()).collect();
     found.extend(flown.difference(&known).map(|tail| unknown(flights, tail)));
     for pattern in config.document.overrides.iter().flat_map(|one| &one.tails) {

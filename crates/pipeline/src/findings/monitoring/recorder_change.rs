@@ -25,9 +25,9 @@ pub struct RecorderChange {
     pub everywhere: bool,
     /// The first flight of the new level.
     pub since_utc: Timestamp,
-    /// Level before and after; of several positions, their median.
+    /// Level before the change; of several positions, their median.
     pub from: f64,
-    /// See `from`.
+    /// Level after it, likewise.
     pub to: f64,
 }
 

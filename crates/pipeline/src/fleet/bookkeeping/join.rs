@@ -15,7 +15,7 @@ use ingest::Flights;
 use jiff::Timestamp;
 use job::Config;
 use records::{Installation, Installations};
-use store::{Join, Store, Writer};
+use store::{Store, Writer};
 
 use crate::error::Error;
 use crate::fleet::histories::UnitKey;
@@ -123,7 +123,7 @@ impl Bookkeeping {
             return Ok(store);
         }
         let own = self.clone();
-        Ok(store.joined(Join::new(move |batch| own.join(batch, |_, _| {}))))
+        Ok(store.joined(move |batch| own.join(batch, |_, _| {})))
     }
 
     /// Whether the latest run wrote these tables into all records, and ended.
