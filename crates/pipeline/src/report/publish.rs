@@ -56,10 +56,15 @@ pub fn write(
     let list = fresh.path().join(MANIFEST);
     fs::write(&list, entries(fresh.path()).join("\n")).map_err(|e| failed(&list, e))?;
     let old = temporary(parent, dir)?;
+    let replaced = old.path().join("report");
     if dir.exists() {
-        fs::rename(dir, old.path().join("report")).map_err(|e| failed(dir, e))?;
+        fs::rename(dir, &replaced).map_err(|e| failed(dir, e))?;
     }
-    fs::rename(fresh.path(), dir).map_err(|e| failed(dir, e))?;
+    fs::rename(fresh.path(), dir).map_err(|e| {
+        // Best effort: the report that was there is not lost with its temporary folder.
+        let _ = fs::rename(&replaced, dir);
+        failed(dir, e)
+    })?;
     Ok(written)
 }
 

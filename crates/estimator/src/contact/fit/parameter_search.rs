@@ -8,7 +8,7 @@ use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, SPEED, dot};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
-use crate::contact::fit::scaling::Scaling;
+use crate::contact::fit::scaling::{Scaling, UNSEEN_GAP};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
 use crate::contact::stats::{median, spread};
@@ -20,7 +20,7 @@ const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 /// Reading of the load cell at the middle of δX, over the 95 % load, from which the search also starts from that zero.
 const FAR_ZERO: f64 = 0.25;
 /// By how much the misfit must be smaller from there.
-const ZERO_GAIN: f64 = 0.02;
+const ZERO_GAIN: f64 = 0.5;
 
 /// The best candidate.
 #[derive(Debug)]
@@ -96,11 +96,12 @@ impl<'a> ParameterSearch<'a> {
         let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
+        // Without a gap, and without a load on both sides, any zero fits.
+        let seen_m = UNSEEN_GAP * self.scaling.windup_m();
         match (near, far) {
-            // Without a gap any zero fits: then the zero is that of the load cell.
             (Some(near), Some(far)) if far.misfit + ZERO_GAIN < near.misfit => Ok(far),
             (Some(near), _) => Ok(near),
-            (None, far) => far.ok_or(rejection),
+            (None, far) => far.filter(|far| far.found.fit.beta[GAP] > seen_m).ok_or(rejection),
         }
     }
 
