@@ -97,7 +97,7 @@ impl<'a> ParameterSearch<'a> {
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
         // Without a gap, and without a load on both sides, any zero fits.
-        let seen_m = UNSEEN_GAP * self.scaling.windup_m();
+        let seen_m = 2.0 * UNSEEN_GAP * self.scaling.windup_m();
         match (near, far) {
             (Some(near), Some(far)) if far.misfit + ZERO_GAIN < near.misfit => Ok(far),
             (Some(near), _) => Ok(near),
