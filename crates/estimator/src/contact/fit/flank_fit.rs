@@ -16,7 +16,7 @@ use crate::contact::fit::design_matrix::{
     COLUMNS, DRY, DesignRow, FIRM_SHARE, FORCE, GAP, PERIODIC, PLACE, dot, less_pressed, less_pressed_blocks,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
-use crate::contact::fit::parameter_search::{FAR_ZERO, ParameterSearch, SearchResult};
+use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
 use crate::contact::fit::robust_regression::REWEIGHTINGS;
 use crate::contact::fit::scaling::{SEARCH_ROW_S, Scaling, UNSEEN_GAP};
 use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
@@ -116,10 +116,6 @@ pub(crate) fn fit(
     };
     if gap_m.0 < UNSEEN_GAP * windup_m {
         check_both_sides(&workspace.whole, scaling, false)?;
-        // Any zero fits where no gap is seen: one that is far off may be that of a load on one side.
-        if fit.search.line.at.load_zero_n.abs() > FAR_ZERO * scaling.load_n {
-            return Err(Rejection::NoLoadReversal);
-        }
     }
     fit.unexplained_m = unexplained_m(&mut workspace.excerpt, scaling, &fit);
     // The load of a bench is no other actuator's: travel that no flank accounts for may be the gap's.

@@ -18,7 +18,7 @@ use crate::gap::load_band::quantiles;
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 
 /// Reading of the load cell at the middle of δX, over the 95 % load, from which the search also starts from that zero.
-pub(crate) const FAR_ZERO: f64 = 0.25;
+const FAR_ZERO: f64 = 0.25;
 /// By how much the misfit must be smaller from there.
 const ZERO_GAIN: f64 = 0.5;
 
