@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::Samples;
 use crate::contact::codes::Rejection;
 use crate::contact::friction::friction_model::{Coupling, Drive, FrictionState};
-use crate::contact::stats::{LOOKS, middle_and_half, second_differences};
+use crate::contact::stats::{LOOKS, median, middle_and_half, second_differences};
 use crate::contact::types::PartPrior;
 use crate::gap::load_band::{quantiles, reversals};
 
@@ -15,6 +15,8 @@ const PERIOD_S: f64 = 0.004;
 const CALM_PERIOD_S: f64 = 0.012;
 /// Half of the time over which the speed of the motor is averaged, s.
 const SPEED_S: f64 = 0.03;
+/// Reading of the load cell at the middle of δX, over the 95 % load, from which its zero may be far off.
+const FAR_ZERO: f64 = 0.25;
 /// Number of blocks in each window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
 /// Minimum time of sound blocks, s: a flight with less is rejected.
@@ -135,6 +137,17 @@ impl BlockMeans {
     /// Whether loads pile up at the largest value of a side.
     pub(crate) fn is_clipped(&self) -> bool {
         self.in_range_n.start.is_finite() || self.in_range_n.end.is_finite()
+    }
+
+    /// Median reading of the load where δX is near the middle between its 5 % and 95 % quantiles, N, if that is far from zero:
+    /// there the load cell's zero may be.
+    pub(crate) fn far_zero_n(&self, load_n: f64) -> Option<f64> {
+        let all = 0..self.len();
+        let [low_m, high_m] = quantiles(&self.dx_m, std::slice::from_ref(&all), [0.05, 0.95])?;
+        let is_near = |dx_m: f64| (dx_m - 0.5 * (low_m + high_m)).abs() < 0.05 * (high_m - low_m);
+        let near = self.dx_m.iter().zip(&self.load_n).filter(|(dx_m, n)| is_near(**dx_m) && n.is_finite());
+        let zero_n = median(&mut near.map(|(_, n)| *n).collect::<Vec<f64>>());
+        (zero_n.abs() > FAR_ZERO * load_n).then_some(zero_n)
     }
 
     /// What drives the coupling at a block.

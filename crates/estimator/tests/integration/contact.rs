@@ -59,14 +59,16 @@ impl Case {
         let prior = PartPrior { reference_load_n: Some(4000.0), ..self.prior() };
         let outcome = fit(samples, &prior).unwrap();
         let without_fit = contact::find_rejection(samples, &prior, &mut ContactWorkspace::default()).unwrap();
-        match outcome {
+        match &outcome {
+            // Only the regression finds a zero of the load cell that is far off.
+            Ok(found) if found.load_zero_n.abs() > 0.25 * found.load_p95_n => (),
             Ok(_) => assert_eq!(without_fit, None),
             // Touches that give no row, and a screw that sticks within its gap, take the regression.
             Err(Rejection::RateTooLow | Rejection::LoadHeld | Rejection::MotionUnexplained) => (),
             Err(Rejection::NoLoadReversal | Rejection::OneSideBrief) => {
                 assert!(matches!(without_fit, Some(Rejection::NoLoadReversal | Rejection::OneSideBrief)));
             }
-            Err(why) => assert_eq!(without_fit, Some(why)),
+            Err(why) => assert_eq!(without_fit, Some(*why)),
         }
         outcome
     }

@@ -11,14 +11,11 @@ use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
 use crate::contact::fit::scaling::{Scaling, UNSEEN_GAP};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
-use crate::contact::stats::{median, spread};
-use crate::gap::load_band::quantiles;
+use crate::contact::stats::spread;
 
 /// First and last step of the search for the load zero, as shares of the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 
-/// Reading of the load cell at the middle of δX, over the 95 % load, from which the search also starts from that zero.
-const FAR_ZERO: f64 = 0.25;
 /// By how much the misfit must be smaller from there.
 const ZERO_GAIN: f64 = 0.5;
 
@@ -90,9 +87,7 @@ impl<'a> ParameterSearch<'a> {
         // Dry friction as a share of the 95 % load, and lost share of the load: usual friction, then heavy friction.
         let [usual, heavy] = [self.start((0.02, 0.03), 0.0), self.start((0.10, 0.12), 0.0)];
         // From a zero of the load cell that is far off, no small step leads to the true one.
-        let middle_n = self.load_at_middle_n();
-        let is_far = middle_n.abs() > FAR_ZERO * self.scaling.load_n;
-        let far = is_far.then(|| self.start((0.02, 0.03), middle_n));
+        let far = self.blocks.far_zero_n(self.scaling.load_n).map(|zero_n| self.start((0.02, 0.03), zero_n));
         let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
@@ -131,18 +126,6 @@ impl<'a> ParameterSearch<'a> {
             self.candidate(found, misfit)
         });
         judged.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
-    }
-
-    /// Median reading of the load where δX is near the middle between its 5 % and 95 % quantiles, N; zero if it never is.
-    fn load_at_middle_n(&self) -> f64 {
-        let BlockMeans { dx_m, load_n, .. } = &*self.blocks;
-        let all = 0..dx_m.len();
-        let Some([low_m, high_m]) = quantiles(dx_m, std::slice::from_ref(&all), [0.05, 0.95]) else {
-            return 0.0;
-        };
-        let is_near = |dx_m: f64| (dx_m - 0.5 * (low_m + high_m)).abs() < 0.05 * (high_m - low_m);
-        let near = dx_m.iter().zip(load_n).filter(|(dx_m, load_n)| is_near(**dx_m) && load_n.is_finite());
-        median(&mut near.map(|(_, load_n)| *load_n).collect::<Vec<f64>>())
     }
 
     /// Iterates from a state; afterwards, blocks, couplings and linear parts are those of the result.
