@@ -315,9 +315,6 @@ impl Proposal {
         let is_identified = has_tail && has_departure;
         let position_path = needed_position(log, offer).filter(|_| is_identified);
         let identity_path = if is_identified { None } else { identity_path(log, offer) };
-        let has_flight = has(offer, IdentityField::FlightId)
-            || identity_path.as_ref().is_some_and(|(path, _)| path.contains("<flight_id>"));
-        let are_pieces = has_flight && is_piece(log);
         let lacks_format = identity_path.as_ref().map_or(has_tail, |(_, format)| format.is_none());
         let text = Configuration {
             proposal: self,
@@ -326,7 +323,6 @@ impl Proposal {
             positions: if positions.is_empty() { "none".to_owned() } else { positions },
             position_path: position_path.map(|(_, path)| path),
             identity_path,
-            are_pieces,
             has_tail,
             has_departure,
             lacks_departure: lacks_format && !has_departure,
@@ -382,7 +378,6 @@ struct Configuration<'p> {
     position_path: Option<String>,
     /// The expression that finds what metadata and columns do not hold, and the format of its departure.
     identity_path: Option<(String, Option<String>)>,
-    are_pieces: bool,
     has_tail: bool,
     has_departure: bool,
     lacks_departure: bool,
@@ -398,6 +393,13 @@ impl Configuration<'_> {
     /// A pattern of files below the folder of the logs.
     fn below(&self, files: &str) -> String {
         quoted(&format!("{}/{files}", display_path(&self.folder)))
+    }
+
+    /// Whether the files are pieces, by their names, of flights that the identity knows.
+    fn are_pieces(&self) -> bool {
+        let main = &self.proposal.main;
+        let is_in_path = self.identity_path.as_ref().is_some_and(|(path, _)| path.contains("<flight_id>"));
+        is_piece(&main.log) && (is_in_path || has(&main.offer, IdentityField::FlightId))
     }
 
     /// Sources of the identity other than the path, each with its facts as keys of a table.
