@@ -43,7 +43,7 @@ pub(super) fn baseline(id: &str, known: &[&Finding], selected: &[&Finding], run_
     let mut states = BTreeMap::<&str, usize>::new();
     known.iter().for_each(|finding| *states.entry(word(finding.state)).or_default() += 1);
     let text = format!(
-        "Alerts begin with {} units, {} of them in a selected state; from now on changes are sent.",
+        "Units known when alerts begin: {}; findings in a selected state: {}. From now on, changes are sent.",
         known.len(),
         selected.len()
     );

@@ -97,7 +97,7 @@ impl TrendRow {
     }
 
     /// Order of urgency: by state, then by due date, then by the hours to the limit.
-    pub fn urgency(&self) -> (u8, f64, f64, &str) {
+    fn urgency(&self) -> (u8, f64, f64, &str) {
         let rank = match state_rank(self.state) {
             NORMAL_RANK if self.action.is_some() => NORMAL_RANK - 1,
             rank => rank,

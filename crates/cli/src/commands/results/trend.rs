@@ -1,6 +1,5 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -173,7 +172,7 @@ const AS_OF: &str = "as of";
 
 /// Units by urgency, with date, reason and certainty; without the columns above a rank.
 pub(crate) fn unit_table(mut units: Vec<&TrendRow>, max_rank: u8) -> String {
-    units.sort_by(|a, b| a.urgency().partial_cmp(&b.urgency()).unwrap_or(Ordering::Equal));
+    units.sort_by(|a, b| a.by_urgency(b));
     let or_dash_number = |value: Option<f64>, factor: f64| {
         value.map_or_else(table::empty_cell, |value| format!("{:.1}", value * factor))
     };
