@@ -164,12 +164,12 @@ fn send_due<'r, C: Courier>(
             Attempt::Unknown(why) => (AlertStatus::Unconfirmed, Some(why)),
         };
         failures = if error.is_some() { failures + 1 } else { 0 };
-        // Else the older message would come last, in the next run.
-        if status == AlertStatus::Pending && row.attempts < MAX_HOLDING {
-            held.insert(subject(row));
-        }
         row.error = error;
         mark(row, status, run_id);
+        // Else the older message would come last, in the next run.
+        if is_due(row, channel) && row.attempts < MAX_HOLDING {
+            held.insert(subject(row));
+        }
         marked.push(row.clone());
     }
     if marked.is_empty() { Ok(()) } else { courier.write(&marked) }

@@ -191,6 +191,17 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
         changes.sort_by_key(|row| row.change_number);
         assert!(changes.windows(2).all(|pair| pair[0].to_state == pair[1].from_state), "{changes:?}");
     }
+    // The last message about a unit says its present state.
+    for (serial, channel) in
+        SERIALS.iter().flat_map(|serial| ["command", "folder", "url"].map(|of| (serial, of)))
+    {
+        let of_unit = |(to, id): &(String, String)| {
+            let row = world.table.get(&(id.clone(), to.clone()))?;
+            (to == channel && row.serial_number.as_deref() == Some(serial)).then_some(row.change_number)
+        };
+        let received: Vec<i64> = world.received.iter().filter_map(of_unit).collect();
+        assert_eq!(received.last(), received.iter().max(), "{serial} {channel}");
+    }
     let mut counts = BTreeMap::<&str, usize>::new();
     for row in world.table.values().filter(|row| !row.channel.is_empty() && row.kind == "change") {
         let name = (row.channel.clone(), row.alert_id.clone());
@@ -258,6 +269,23 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     world.refused = ["S3".to_owned()].into();
     assert_eq!(run(&mut world, "5"), (7, 1, 0, 8));
     assert_eq!(run(&mut world, "6"), (0, 1, 0, 1));
+}
+
+#[test]
+fn a_unit_that_lost_its_flights_is_one_alert() {
+    let channels = channels();
+    let [one, other] = ["1040-0009", "7"].map(|serial| finding(serial, Some("act"), 0));
+    let detect = |known: &[AlertRecord], findings: &[Finding]| {
+        alert_changes::detect(known, findings, &channels, "run", one.as_of_utc)
+    };
+    let mut known = detect(&[], &[one.clone(), other.clone()]);
+    let found = detect(&known, std::slice::from_ref(&other));
+    assert_eq!(found.len(), 1 + channels.len());
+    assert!(
+        found.iter().all(|row| row.serial_number.as_deref() == Some("1040-0009") && row.to_state.is_none())
+    );
+    known.extend(found);
+    assert_eq!(detect(&known, std::slice::from_ref(&other)), []);
 }
 
 /// A change that a tail made, first seen on a day.
