@@ -187,26 +187,31 @@ impl<'a> OwnershipLedger<'a> {
             return Ok(self.refuse_pieces(account, diagnostics, pieces, report));
         }
         let held = self.held(&account, &records, writer)?;
-        if self.must_wait(&account, &records, &held) {
+        let claim = |record: &GapRecord| {
+            let key = RecordKey::of(record);
+            held.get(&key).map(|other| (self.claim(&account, &HeldRecord::of(record), &key, other), other))
+        };
+        let claims: Vec<_> = records.iter().map(claim).collect();
+        let is_open = |(claim, other): &(Claim, &HeldRecord)| {
+            matches!(claim, Claim::Contradicts) && self.is_awaited(&other.log_path, &account.run_id)
+        };
+        if claims.iter().flatten().any(is_open) {
             self.waiting.insert(account.log_path.clone(), ProcessedLog { account, records, diagnostics });
             return Ok(Vec::new());
         }
         let moved_from = self.moved_from(&account, &records, writer)?;
         let (mut kept, mut displaced) = (Vec::new(), BTreeMap::<String, bool>::new());
         let (mut copy_of, mut contradicts, mut worse_than) = (None, None, None);
-        for record in records {
-            let key = RecordKey::of(&record);
-            let Some(other) = held.get(&key) else {
+        for (record, claim) in records.into_iter().zip(claims) {
+            let Some((claim, other)) = claim else {
                 kept.push(record);
                 continue;
             };
             let owner = other.log_path.clone();
-            let new = HeldRecord::of(&record);
-            let is_same = other.is_same_as(&new);
-            match self.claim(&account, &new, &key, other) {
+            match claim {
                 Claim::Takes => {
-                    if self.own.contains_key(&key) {
-                        displaced.entry(owner).or_insert(is_same);
+                    if self.own.contains_key(&RecordKey::of(&record)) {
+                        displaced.entry(owner).or_insert_with(|| other.is_same_as(&HeldRecord::of(&record)));
                     }
                     kept.push(record);
                 }
@@ -306,24 +311,10 @@ impl<'a> OwnershipLedger<'a> {
         }
     }
 
-    /// Whether a record contradicts that of a log which this run is still to process.
-    fn must_wait(
-        &self,
-        account: &LogRecord,
-        records: &[GapRecord],
-        held: &BTreeMap<RecordKey, HeldRecord>,
-    ) -> bool {
-        let is_awaited = |log: &String| {
-            let is_processed = self.accounts.get(log).is_some_and(|holder| holder.run_id == account.run_id);
-            !is_processed && self.plan.work.iter().any(|work| work.log_path == *log)
-        };
-        records.iter().any(|record| {
-            let (key, new) = (RecordKey::of(record), HeldRecord::of(record));
-            held.get(&key).is_some_and(|other| {
-                matches!(self.claim(account, &new, &key, other), Claim::Contradicts)
-                    && is_awaited(&other.log_path)
-            })
-        })
+    /// Whether this run is still to process a log.
+    fn is_awaited(&self, log: &str, run_id: &str) -> bool {
+        self.accounts.get(log).is_none_or(|account| account.run_id != run_id)
+            && self.plan.work.iter().any(|work| work.log_path == log)
     }
 
     /// Converts the outcomes that waited, after all others. One that waits for a log which the run did not reach is not
