@@ -21,6 +21,10 @@ const FAR_ZERO: f64 = 0.25;
 const WINDOW_BLOCKS: usize = 500;
 /// Minimum time of sound blocks, s: a flight with less is rejected.
 const SHORTEST_S: f64 = 9.0;
+/// Length of the windows that standstill is looked for in, s: so much of it before and after each motion counts.
+const STILL_S: f64 = 2.0;
+/// Shares of the stroke seen and of the load's range below which a window is standstill.
+const STILL: (f64, f64) = (0.01, 0.05);
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
@@ -85,6 +89,7 @@ impl BlockMeans {
             self.segments.push(first..self.len());
         }
         self.is_calm = is_calm;
+        self.leave_out_standstill();
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
@@ -96,6 +101,41 @@ impl BlockMeans {
         }
         let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
         if (sound as f64) * self.period_s < SHORTEST_S { Err(Rejection::TooShort) } else { Ok(()) }
+    }
+
+    /// Removes standstill where it fills more than half of a log and enough remains. It shows nothing of the gap, but would
+    /// set the load's scale and the scatter that is usual.
+    fn leave_out_standstill(&mut self) {
+        let least = [(&self.motor_m, STILL.0), (&self.load_n, STILL.1)];
+        let least = least.map(|(values, share)| (values, share * middle_and_half(values).1));
+        let moves = |window: &Range<usize>| {
+            least.iter().any(|(values, least)| middle_and_half(&values[window.clone()]).1 > *least)
+        };
+        let each = (STILL_S / self.period_s).ceil() as usize;
+        let mut kept: Vec<Range<usize>> = Vec::new();
+        for segment in &self.segments {
+            let starts = segment.clone().step_by(each);
+            let windows: Vec<_> = starts.map(|start| start..(start + each).min(segment.end)).collect();
+            let moving: Vec<bool> = windows.iter().map(moves).collect();
+            let near = |k: usize| moving[k.saturating_sub(1)..moving.len().min(k + 2)].contains(&true);
+            let moving = (0..windows.len()).filter(|k| near(*k)).map(|k| windows[k].clone());
+            let moving: Vec<_> = moving.collect();
+            kept.extend(
+                moving.chunk_by(|a, b| a.end == b.start).map(|run| run[0].start..run[run.len() - 1].end),
+            );
+        }
+        let blocks = kept.iter().map(Range::len).sum::<usize>();
+        if 2 * blocks > self.len() || blocks as f64 * self.period_s < SHORTEST_S {
+            return;
+        }
+        for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
+            *column = kept.iter().flat_map(|run| &column[run.clone()]).copied().collect();
+        }
+        self.segments.clear();
+        for run in kept {
+            let first = self.segments.last().map_or(0, |segment| segment.end);
+            self.segments.push(first..first + run.len());
+        }
     }
 
     /// Removes all blocks, and reserves memory for new ones.

@@ -25,6 +25,7 @@ mod block_means;
 mod codes;
 mod fit;
 mod friction;
+mod line_joined;
 mod load_jump;
 mod lost_motion;
 mod plot_data;
@@ -44,6 +45,7 @@ use fit::flank_fit::{self, FlankFit};
 use fit::gauss_newton::{GaussNewtonResult, LATEST_S};
 use fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use fit::sign_check::{self, SignCheck};
+use line_joined::line_length;
 
 /// Longest step between samples, s: slower logs blur the moment at which a flank is left.
 const LONGEST_STEP_S: f64 = 0.05;
@@ -124,7 +126,11 @@ fn prepare(
     prior: &PartPrior,
     workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, SignCheck), Rejection> {
-    if is_too_slow(samples.step_s) {
+    // Single-precision positions are rounded by less than this.
+    let rounding_m = 5e-7 * samples.motor_m.iter().fold(0.0, |most, m| m.abs().max(most));
+    let own_step_s =
+        |values| line_length(values, rounding_m).map_or(samples.step_s, |n| n as f64 * samples.step_s);
+    if is_too_slow(own_step_s(samples.motor_m).min(own_step_s(samples.dx_m))) {
         return Err(Rejection::RateTooLow);
     }
     workspace.whole.gather(samples, prior)?;

@@ -317,7 +317,9 @@ fn gap_and_error_m(
     let astray: f64 = rows.iter().filter(is_astray).map(|row| row.blocks).sum();
     let attenuated_m = 2.0 * gap_m * astray / all;
     let error_m = (0.8 * jackknife_m).hypot(candidates_m).hypot(floor_m) * growth;
-    ((gap_m, error_m.hypot(place_m).hypot(attenuated_m)), sigma)
+    // Where a load steps between a few levels, friction is not distinguishable from the gap: its prior decides.
+    let priors_m = line.fit.error_of_priors_m(GAP);
+    ((gap_m, error_m.hypot(priors_m).hypot(place_m).hypot(attenuated_m)), sigma)
 }
 
 /// Groups of about equally many rows, in order of time; no stretch is divided.

@@ -244,9 +244,17 @@ impl<const N: usize> RobustFit<N> {
         let moved = |(row, w): (&DesignRow<N>, &f64)| w * self.residual_m(row) * dot(&influence, &row.x);
         let (total, stretches) = squares_of_stretches(rows, rows.iter().zip(&self.weights).map(moved));
         let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);
+        (total * freedom + self.variance_of_priors(&influence)).sqrt()
+    }
+
+    /// Standard error of a coefficient by the uncertainty of the priors that it rests on, m: 0 where the data decide.
+    pub(crate) fn error_of_priors_m(&self, column: usize) -> f64 {
+        self.variance_of_priors(&std::array::from_fn(|i| self.inverse[(column, i)])).sqrt()
+    }
+
+    fn variance_of_priors(&self, influence: &[f64; N]) -> f64 {
         let believed = (0..N).filter(|&i| self.priors[i].sd.is_finite());
-        let lent = believed.map(|i| (influence[i] * self.lent[i] * self.priors[i].sd).powi(2));
-        (total * freedom + lent.sum::<f64>()).sqrt()
+        believed.map(|i| (influence[i] * self.lent[i] * self.priors[i].sd).powi(2)).sum()
     }
 }
 
