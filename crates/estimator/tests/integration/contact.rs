@@ -278,6 +278,69 @@ fn a_sweep_against_a_spring_shows_its_gap() {
     }
 }
 
+/// A log of which nine tenths are standstill under a constant load shows the gap of its active tenth.
+#[test]
+fn standstill_moves_no_gap() {
+    for seed in 0..3 {
+        let case = Case::nominal(60e-6);
+        let flight = case.fly(seed);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut rested = |values: &[f64], noise: f64| -> Vec<f64> {
+            let rest = (0..9 * values.len()).map(|_| values[0] + noise * random.random_range(-1.7..1.7));
+            rest.chain(values.iter().copied()).collect()
+        };
+        let motor_m = rested(&flight.motor_m, 1e-6);
+        let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
+        let (dx_m, load_n) = (rested(&dx_m, 3e-6), rested(&flight.load_n, 20.0));
+        let (found, alone) = (case.look(&motor_m, &dx_m, &load_n).unwrap(), case.outcome(&flight).unwrap());
+        assert!((found.gap_m - 60e-6).abs() < 1e-6, "{seed}: {found:?}");
+        assert!(found.gap_se_m < 2.0 * alone.gap_se_m, "{seed}: {found:?}, alone {alone:?}");
+    }
+}
+
+/// Positions of 4 Hz in rows of 125 Hz, joined by lines, put the moment at which a flank is left anywhere between two samples.
+#[test]
+fn positions_joined_by_lines_count_at_their_own_rate() {
+    let case = Case::nominal(100e-6);
+    let flight = case.fly(2);
+    let lines = |values: &[f64]| -> Vec<f64> {
+        let line = |k: usize| {
+            let (from, share) = (k / 31 * 31, (k % 31) as f64 / 31.0);
+            values[from] * (1.0 - share) + values[(from + 31).min(values.len() - 1)] * share
+        };
+        (0..values.len()).map(line).collect()
+    };
+    let [motor_m, screw_m, load_n] = [&flight.motor_m, &flight.screw_m, &flight.load_n].map(|v| lines(v));
+    let dx_m: Vec<f64> = screw_m.iter().zip(&motor_m).map(|(s, m)| s - m).collect();
+    assert_eq!(case.look(&motor_m, &dx_m, &load_n), Err(Rejection::RateTooLow));
+}
+
+/// A bench load that is held at three sizes on both sides: each is reached from the other side, so that friction of 8 % of
+/// the load takes off 16 µm of every distance between the flanks, and nothing tells it from the gap.
+#[test]
+fn an_interval_holds_a_gap_that_friction_hides() {
+    let at_m = |force_n: f64| 50e-6 * force_n.signum() + force_n / 5e7;
+    for seed in 0..6 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let case = Case::nominal(100e-6);
+        let (mut force_n, mut place_m) = (0.0_f64, 0.0);
+        let (mut load_n, mut dx_m) = (Vec::new(), Vec::new());
+        for k in 0..12 * 10 * 125 {
+            let hold = k / (10 * 125);
+            let level_n = [2000.0, 3500.0, 5000.0][hold / 2 % 3] * [1.0, -1.0][hold % 2];
+            force_n += 0.2 * (level_n - force_n);
+            place_m = f64::clamp(place_m, at_m(force_n - 400.0), at_m(force_n + 400.0));
+            load_n.push(force_n + 20.0 * random.random_range(-1.7..1.7));
+            dx_m.push(place_m + 3e-7 * random.random_range(-1.7..1.7));
+        }
+        let motor_m: Vec<f64> = dx_m.iter().map(|dx_m| -dx_m).collect();
+        let prior = PartPrior { output_locked: true, ..case.prior() };
+        let found = case.with_samples(&motor_m, &dx_m, &load_n, |samples| fit(samples, &prior).unwrap());
+        let holds = |found: &ContactEstimate| (found.gap_m - 100e-6).abs() < 2.0 * found.gap_se_m;
+        assert!(found.as_ref().is_ok_and(|found| holds(found)), "{seed}: {found:?}");
+    }
+}
+
 /// In calm air the load follows the place, too. The zeros of load cell and screw transducer drift with temperature: no lead is
 /// wrong.
 #[test]

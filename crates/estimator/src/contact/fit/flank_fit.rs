@@ -318,7 +318,7 @@ fn gap_and_error_m(
     let attenuated_m = 2.0 * gap_m * astray / all;
     let error_m = (0.8 * jackknife_m).hypot(candidates_m).hypot(floor_m) * growth;
     // Where a load steps between a few levels, friction is not distinguishable from the gap: its prior decides.
-    let priors_m = line.fit.error_of_priors_m(GAP);
+    let priors_m = search.priors_m.max(line.fit.error_of_priors_m(GAP));
     ((gap_m, error_m.hypot(priors_m).hypot(place_m).hypot(attenuated_m)), sigma)
 }
 

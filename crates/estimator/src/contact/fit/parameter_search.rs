@@ -7,7 +7,7 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, SPEED, dot};
-use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
+use crate::contact::fit::gauss_newton::{DRY_SHARE, GaussNewtonResult, search};
 use crate::contact::fit::scaling::{Scaling, UNSEEN_GAP};
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
@@ -29,6 +29,8 @@ pub(crate) struct SearchResult {
     pub(crate) scale_m: f64,
     /// Standard error of the load zero, N.
     pub(crate) load_zero_se_n: f64,
+    /// Standard error of the gap by what the priors leave open, m.
+    pub(crate) priors_m: f64,
 }
 
 /// The state of a search.
@@ -75,7 +77,9 @@ impl<'a> ParameterSearch<'a> {
             squares += weight * (other_m - gap_m).powi(2);
         }
         let load_zero_se_n = self.zero_error_n(&best.found);
+        let priors_m = self.error_of_priors_m(&best.found);
         Ok(SearchResult {
+            priors_m,
             line: best.found,
             spread_m: (squares / total.max(f64::MIN_POSITIVE)).sqrt(),
             scale_m: self.scale_m,
@@ -198,6 +202,16 @@ impl<'a> ParameterSearch<'a> {
         let error_n = (curvature * independent).recip().sqrt();
         let least_n = ZERO_STEPS.1 * self.scaling.load_n;
         if curvature > 0.0 { error_n.clamp(least_n, self.scaling.load_n) } else { self.scaling.load_n }
+    }
+
+    /// Standard error of the gap by the priors, m, under friction that is larger than the fitted one by the standard
+    /// deviation of its prior: under next to none, noise of the load makes the screw slip to and fro, so that
+    /// friction seems to be known.
+    fn error_of_priors_m(&mut self, found: &GaussNewtonResult) -> f64 {
+        let mut state = found.state;
+        state.friction.dry_n += DRY_SHARE.1 * self.scaling.load_n;
+        let probe = search(self.blocks, self.scaling, state, 1, 1);
+        probe.map_or(0.0, |probe| probe.fit.error_of_priors_m(GAP))
     }
 
     /// Tries bristles with each factor times one compliance, m/N. True if one of them fits better.
