@@ -65,7 +65,7 @@ pub(crate) struct DesignMatrix {
 
 #[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
 impl BlockMeans {
-    /// Rows of all blocks that keep their flank, none of which mixes flank and gap. A firm row is of blocks before which its
+    /// Rows of all blocks that keep their flank after a slip, none of which mixes flank and gap. A firm row is of blocks before which its
     /// flank was pressed firmly for `settling` blocks.
     ///
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
@@ -83,7 +83,10 @@ impl BlockMeans {
             for (k, around) in (segment.start + BEFORE..).zip(self.couplings[segment.clone()].array_windows())
             {
                 pressed = pressed_blocks(pressed, around[BEFORE].force_n, firm_n);
-                let is_settled = |kind: &usize| *kind < 2 || pressed.unsigned_abs() > settling;
+                // Before the screw slips for the first time, its friction may have any size.
+                let has_slipped = around[BEFORE].dforce_ddry != 0.0;
+                let is_settled =
+                    |kind: &usize| has_slipped && (*kind < 2 || pressed.unsigned_abs() > settling);
                 let kind = touch(around, firm_n).filter(is_settled);
                 let Some(kind) = kind.filter(|_| self.is_complete(k)) else { continue };
                 let here = self.stretch(k);

@@ -73,7 +73,6 @@ impl ScrewStates8 {
             memory: [self.memory[0][lane], self.memory[1][lane], self.memory[2][lane]],
             coupling: Coupling::UNKNOWN,
             has_slipped: false,
-            is_known: true,
         }
     }
 

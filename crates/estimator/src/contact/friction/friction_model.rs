@@ -50,7 +50,7 @@ pub(crate) struct FrictionState {
 /// The coupling at one block: its force, the derivatives of the force by the friction parameters, and its position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Coupling {
-    /// c, N; NaN where it is unknown.
+    /// c, N; NaN where a channel is missing.
     pub(crate) force_n: f64,
     /// ∂c/∂F_d.
     pub(crate) dforce_ddry: f64,
@@ -58,12 +58,12 @@ pub(crate) struct Coupling {
     pub(crate) dforce_dloss_n: f64,
     /// ∂c/∂p, N.
     pub(crate) dforce_dstribeck_n: f64,
-    /// Relative position from the middle of the gap, m; NaN where it is unknown.
+    /// Relative position from the middle of the gap, m; NaN where a channel is missing.
     pub(crate) relative_m: f64,
 }
 
 impl Coupling {
-    /// Where a channel is missing, or the screw has not slipped yet.
+    /// Where a channel is missing.
     pub(crate) const UNKNOWN: Self = Self {
         force_n: f64::NAN,
         dforce_ddry: 0.0,
@@ -104,8 +104,6 @@ pub(crate) struct ScrewState {
     pub(crate) coupling: Coupling,
     /// Whether it slipped in this block, so that no earlier state matters.
     pub(crate) has_slipped: bool,
-    /// Whether it has slipped in the segment: before, its friction may have any size.
-    pub(crate) is_known: bool,
 }
 
 #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
@@ -161,12 +159,11 @@ impl CouplingParams {
                 relative_m,
             },
             has_slipped,
-            is_known: before.is_known | has_slipped,
         }
     }
 
-    /// Takes a screw, if there is one yet, to the next block, and returns the coupling there, once the screw has slipped. A
-    /// block with a missing channel is skipped.
+    /// Takes a screw, if there is one yet, to the next block, and returns the coupling there. A block with a missing channel
+    /// is skipped.
     #[inline]
     pub(crate) fn follow(&self, screw: &mut Option<ScrewState>, drive: Drive) -> Coupling {
         if !(drive.motor_m + drive.load_n).is_finite() {
@@ -174,7 +171,7 @@ impl CouplingParams {
         }
         let next = screw.map_or_else(|| self.rest(drive), |before| self.step(&before, drive));
         *screw = Some(next);
-        if next.is_known { next.coupling } else { Coupling::UNKNOWN }
+        next.coupling
     }
 
     /// The screw at the start of a segment: at rest, its friction unknown.
@@ -187,7 +184,6 @@ impl CouplingParams {
             memory: [0.0; 3],
             coupling: Coupling { force_n, relative_m, ..Coupling::UNKNOWN },
             has_slipped: false,
-            is_known: false,
         }
     }
 
