@@ -16,7 +16,7 @@ const CALM_PERIOD_S: f64 = 0.012;
 /// Half of the time over which the speed of the motor is averaged, s.
 const SPEED_S: f64 = 0.03;
 /// Reading of the load cell at the middle of δX, over the 95 % load, from which its zero may be far off.
-const FAR_ZERO: f64 = 0.25;
+const FAR_ZERO: f64 = 0.08;
 /// Number of blocks in each window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
 /// Minimum time of sound blocks, s: a flight with less is rejected.
@@ -24,7 +24,7 @@ const SHORTEST_S: f64 = 9.0;
 /// Length of the windows that standstill is looked for in, s: so much of it before and after each motion counts.
 const STILL_S: f64 = 2.0;
 /// Shares of the stroke seen and of the load's range below which a window is standstill.
-const STILL: (f64, f64) = (0.01, 0.05);
+const STILL: (f64, f64) = (0.02, 0.1);
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
@@ -65,6 +65,25 @@ impl BlockMeans {
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
     pub(crate) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
+        self.take_means(samples)?;
+        if let Some(moving) = self.moving_segments(samples) {
+            self.take_means(&Samples { segments: &moving, ..*samples })?;
+        }
+        self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
+        self.logged_n.extend_from_slice(&self.load_n);
+        self.find_slowness();
+        self.in_range_n = -self.clipped_above_n(-1.0)..self.clipped_above_n(1.0);
+        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
+        // A dead sensor, or that of a locked surface, repeats one value; a billionth of the motor's travel is rounding.
+        if !prior.output_locked && (0.0..=1e-9 * motor_m).contains(&screw_m) {
+            return Err(Rejection::ChannelConstant);
+        }
+        let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
+        if (sound as f64) * self.period_s < SHORTEST_S { Err(Rejection::TooShort) } else { Ok(()) }
+    }
+
+    /// Fills the channels from the samples of all segments.
+    fn take_means(&mut self, samples: &Samples<'_>) -> Result<(), Rejection> {
         let shortest = ((PERIOD_S / samples.step_s).round() as usize).max(1);
         let is_calm = is_calm(samples, shortest);
         let count = (CALM_PERIOD_S / (shortest as f64 * samples.step_s)).ceil() as usize;
@@ -89,53 +108,39 @@ impl BlockMeans {
             self.segments.push(first..self.len());
         }
         self.is_calm = is_calm;
-        self.leave_out_standstill();
-        self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
-        self.logged_n.extend_from_slice(&self.load_n);
-        self.find_slowness();
-        self.in_range_n = -self.clipped_above_n(-1.0)..self.clipped_above_n(1.0);
-        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
-        // A dead sensor, or that of a locked surface, repeats one value; a billionth of the motor's travel is rounding.
-        if !prior.output_locked && (0.0..=1e-9 * motor_m).contains(&screw_m) {
-            return Err(Rejection::ChannelConstant);
-        }
-        let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
-        if (sound as f64) * self.period_s < SHORTEST_S { Err(Rejection::TooShort) } else { Ok(()) }
+        Ok(())
     }
 
-    /// Removes standstill where it fills more than half of a log and enough remains. It shows nothing of the gap, but would
-    /// set the load's scale and the scatter that is usual.
-    fn leave_out_standstill(&mut self) {
+    /// The samples near motion, where standstill fills more than half of a log and enough remains. Standstill shows nothing of
+    /// the gap, but would set the load's scale and the scatter that is usual.
+    fn moving_segments(&self, samples: &Samples<'_>) -> Option<Vec<Range<usize>>> {
         let least = [(&self.motor_m, STILL.0), (&self.load_n, STILL.1)];
         let least = least.map(|(values, share)| (values, share * middle_and_half(values).1));
         let moves = |window: &Range<usize>| {
             least.iter().any(|(values, least)| middle_and_half(&values[window.clone()]).1 > *least)
         };
-        let each = (STILL_S / self.period_s).ceil() as usize;
-        let mut kept: Vec<Range<usize>> = Vec::new();
-        for segment in &self.segments {
-            let starts = segment.clone().step_by(each);
-            let windows: Vec<_> = starts.map(|start| start..(start + each).min(segment.end)).collect();
-            let moving: Vec<bool> = windows.iter().map(moves).collect();
-            let near = |k: usize| moving[k.saturating_sub(1)..moving.len().min(k + 2)].contains(&true);
-            let moving = (0..windows.len()).filter(|k| near(*k)).map(|k| windows[k].clone());
-            let moving: Vec<_> = moving.collect();
-            kept.extend(
-                moving.chunk_by(|a, b| a.end == b.start).map(|run| run[0].start..run[run.len() - 1].end),
-            );
+        let in_window = (STILL_S / self.period_s).ceil() as usize;
+        let in_block = (self.period_s / samples.step_s).round() as usize;
+        let mut moving: Vec<Range<usize>> = Vec::new();
+        for (segment, of_samples) in self.segments.iter().zip(samples.segments) {
+            let starts = segment.clone().step_by(in_window);
+            let windows: Vec<_> = starts.map(|start| start..(start + in_window).min(segment.end)).collect();
+            let moves: Vec<bool> = windows.iter().map(moves).collect();
+            let is_near = |k: usize| moves[k.saturating_sub(1)..moves.len().min(k + 2)].contains(&true);
+            let sample = |block: usize| of_samples.start + (block - segment.start) * in_block;
+            for (_, window) in windows.iter().enumerate().filter(|(k, _)| is_near(*k)) {
+                let window = sample(window.start)..sample(window.end);
+                match moving
+                    .last_mut()
+                    .filter(|last| last.end == window.start && last.start >= of_samples.start)
+                {
+                    Some(last) => last.end = window.end,
+                    None => moving.push(window),
+                }
+            }
         }
-        let blocks = kept.iter().map(Range::len).sum::<usize>();
-        if 2 * blocks > self.len() || blocks as f64 * self.period_s < SHORTEST_S {
-            return;
-        }
-        for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
-            *column = kept.iter().flat_map(|run| &column[run.clone()]).copied().collect();
-        }
-        self.segments.clear();
-        for run in kept {
-            let first = self.segments.last().map_or(0, |segment| segment.end);
-            self.segments.push(first..first + run.len());
-        }
+        let blocks = moving.iter().map(Range::len).sum::<usize>() / in_block;
+        (2 * blocks < self.len() && blocks as f64 * self.period_s > SHORTEST_S).then_some(moving)
     }
 
     /// Removes all blocks, and reserves memory for new ones.
@@ -179,14 +184,20 @@ impl BlockMeans {
         self.in_range_n.start.is_finite() || self.in_range_n.end.is_finite()
     }
 
-    /// Median reading of the load where δX is near the middle between its 5 % and 95 % quantiles, N, if that is far from zero:
-    /// there the load cell's zero may be.
+    /// Reading of the load where δX passes the middle between its 5 % and 95 % quantiles, N, if that is far from zero: there the
+    /// load cell's zero may be. The mean of the medians of both ways: friction and delays move these apart.
     pub(crate) fn far_zero_n(&self, load_n: f64) -> Option<f64> {
         let all = 0..self.len();
         let [low_m, high_m] = quantiles(&self.dx_m, std::slice::from_ref(&all), [0.05, 0.95])?;
-        let is_near = |dx_m: f64| (dx_m - 0.5 * (low_m + high_m)).abs() < 0.05 * (high_m - low_m);
-        let near = self.dx_m.iter().zip(&self.load_n).filter(|(dx_m, n)| is_near(**dx_m) && n.is_finite());
-        let zero_n = median(&mut near.map(|(_, n)| *n).collect::<Vec<f64>>());
+        let is_above = |k: usize| self.dx_m[k] > 0.5 * (low_m + high_m);
+        let of_way = |is_rising: bool| {
+            let passes =
+                (1..self.len()).filter(|&k| is_above(k) == is_rising && is_above(k - 1) != is_rising);
+            let readings_n = passes.map(|k| 0.5 * (self.load_n[k - 1] + self.load_n[k]));
+            let mut readings_n: Vec<f64> = readings_n.filter(|n| n.is_finite()).collect();
+            (!readings_n.is_empty()).then(|| median(&mut readings_n))
+        };
+        let zero_n = 0.5 * (of_way(true)? + of_way(false)?);
         (zero_n.abs() > FAR_ZERO * load_n).then_some(zero_n)
     }
 

@@ -201,7 +201,8 @@ fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     let best = loop {
         excerpt.excerpt_of(whole, scaling.load_n, blocks);
         excerpt.find_phases(scaling.per_period);
-        match ParameterSearch::new(excerpt, &coarse).run() {
+        let can_grow = blocks == EXCERPT_BLOCKS && whole.is_longer(blocks);
+        match ParameterSearch::new(excerpt, &coarse, can_grow).run() {
             Ok(best) => break best,
             Err(why) if !whole.is_longer(blocks) => {
                 return Err(rejection_without_rows(excerpt, scaling, why));

@@ -16,8 +16,10 @@ use crate::contact::stats::spread;
 /// First and last step of the search for the load zero, as shares of the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 
-/// By how much the misfit must be smaller from there.
+/// By how much the misfit must be smaller from a far zero of the load cell.
 const ZERO_GAIN: f64 = 0.5;
+/// Reading of the load cell, over the 95 % load, from which a far zero counts where no other start succeeds.
+const ZERO_ALONE: f64 = 0.25;
 
 /// The best candidate.
 #[derive(Debug)]
@@ -37,6 +39,8 @@ pub(crate) struct SearchResult {
 pub(crate) struct ParameterSearch<'a> {
     blocks: &'a mut BlockMeans,
     scaling: &'a Scaling,
+    /// Whether a longer excerpt may be asked for where one start fails, and not only where all do.
+    can_grow: bool,
     /// δX of each block minus the fitted terms that do not depend on the force in the coupling, m.
     linear_m: Vec<f64>,
     /// Scale of the residuals, m.
@@ -51,14 +55,14 @@ struct Candidate {
 }
 
 impl<'a> ParameterSearch<'a> {
-    pub(crate) fn new(blocks: &'a mut BlockMeans, scaling: &'a Scaling) -> Self {
-        Self { blocks, scaling, linear_m: Vec::new(), scale_m: f64::INFINITY, tried: Vec::new() }
+    pub(crate) fn new(blocks: &'a mut BlockMeans, scaling: &'a Scaling, can_grow: bool) -> Self {
+        Self { blocks, scaling, can_grow, linear_m: Vec::new(), scale_m: f64::INFINITY, tried: Vec::new() }
     }
 
     /// The best parameters of a flight.
     ///
     /// # Errors
-    /// The last rejection, if [`search`] fails from every start.
+    /// The last rejection, if [`search`] fails from every start, or from that of a far zero where the excerpt can grow.
     pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
         let mut best = self.best_start()?;
         self.improve_zero(&mut best);
@@ -91,16 +95,25 @@ impl<'a> ParameterSearch<'a> {
         // Dry friction as a share of the 95 % load, and lost share of the load: usual friction, then heavy friction.
         let [usual, heavy] = [self.start((0.02, 0.03), 0.0), self.start((0.10, 0.12), 0.0)];
         // From a zero of the load cell that is far off, no small step leads to the true one.
-        let far = self.blocks.far_zero_n(self.scaling.load_n).map(|zero_n| self.start((0.02, 0.03), zero_n));
+        let zero_n = self.blocks.far_zero_n(self.scaling.load_n);
+        let far = zero_n.map(|zero_n| self.start((0.02, 0.03), zero_n));
+        if let Some(Err(why)) = &far
+            && self.can_grow
+        {
+            return Err(*why);
+        }
         let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
         // Without a gap, and without a load on both sides, any zero fits.
-        let seen_m = 2.0 * UNSEEN_GAP * self.scaling.windup_m();
+        let is_sure = |far: &Candidate| {
+            zero_n.is_some_and(|zero_n| zero_n.abs() > ZERO_ALONE * self.scaling.load_n)
+                && far.found.fit.beta[GAP] > 2.0 * UNSEEN_GAP * self.scaling.windup_m()
+        };
         match (near, far) {
             (Some(near), Some(far)) if far.misfit + ZERO_GAIN < near.misfit => Ok(far),
             (Some(near), _) => Ok(near),
-            (None, far) => far.filter(|far| far.found.fit.beta[GAP] > seen_m).ok_or(rejection),
+            (None, far) => far.filter(is_sure).ok_or(rejection),
         }
     }
 
