@@ -129,13 +129,13 @@ impl Normalization<'_> {
     }
 }
 
-/// A name as a file may carry it: what is no letter, digit, dot, dash or underscore is written `%2F`.
+/// A name as a file may carry it: what is no letter, digit, dot, dash or underscore is written `%2F`. So is a first dot,
+/// which would hide the file from `run`.
 fn file_name(name: &str) -> String {
-    let plain = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_') || *b == b'.';
-    let dots = name.bytes().all(|b| b == b'.');
-    name.bytes()
-        .map(|b| if plain(&b) && !dots { char::from(b).to_string() } else { format!("%{b:02X}") })
-        .collect()
+    let is_plain =
+        |at: usize, b: u8| b.is_ascii_alphanumeric() || b"-_".contains(&b) || (b == b'.' && at > 0);
+    let written = |(at, b)| if is_plain(at, b) { char::from(b).to_string() } else { format!("%{b:02X}") };
+    name.bytes().enumerate().map(written).collect()
 }
 
 #[cfg(test)]
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn no_name_leaves_its_folder() {
         assert_eq!(file_name("N412FP"), "N412FP");
-        assert_eq!(file_name("../x"), "..%2Fx");
-        assert_eq!(file_name(".."), "%2E%2E");
+        assert_eq!(file_name("../x"), "%2E.%2Fx");
+        assert_eq!(file_name(".N412.FP"), "%2EN412.FP");
     }
 }

@@ -239,23 +239,26 @@ fn group_files(
         })
         .collect();
     for (who, group, log_path, path) in identified {
-        match who {
-            Err(diagnostic) => drop(found.faulty.insert(log_path, (path, diagnostic))),
-            Ok(who) => attach_companions(found, &whose, &who, group, log_path, &path),
+        let attached =
+            who.and_then(|who| attach_companion(config, found, &whose, &who, (group, &log_path, &path)));
+        if let Err(diagnostic) = attached {
+            let diagnostic = diagnostic.in_file(&log_path);
+            found.faulty.insert(log_path, (path, diagnostic));
         }
     }
 }
 
-/// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
-fn attach_companions(
+/// A file of a group goes to every main log of its flight, of its actuator only where it names one.
+///
+/// # Errors
+/// A diagnostic where samples of two actuators, or of two copies, would be taken for one sequence.
+fn attach_companion(
+    config: &Config,
     found: &mut DiscoveredLogs,
     whose: &IdentityIndex,
-    who: &FlightIdentity,
-    group: &str,
-    log_path: String,
-    path: &Path,
-) {
-    let (flight, position) = who;
+    (flight, position): &FlightIdentity,
+    (group, name, path): (&str, &str, &Path),
+) -> Result<(), Diagnostic> {
     let on_tail = whose.get(&flight.tail_number).map_or(&[][..], Vec::as_slice);
     let is_placed = |other: &Option<Position>| position.is_none() || other.is_none() || position == other;
     let placed = || on_tail.iter().filter(|((_, other), _)| is_placed(other));
@@ -268,15 +271,28 @@ fn attach_companions(
     };
     let is_own = |main: &Flight| if is_known { departs(main) } else { is_near(main) };
     let mut is_stray = true;
-    for (_, first) in placed().filter(|((main, _), _)| is_own(main)) {
-        if let Some(files) = found.logs.get_mut(first) {
-            files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
-            is_stray = false;
+    for ((_, main), first) in placed().filter(|((main, _), _)| is_own(main)) {
+        let Some(files) = found.logs.get_mut(first) else { continue };
+        if let (Some(position), None) = (position, main) {
+            let what =
+                format!("this file of group `{group}` is of {position} alone, and {first} names no position");
+            return Err(Diagnostic::new("group_ambiguous", what)
+                .hint("map `position` for the main logs too, or write the loads of a flight to one file"));
         }
+        let of_group = files.groups.entry(group.to_owned()).or_default();
+        if let (Some(other), false) = (of_group.first(), config.document.logs.has_pieces()) {
+            let other = log_path(config, other);
+            let what = format!("another file of group `{group}` belongs to the same flight: {other}");
+            let hint = "if they are pieces of one flight, set `logs.pieces = true`; else remove one of them";
+            return Err(Diagnostic::new("group_ambiguous", what).hint(hint));
+        }
+        of_group.push(path.to_owned());
+        is_stray = false;
     }
     if is_stray {
-        found.strays.push(log_path);
+        found.strays.push(name.to_owned());
     }
+    Ok(())
 }
 
 /// A file or object that fits a pattern, with its status where the listing has it; or a path at fault, and why.

@@ -160,6 +160,23 @@ fn live_files(root: &Path, format: TableFormat) -> Result<BTreeMap<PathBuf, bool
         Diagnostic::new("table_unreadable", format!("the Delta table cannot be read: {e}"))
             .hint("repair the table, or name its files without the table: copy them to a folder of their own")
     })?;
-    let whole = |name: &str| if name.contains("://") { PathBuf::from(name) } else { root.join(name) };
-    Ok(live.into_iter().map(|(name, has_deleted_rows)| (whole(&name), has_deleted_rows)).collect())
+    // A path of a table's log is below its folder, a local path of its own, or an address.
+    let absolute = std::path::absolute(root).unwrap_or_else(|_| root.to_owned());
+    let whole = |name: &str| match name.strip_prefix("file://") {
+        None if name.contains("://") => PathBuf::from(name),
+        local => {
+            let name = Path::new(local.unwrap_or(name));
+            root.join(name.strip_prefix(&absolute).unwrap_or(name))
+        }
+    };
+    let live: BTreeMap<_, _> = live.into_iter().map(|(name, deleted)| (whole(&name), deleted)).collect();
+    match live.keys().find(|file| !file.starts_with(root)) {
+        None => Ok(live),
+        Some(file) => {
+            let what = format!("a live file of the Delta table is outside of its folder: {}", file.display());
+            let hint =
+                "copy the table with its files (a deep clone), or name folders of files without the table";
+            Err(Diagnostic::new("table_unsupported", what).hint(hint))
+        }
+    }
 }
