@@ -180,14 +180,12 @@ impl<'s> ChannelSampling<'s> {
         Ok((Some(stamps), base))
     }
 
-    /// Rows between samples where the channel is slower than its rows; else 1.
+    /// Rows between samples where the channel is slower than its rows; else 1, as where no whole number of rows fits: every
+    /// n-th row would hold older and older samples.
     fn rows_between(&self) -> usize {
-        match self.map.rate_hz {
-            Some(rate_hz) if !self.is_apart() => {
-                ((self.base.step_s * rate_hz).recip().round() as usize).max(1)
-            }
-            _ => 1,
-        }
+        let Some(rate_hz) = self.map.rate_hz.filter(|_| !self.is_apart()) else { return 1 };
+        let rows = (self.base.step_s * rate_hz).recip();
+        if (rows - rows.round()).abs() < 0.02 * rows { (rows.round() as usize).max(1) } else { 1 }
     }
 
     /// The stamps of the rows that count.

@@ -15,7 +15,7 @@ use crate::error::{self, Error, Fault};
 use crate::log::assemble::{RawChannels, assemble, mean};
 use crate::log::channel_reader::{Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
-use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
+use crate::log::identity::{self, ClockSpan, Identity, IdentityFields, LONGEST_FLIGHT_H};
 use crate::log::normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
@@ -189,13 +189,25 @@ impl Log {
         identity::read(&facts, mapping, departure).map_err(fail)
     }
 
-    /// The earliest and the latest stamp of the log, if it has a time column.
+    /// The earliest and the latest stamp of the log, if it has a time column: of the rows around its middle one up to the next
+    /// leap by more than a flight, since a recorder that was not set yet stamps rows years before.
     fn clock_span(&self) -> Result<Option<ClockSpan>, Error> {
         let table = self.main();
         let column = table.clock.column.as_ref().filter(|column| table.files[0].has(column));
         let Some(column) = column else { return Ok(None) };
         let stamps = table.stamps(&SampleSelector::every_row(column), None)?;
-        let (earliest_s, latest_s) = span(&stamps.seconds);
+        let (before, after) = stamps.seconds.split_at(stamps.seconds.len() / 2);
+        let middle_s = after.iter().copied().find(|s| !s.is_nan()).unwrap_or(f64::NAN);
+        let mut last_s = middle_s;
+        let mut is_near = |s: &f64| {
+            let is_near = !((s - last_s).abs() > 3600.0 * LONGEST_FLIGHT_H);
+            last_s = if s.is_nan() { last_s } else { *s };
+            is_near
+        };
+        let from = before.len() - before.iter().rev().take_while(|s| is_near(s)).count();
+        is_near(&middle_s);
+        let until = before.len() + after.iter().take_while(|s| is_near(s)).count();
+        let (earliest_s, latest_s) = span(&stamps.seconds[from..until]);
         Ok((earliest_s <= latest_s).then_some(ClockSpan { origin: stamps.origin, earliest_s, latest_s }))
     }
 

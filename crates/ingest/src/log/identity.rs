@@ -226,7 +226,7 @@ fn missing(fact: IdentityField, mapping: &IdentityMapping) -> Fault {
 }
 
 /// Longest flight that a log may state, h: almost twice the longest scheduled one.
-const LONGEST_FLIGHT_H: f64 = 36.0;
+pub(crate) const LONGEST_FLIGHT_H: f64 = 36.0;
 
 fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, Fault> {
     let Some(text) = text else { return Ok(None) };

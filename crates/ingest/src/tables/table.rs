@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{AsArray, RecordBatch, RecordBatchOptions};
+use arrow::array::{ArrayRef, AsArray, RecordBatch, RecordBatchOptions, StringArray};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
@@ -30,8 +30,15 @@ impl TableBatch {
         let fail = |error: ArrowError| bad_table(error).in_file(name);
         let schema = batches.first().map_or_else(|| Arc::new(Schema::empty()), RecordBatch::schema);
         let mut whole = Self::new(name, concat_batches(&schema, batches).map_err(fail)?, 0);
-        let texts = (0..whole.header.len()).map(|column| whole.cast(Some(column), &DataType::Utf8));
-        let texts = texts.collect::<Result<_, _>>()?;
+        let texts = (0..whole.header.len()).map(|column| {
+            let text = whole.cast(Some(column), &DataType::Utf8)?;
+            Ok(if whole.batch.column(column).data_type().is_floating() {
+                without_decimals(&text)
+            } else {
+                text
+            })
+        });
+        let texts = texts.collect::<Result<_, Error>>()?;
         let fields: Vec<_> = whole.header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
         let rows = RecordBatchOptions::new().with_row_count(Some(whole.batch.num_rows()));
         let schema = Arc::new(Schema::new(fields));
@@ -100,4 +107,11 @@ impl TableBatch {
         };
         read(text).map(Some).map_err(|detail| self.error(row, Some(column), detail))
     }
+}
+
+/// Whole numbers without `.0`, and nothing for NaN: pandas makes floats of names that are numbers where one is missing.
+fn without_decimals(numbers: &ArrayRef) -> ArrayRef {
+    let texts = numbers.as_string::<i32>().iter();
+    let cut = texts.map(|text| text.filter(|text| *text != "NaN").map(|text| text.trim_end_matches(".0")));
+    Arc::new(cut.collect::<StringArray>())
 }
