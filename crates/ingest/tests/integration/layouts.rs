@@ -362,6 +362,10 @@ fn a_date_in_the_path_is_joined_with_a_clock_of_the_day_or_refused() {
     assert_eq!(of_table("2026-11-06", &[("t", instant(0))]).unwrap(), "2026-11-06T21:20:00Z");
     assert!(of_table("2026-11-06", &[("t", instant(3))]).unwrap_err().contains("another day"));
     assert!(of_table("2026-11-06", &[("other", instant(0))]).unwrap_err().contains("the flights table"));
+    // A recorder that is not set yet stamps its first rows years before.
+    let unset = (0..200).map(|k| if k < 3 { 1_577_836_800_000 } else { 1_794_000_000_000 + 50 * (k - 3) });
+    let unset: ArrayRef = Arc::new(TimestampMillisecondArray::from_iter_values(unset).with_timezone("UTC"));
+    assert_eq!(identity("N1_x.parquet", &m, &[("t", unset)]).unwrap(), "2026-11-06T21:20:00Z");
     // An instant of the table, whatever form the departures of the logs have.
     let at = "2026-11-06T05:00:00Z";
     assert_eq!(of_table(at, &[("t", instant(0))]).unwrap(), at);
