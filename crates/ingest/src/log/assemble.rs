@@ -6,7 +6,7 @@ use records::Position;
 
 use crate::channel::quality::{self, Quality};
 use crate::channel::stats::span;
-use crate::channel::turns::{TurnEvidence, restore_turns};
+use crate::channel::turns::restore_turns;
 use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
@@ -96,8 +96,7 @@ fn restored(
     let turn_m = own.turn_m?;
     let mut other_m = other.values.clone();
     join_samples(&mut other_m, segments);
-    let evidence = TurnEvidence { turn_m, other_m: &other_m, load_n: &load.values, segments };
-    let unclear = restore_turns(&mut own.values, evidence);
+    let unclear = restore_turns(&mut own.values, turn_m, &other_m, &load.values, segments);
     (unclear > 0).then(|| format!("{}_turns_unclear", role.as_str()))
 }
 

@@ -1,6 +1,9 @@
 //! Numeric column chunks into a channel: by the parquet crate's column reader, without an Arrow array in between.
 //!
-//! Chunks of doubles and floats that hold no lists are read here; the others by Arrow's reader.
+//! Chunks of doubles and floats that hold no lists are read here; the others by Arrow's reader. Pages without a selected row
+//! are not decompressed, which changes no value: rows that are not selected are removed from pages that hold both.
+
+use std::ops::Range;
 
 use parquet::basic::Type;
 use parquet::column::page::PageReader;
@@ -12,7 +15,17 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use crate::channel::column_builder::{BATCH, ColumnBuilder};
 use crate::parquet::page_reader::Pages;
 use crate::parquet::raw_footer::caught;
-use crate::parquet::row_selection::{RowSelection, intersects};
+
+/// Selected rows of a table: stretches in order and apart from each other; `None` for every row.
+pub(crate) type RowSelection<'a> = Option<&'a [Range<usize>]>;
+
+/// Whether any of these rows is selected.
+pub(crate) fn intersects(selection: RowSelection<'_>, rows: &Range<usize>) -> bool {
+    selection.is_none_or(|stretches| {
+        let next = stretches.partition_point(|stretch| stretch.end <= rows.start);
+        stretches.get(next).is_some_and(|stretch| stretch.start < rows.end)
+    })
+}
 
 /// Whether the numbers of a chunk are read here.
 pub(crate) fn is_plain(chunk: &ColumnChunkMetaData) -> bool {
