@@ -16,7 +16,7 @@ pub(crate) use results::{
     BacktestArgs, DiffArgs, ExplainArgs, ExternalEstimatesArgs, QueryArgs, ReportArgs, TrendArgs,
 };
 pub(crate) use run::RunArgs;
-pub(crate) use shared::{DepartureArgs, Format, QUERY_KEYS, RowFormatArgs, UnitFilterArgs};
+pub(crate) use shared::{DepartureArgs, Format, RowFormatArgs, UnitFilterArgs};
 pub(crate) use store::{ForgetArgs, StoreArgs, StoreCommand};
 pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 

@@ -112,7 +112,3 @@ pub(super) fn encoding_parser() -> impl TypedValueParser<Value = Encoding> {
     let encoding = |word: String| if word == "compatible" { Encoding::Compatible } else { Encoding::Split };
     PossibleValuesParser::new(["split", "compatible"]).map(encoding)
 }
-
-/// The words by which `query` selects records, each with its column.
-pub(crate) const QUERY_KEYS: [(&str, &str); 4] =
-    [("tail", "tail_number"), ("serial", "serial_number"), ("flight", "flight_id"), ("position", "position")];

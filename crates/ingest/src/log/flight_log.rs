@@ -12,7 +12,7 @@ use records::Position;
 use crate::channel::si_conversion::Geometry;
 use crate::channel::stats::span;
 use crate::error::{self, Error, Fault};
-use crate::log::assemble::{RawChannels, assemble, mean};
+use crate::log::assemble::{assemble, mean};
 use crate::log::channel_reader::{Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields};
@@ -443,8 +443,7 @@ impl<'c> ActuatorReader<'c> {
                 own.follow(&master, role, geometry, selection.wanted()).map(|read| (selection.cut(read), ()))
             })
         };
-        let output_locked = self.channels.output.is_locked();
-        let screw = if output_locked {
+        let screw = if self.channels.output.is_locked() {
             selection.cut(vec![0.0; motor.values.len()].into())
         } else {
             follower(Role::Screw, &selection)?.0
@@ -455,9 +454,8 @@ impl<'c> ActuatorReader<'c> {
         let temperature = self.channels.temperature.as_ref();
         let temperature = temperature.and_then(|_| follower(Role::Temperature, &whole).ok());
         let temperature_c = temperature.and_then(|(read, ())| mean(&read.values));
-        let is_relative = self.channels.is_relative();
-        let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
-        Ok(assemble(self.at.position.clone(), read, &master.base, temperature_c))
+        let (position, read) = (self.at.position.clone(), [motor, screw, load]);
+        Ok(assemble(position, read, self.channels, selection, &master.base, temperature_c))
     }
 
     /// Reads redundant channels until one is alive, and returns it as `read` gave it; the first channel where none is alive.

@@ -12,7 +12,8 @@ use arrow::datatypes::{DataType, Field, Fields, Schema, TimeUnit};
 use blake3::Hasher;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
-use parquet::basic::Encoding;
+use parquet::basic::{Encoding, Type};
+use parquet::data_type::{DoubleType, FloatType};
 use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 
 use crate::channel::column_builder::ColumnBuilder;
@@ -259,8 +260,11 @@ impl LogFile {
             if column_numbers::is_plain(chunk) {
                 let pages = self.pages(group, leaf)?;
                 let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
-                column_numbers::append(pages, chunk, wanted, into)
-                    .map_err(|detail| self.decode(leaf, group, &detail))?;
+                let read = caught(|| match chunk.column_type() {
+                    Type::DOUBLE => column_numbers::append::<DoubleType>(pages, chunk, wanted, into),
+                    _ => column_numbers::append::<FloatType>(pages, chunk, wanted, into),
+                });
+                read.map_err(|detail| self.decode(leaf, group, &detail))?;
                 self.all_rows(group, into.len() - before, leaf)?;
             } else {
                 self.each_batch(group, &[leaf], Scan::PLAIN, |columns| {

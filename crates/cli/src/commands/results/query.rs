@@ -11,7 +11,8 @@ use records::row_schema::to_batch;
 use records::{GapEstimate, GapRecord, Installations};
 use store::{Query, Store};
 
-use crate::args::{Format, Global, QUERY_KEYS, QueryArgs};
+use crate::args::{Format, Global, QueryArgs};
+use crate::completion::QUERY_KEYS;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
