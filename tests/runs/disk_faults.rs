@@ -6,7 +6,7 @@
 //! journal.
 
 use crate::gate::is_gate;
-use crate::harness::{TestFleet, print_line, spread, wait_until};
+use crate::harness::{TestFleet, each, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records, seed};
 use crate::runs::interruption::{small, stored_records, whole_flights};
 use std::path::{Path, PathBuf};
@@ -204,7 +204,12 @@ fn a_power_cut_at_any_instant_loses_nothing_that_was_promised() {
     assert!(partly > 0, "no cut came between two commits");
 }
 
-/// The control: where syncing is a lie, a cut must be seen to lose what was promised.
+/// The control: where syncing of anything or of folders is a lie, a cut must be seen to lose what was promised.
+#[test]
+fn without_syncing_a_power_cut_is_caught() {
+    each(&[("anything", &[][..]), ("folders", &["-DFOLDERS"])], |(what, flags)| is_caught(what, flags));
+}
+
 fn is_caught(what: &str, flags: &[&str]) {
     let library = tempfile::tempdir().unwrap();
     let (source, lie) =
@@ -223,14 +228,4 @@ fn is_caught(what: &str, flags: &[&str]) {
         }
     }
     panic!("{CONTROL_CUTS} cuts without syncing {what} lost nothing: the harness cannot see a loss");
-}
-
-#[test]
-fn without_syncing_a_power_cut_is_caught() {
-    is_caught("anything", &[]);
-}
-
-#[test]
-fn without_syncing_folders_a_power_cut_is_caught() {
-    is_caught("folders", &["-DFOLDERS"]);
 }

@@ -11,10 +11,14 @@ use clap_complete::{ArgValueCompleter, CompletionCandidate};
 use job::Config;
 use store::Store;
 
-use crate::args::{CONFIG, QUERY_KEYS};
+use crate::args::CONFIG;
 
 /// Maximum number of names that are offered at once.
 const MAX_CANDIDATES: usize = 200;
+
+/// The words by which `query` selects records, each with its column.
+pub(crate) const QUERY_KEYS: [(&str, &str); 4] =
+    [("tail", "tail_number"), ("serial", "serial_number"), ("flight", "flight_id"), ("position", "position")];
 
 /// Completes the values of a column of the records.
 pub(crate) fn of(column: &'static str) -> ArgValueCompleter {

@@ -41,17 +41,14 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// A wrong argument.
     pub(crate) fn usage(code: &str, what: impl std::fmt::Display, hint: &str) -> Self {
         Self::Refused(vec![Diagnostic::new(code, what).hint(hint)])
     }
 
-    /// Store or disk.
     pub(crate) fn failed(diagnostic: Diagnostic) -> Self {
         Self::Failed(Box::new(diagnostic))
     }
 
-    /// Its exit code.
     pub(crate) fn code(&self) -> Code {
         match self {
             Self::Refused(_) => Code::Usage,

@@ -27,17 +27,14 @@ fn line(level: &str, event: &str, rest: Value) -> String {
     serde_json::to_string(&LogLine { time_utc: Timestamp::now(), level, event, rest }).unwrap_or_default()
 }
 
-/// A note.
 pub(crate) fn note(text: &str) -> String {
     line("info", "note", json!({ "message": text }))
 }
 
-/// A diagnostic.
 pub(crate) fn diagnostic(diagnostic: &Diagnostic) -> String {
     line("error", "complaint", serde_json::to_value(diagnostic).unwrap_or_default())
 }
 
-/// An event of a run.
 pub(crate) fn event(event: &Event) -> String {
     match event {
         Event::Planned { logs, bytes } => line("info", "planned", json!({ "logs": logs, "bytes": bytes })),

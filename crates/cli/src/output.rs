@@ -88,12 +88,10 @@ impl Output {
         Err(Failure::usage("would_overwrite", what, "name another output file"))
     }
 
-    /// Whether progress may be shown.
     pub(crate) fn shows_progress(&self) -> bool {
         self.progress
     }
 
-    /// Whether output is verbose.
     pub(crate) fn is_verbose(&self) -> bool {
         self.verbose > 0
     }
@@ -112,7 +110,6 @@ impl Output {
         Ok(out.flush()?)
     }
 
-    /// Writes a note to stderr.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             self.err(&if self.is_json() { json_log::note(text) } else { escape(text) });
@@ -126,7 +123,6 @@ impl Output {
         }
     }
 
-    /// Shows a diagnostic, on stderr.
     pub(crate) fn diagnostic(&self, diagnostic: &Diagnostic) {
         if self.is_json() {
             return self.err(&json_log::diagnostic(diagnostic));

@@ -25,7 +25,6 @@ pub(crate) fn shown<T>(
     done
 }
 
-/// Progress of one command.
 pub(crate) struct Progress<'t> {
     name: &'static str,
     output: &'t Output,
@@ -56,22 +55,29 @@ impl<'t> Progress<'t> {
         Self { name, output, bar, terminal, state: Mutex::default() }
     }
 
-    /// Shows an event.
     pub(crate) fn follow(&self, event: &Event) {
         match event {
-            Event::Planned { logs, .. } => self.total(*logs),
-            Event::Started { log } => self.started(log),
+            Event::Planned { logs, .. } => self.begin(*logs),
+            Event::Started { log } => self.show(|state| {
+                state.in_progress.insert(log.clone());
+            }),
             Event::Finished { log, refused, diagnostics, .. } => {
-                self.finished(log, *refused, !diagnostics.is_empty());
+                self.show(|state| {
+                    state.in_progress.remove(log);
+                    state.refused += refused;
+                    state.errors += usize::from(!diagnostics.is_empty());
+                });
+                self.bar.inc(1);
+                self.print_line();
             }
             Event::Stored { .. } | Event::Trends { .. } => {}
         }
     }
 
-    /// Sets the number of logs.
-    fn total(&self, total: usize) {
+    /// Shows the bar for a number of logs.
+    fn begin(&self, logs: usize) {
         self.bar.reset_elapsed();
-        self.bar.set_length(total as u64);
+        self.bar.set_length(logs as u64);
         let template = "{prefix} {bar:24} {pos}/{len}  {rate:>10}  left {eta}  {wide_msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             let rate = |state: &ProgressState, out: &mut dyn Write| {
@@ -81,24 +87,6 @@ impl<'t> Progress<'t> {
         }
         self.bar.set_prefix(self.name);
         self.bar.enable_steady_tick(Duration::from_millis(200));
-    }
-
-    /// Records that a worker started a log.
-    fn started(&self, log: &str) {
-        self.show(|state| {
-            state.in_progress.insert(log.to_owned());
-        });
-    }
-
-    /// Records that a log is finished.
-    fn finished(&self, log: &str, refused: usize, has_failed: bool) {
-        self.show(|state| {
-            state.in_progress.remove(log);
-            state.refused += refused;
-            state.errors += usize::from(has_failed);
-        });
-        self.bar.inc(1);
-        self.print_line();
     }
 
     /// Changes the state and shows its failed logs, and a log in progress.
@@ -153,7 +141,6 @@ impl<'t> Progress<'t> {
     }
 }
 
-/// Duration as text.
 pub(crate) fn span(span: Duration) -> String {
     match span.as_secs() {
         0 => format!("{:.1} s", span.as_secs_f64()),

@@ -16,7 +16,6 @@ const LEAST_BESIDE: usize = 60;
 /// Indent of text below its row.
 const INDENT: usize = 4;
 
-/// A column of a table.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     /// Heading, with the unit in brackets.
@@ -27,12 +26,10 @@ pub(crate) struct Column {
     pub rank: u8,
 }
 
-/// Left-aligned text column.
 pub(crate) const fn text(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: false, rank }
 }
 
-/// Right-aligned number column.
 pub(crate) const fn number(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: true, rank }
 }
@@ -225,7 +222,6 @@ pub(crate) fn hours(h: Option<f64>) -> String {
     h.map_or_else(empty_cell, |h| format!("{h:.0}"))
 }
 
-/// Text of an empty cell.
 pub(crate) fn empty_cell() -> String {
     "–".to_owned()
 }

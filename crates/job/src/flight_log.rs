@@ -366,8 +366,9 @@ pub fn identify_companion(
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
         let fallback = |fields: &IdentityFields, departure| config.flights.facts(path, fields, departure);
-        let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
-            .map_err(|e| e.diagnostic().in_file(display_name))?;
+        let of_group = Arc::new(config.base_mapping().of_group(Some(group)));
+        let id = Log::open(&LogFiles::one(path), &of_group).and_then(|log| log.identity(fallback));
+        let id = id.map_err(|e| e.diagnostic().in_file(display_name))?;
         check_tail(&id, display_name, config)?;
         Ok((id.flight, id.position))
     })

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use ingest::parquet::writer::Encoding;
 
-use super::parse::{encoding_parser, parse_workers};
-use super::rows::RowFormatArgs;
+use super::shared::{RowFormatArgs, encoding_parser, parse_workers};
 
 /// `init`.
 #[derive(Debug, ClapArgs)]

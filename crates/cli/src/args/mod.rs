@@ -1,11 +1,9 @@
 //! Command-line arguments; the doc comments are the help texts.
 
 mod logs;
-mod parse;
 mod results;
-mod rows;
 mod run;
-mod selection;
+mod shared;
 mod store;
 mod work;
 
@@ -14,13 +12,11 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 pub(crate) use logs::{CheckArgs, EstimateArgs, InitArgs, NormalizeArgs, SimulateArgs};
-pub(crate) use parse::QUERY_KEYS;
 pub(crate) use results::{
     BacktestArgs, DiffArgs, ExplainArgs, ExternalEstimatesArgs, QueryArgs, ReportArgs, TrendArgs,
 };
-pub(crate) use rows::{Format, RowFormatArgs};
 pub(crate) use run::RunArgs;
-pub(crate) use selection::{DepartureArgs, UnitFilterArgs};
+pub(crate) use shared::{DepartureArgs, Format, RowFormatArgs, UnitFilterArgs};
 pub(crate) use store::{ForgetArgs, StoreArgs, StoreCommand};
 pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 

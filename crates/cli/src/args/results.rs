@@ -6,9 +6,7 @@ use clap::Args as ClapArgs;
 use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
 
-use super::parse::{parse_count, parse_limit, parse_utc};
-use super::rows::RowFormatArgs;
-use super::selection::{DepartureArgs, UnitFilterArgs};
+use super::shared::{DepartureArgs, RowFormatArgs, UnitFilterArgs, parse_count, parse_limit, parse_utc};
 use crate::completion;
 
 /// `query`.

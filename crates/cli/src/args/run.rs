@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use pipeline::State;
 
-use super::parse::{parse_count, parse_span, parse_workers, state_parser};
-use super::selection::DepartureArgs;
+use super::shared::{DepartureArgs, parse_count, parse_span, parse_workers, state_parser};
 use crate::completion;
 
 /// `run`.

@@ -1,10 +1,8 @@
 //! Arguments of `store`.
 
 use clap::{Args as ClapArgs, Subcommand};
-use jiff::Timestamp;
 
-use super::parse::{parse_count, parse_span, parse_utc};
-use super::rows::RowFormatArgs;
+use super::shared::{DepartureArgs, RowFormatArgs, parse_count, parse_span};
 use crate::completion;
 
 /// `store`.
@@ -96,13 +94,9 @@ pub(crate) struct ForgetArgs {
     /// Records of this position.
     #[arg(long)]
     pub position: Option<String>,
-    /// Departures at or after this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub since: Option<Timestamp>,
-    /// Departures before this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub until: Option<Timestamp>,
     /// Bring forgotten records back instead.
     #[arg(long)]
     pub undo: bool,
+    #[command(flatten)]
+    pub departures: DepartureArgs,
 }

@@ -3,9 +3,7 @@
 use clap::{Args as ClapArgs, Subcommand};
 use jiff::Timestamp;
 
-use super::parse::parse_utc;
-use super::rows::RowFormatArgs;
-use super::selection::UnitFilterArgs;
+use super::shared::{RowFormatArgs, UnitFilterArgs, parse_utc};
 
 /// `work`.
 #[derive(Debug, ClapArgs)]

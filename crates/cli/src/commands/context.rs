@@ -18,12 +18,10 @@ use crate::output::Output;
 /// Version written into every record.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Reads the configuration files named by the options.
 pub(crate) fn load_config(global: &Global) -> Result<Config, Failure> {
     Config::read_layers(&global.config).map_err(Failure::Refused)
 }
 
-/// Reads the configuration and its installations table.
 pub(crate) fn load_with_installations(global: &Global) -> Result<(Config, Installations), Failure> {
     let config = load_config(global)?;
     let installations = pipeline::run::scheduler::installations(&config)?;
@@ -175,7 +173,6 @@ impl KnownNames {
         format!("{table}; list the flights there with `freeplay query tail {tail}`")
     }
 
-    /// The command that lists all units.
     fn listing(&self) -> String {
         match self {
             Self::Store(..) => "freeplay trend".to_owned(),
@@ -220,7 +217,6 @@ impl UnitFilterArgs {
     }
 }
 
-/// A selection of units as text.
 pub(crate) fn selection(ask: &UnitSelection) -> String {
     let named = |what: &str, name: &Option<String>| name.as_ref().map(|name| format!(" of {what} {name}"));
     let parts = [
@@ -232,7 +228,6 @@ pub(crate) fn selection(ask: &UnitSelection) -> String {
     parts.into_iter().flatten().collect()
 }
 
-/// Path as text for messages.
 pub(crate) fn display_path(path: &Path) -> String {
     path.display().to_string()
 }

@@ -214,7 +214,7 @@ fn units_by_name(table: &RowTable, layout: &Layout) -> Result<BTreeMap<String, O
     if let (Some(names), Some(column)) = (&layout.name_column, file.leaves.iter().find(is_of_units)) {
         let mut pairs = DistinctTexts::default();
         pairs.take_file(file, &[names, &column.name])?;
-        for pair in pairs.0 {
+        for pair in pairs.found {
             let unit = unit_of(&pair[1]);
             units.entry(pair[0].clone()).and_modify(|unit| *unit = None).or_insert(unit);
         }
@@ -418,30 +418,6 @@ mod tests {
         }
     }
 
-    /// 1,795,061,580 s after 1970 is 2026-11-19T04:13:00Z.
-    #[test]
-    fn a_clock_that_counts_from_1970_and_a_column_of_units_are_recognised() {
-        let names = ["rudder/motor_position", "rudder/screw_position", "rudder/load"];
-        let every = |texts: [&str; 3]| Column::Text((0..300).map(|k| texts[k % 3].to_owned()).collect());
-        let columns = [
-            ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + f64::from(k / 3 * 10)).collect())),
-            ("channel", every(names)),
-            ("unit", every(["deg", "mm", "N"])),
-            ("eng_value", Column::Real((0..300).map(f64::from).collect())),
-        ];
-        let found = proposed(&columns);
-        assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
-        let Layout { value_column, position_column, .. } = found.layout;
-        assert_eq!((value_column.as_deref(), position_column), (Some("eng_value"), None));
-        assert_eq!(found.channels[&Role::Load], [("{position}/load".to_owned(), Some(Unit::Newton))]);
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
-        let epochs =
-            [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true), (46_345.0, "d", false)]
-                .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
-        assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight, Epoch::Excel]);
-        assert_eq!(unit_of_steps(&[46_345.0, 46_345.0 + 0.01 / 86_400.0]), Some("d"));
-    }
-
     /// One row per position and instant, whose clock is a text.
     #[test]
     fn a_column_of_places_and_a_clock_of_texts_are_understood() {
@@ -458,33 +434,37 @@ mod tests {
         assert!(found.positions.iter().eq(["left", "right"]));
     }
 
-    /// A long table with its identity in columns, one of which is a constant instant.
+    /// A long table with its units and its identity in columns, one of which is a constant instant. 1,795,061,580 s after 1970
+    /// is 2026-11-19T04:13:00Z.
     #[test]
-    fn a_long_log_with_its_identity_in_columns_is_understood() {
-        let rows = 300;
-        let names = ["rudder_motor_deg", "rudder_screw_mm", "rudder_load_n"];
+    fn a_long_log_with_units_and_identity_in_columns_is_understood() {
+        let every = |texts: [&str; 3]| Column::Text((0..300).map(|k| texts[k % 3].to_owned()).collect());
         let departure: jiff::Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
         let mut columns = [
-            ("departure_utc", Column::Instant(vec![departure; rows])),
-            ("tail_number", Column::Text(vec!["N412FP".into(); rows])),
-            ("flight_id", Column::Text(vec!["0413".into(); rows])),
-            ("stamp_ms", Column::Real((0..rows).map(|k| (k / 3 * 10) as f64).collect())),
-            ("parameter", Column::Text((0..rows).map(|k| names[k % 3].to_owned()).collect())),
-            ("value", Column::Real((0..rows).map(|k| k as f64).collect())),
+            ("departure_utc", Column::Instant(vec![departure; 300])),
+            ("tail_number", every(["N412FP"; 3])),
+            ("flight_id", every(["0413"; 3])),
+            ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + f64::from(k / 3 * 10)).collect())),
+            ("channel", every(["rudder/motor_position", "rudder/screw_position", "rudder/load"])),
+            ("unit", every(["deg", "mm", "N"])),
+            ("eng_value", Column::Real((0..300).map(f64::from).collect())),
         ];
         let found = proposed(&columns);
-        assert_eq!(found.clock, Some(("stamp_ms".to_owned(), Some("ms"))));
-        assert_eq!(found.layout.name_column.as_deref(), Some("parameter"));
-        assert_eq!(
-            found.channels[&Role::Screw],
-            [("{position}_screw_mm".to_owned(), Some(Unit::Millimetre))]
-        );
-        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
+        assert_eq!((found.clock, found.epoch), (Some(("unix_ms".to_owned(), Some("ms"))), Epoch::Unix));
+        let Layout { name_column, value_column, position_column } = found.layout;
+        let wanted = [Some("channel"), Some("eng_value"), None];
+        assert_eq!([name_column, value_column, position_column].each_ref().map(Option::as_deref), wanted);
+        assert_eq!(found.channels[&Role::Load], [("{position}/load".to_owned(), Some(Unit::Newton))]);
+        assert!(found.positions.iter().eq(["rudder"]) && found.tails.iter().eq(["N412FP"]));
         let facts: Vec<&str> = found.columns.values().map(String::as_str).collect();
         assert_eq!((facts, found.by_row), (vec!["tail_number", "flight_id", "departure_utc"], false));
-        assert!(found.tails.iter().eq(["N412FP"]));
-        columns[1].1 = Column::Text((0..rows).map(|k| format!("N41{}FP", k / 200)).collect());
+        columns[1].1 = Column::Text((0..300).map(|k| format!("N41{}FP", k / 200)).collect());
         let found = proposed(&columns);
         assert!(found.by_row && found.tails.iter().eq(["N410FP", "N411FP"]), "{found:?}");
+        let epochs =
+            [(0.0, "s", false), (1_795_061_580.0, "ms", true), (15_180.0, "s", true), (46_345.0, "d", false)]
+                .map(|(first, unit, is_of_day)| epoch_of(&[first, first + 0.01], unit, is_of_day));
+        assert_eq!(epochs, [Epoch::None, Epoch::None, Epoch::Midnight, Epoch::Excel]);
+        assert_eq!(unit_of_steps(&[46_345.0, 46_345.0 + 0.01 / 86_400.0]), Some("d"));
     }
 }

@@ -1,7 +1,6 @@
-//! Bytes of local files and objects: where they come from, positional reads, digests.
+//! Bytes of local files and objects: where they come from, and positional reads.
 
 pub(crate) mod byte_source;
-pub(crate) mod digest;
 pub(crate) mod foreign_format;
 pub(crate) mod read_at;
 pub(crate) mod transient;

@@ -6,37 +6,27 @@ use records::Position;
 
 use crate::channel::quality::{self, Quality};
 use crate::channel::stats::span;
-use crate::channel::turns::{TurnEvidence, restore_turns};
+use crate::channel::turns::restore_turns;
 use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
-use crate::mapping::Role;
+use crate::mapping::{Channels, Role};
 use crate::time::clock::TimeBase;
 use crate::time::slow_channel::join_samples;
 use crate::time::zero_order_hold::zero_order_hold;
 
-/// Channels as read, on one clock.
-pub(crate) struct RawChannels {
-    pub(crate) motor: Channel,
-    pub(crate) screw: Channel,
-    pub(crate) load: Channel,
-    pub(crate) is_relative: bool,
-    /// The screw position is constant because the output is fixed.
-    pub(crate) output_locked: bool,
-    pub(crate) selection: SampleSelection,
-}
-
-/// Looks at the channels, leaves out what a frozen one claims, and makes δX.
+/// Looks at the channels that were read on one clock, leaves out what a frozen one claims, and makes δX.
 pub(crate) fn assemble(
     position: Position,
-    read: RawChannels,
+    [mut motor, mut screw, load]: [Channel; 3],
+    channels: &Channels,
+    SampleSelection { segments, excluded }: SampleSelection,
     base: &TimeBase,
     temperature_c: Option<f64>,
 ) -> ActuatorChannels {
-    let RawChannels { mut motor, mut screw, load, is_relative, output_locked, selection } = read;
-    let SampleSelection { segments, excluded } = selection;
-    let channels = Role::NEEDED.iter().zip([&motor, &screw, &load]);
-    let alternatives = channels.filter(|(_, channel)| channel.is_alternative);
+    let (is_relative, output_locked) = (channels.is_relative(), channels.output.is_locked());
+    let read = Role::NEEDED.iter().zip([&motor, &screw, &load]);
+    let alternatives = read.filter(|(_, channel)| channel.is_alternative);
     let mut flags: Vec<String> =
         alternatives.map(|(role, _)| format!("{}_alternative", role.as_str())).collect();
     if !is_relative {
@@ -96,8 +86,7 @@ fn restored(
     let turn_m = own.turn_m?;
     let mut other_m = other.values.clone();
     join_samples(&mut other_m, segments);
-    let evidence = TurnEvidence { turn_m, other_m: &other_m, load_n: &load.values, segments };
-    let unclear = restore_turns(&mut own.values, evidence);
+    let unclear = restore_turns(&mut own.values, turn_m, &other_m, &load.values, segments);
     (unclear > 0).then(|| format!("{}_turns_unclear", role.as_str()))
 }
 

@@ -13,11 +13,11 @@ use crate::channel::stats::ChannelStats;
 use crate::channel::turns::unwrap_turns;
 use crate::error::{self, Error, Fault};
 use crate::log::row_table::{RowTable, SampleSelector};
-use crate::mapping::column_pattern::ColumnPattern;
+use crate::mapping::column_pattern::column_for;
 use crate::mapping::{ChannelMapping, ClockMapping, RawValue, Role};
-use crate::parquet::row_selection::RowSelection;
+use crate::parquet::column_numbers::RowSelection;
 use crate::time::clock::{self, BREAK_STEPS, TimeBase, Timestamps};
-use crate::time::resample::{Interpolation, TimeSeries, decimated_rows, interpolate_at};
+use crate::time::resample::{Interpolation, decimated_rows, interpolate_at};
 
 /// The least share of samples that a redundant channel must hold to be called alive.
 const ALIVE_SHARE: f64 = 0.5;
@@ -71,7 +71,7 @@ pub(crate) struct ChannelSampling<'s> {
 impl<'s> ChannelSampling<'s> {
     /// A channel of a position, whose clock is not read yet.
     pub(crate) fn new(table: &'s RowTable, map: &'s ChannelMapping, position: &str) -> Self {
-        let named = |column: &String| ColumnPattern::new(column).column_for(position);
+        let named = |column: &String| column_for(column, position);
         Self {
             table,
             map,
@@ -102,7 +102,7 @@ impl<'s> ChannelSampling<'s> {
     pub(crate) fn check_rows(&self) -> Result<(), Error> {
         let SampleSelector { leaf, rows } = &self.samples;
         let mut files = self.table.files.iter().filter(|_| rows.is_empty());
-        files.try_for_each(|file| file.check_pages(leaf))
+        files.try_for_each(|file| file.has_page_checksums(&[leaf]).map(drop))
     }
 
     /// The name of the channel in its table.
@@ -309,7 +309,6 @@ impl<'s> ChannelSampling<'s> {
         let step_s = self.base.step_s * every as f64;
         let is_slow = step_s > BREAK_STEPS * master.base.step_s;
         let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
-        let series = TimeSeries { at_s: &own_s, values: &values, step_s };
-        Ok(Channel { turn_m: read.turn_m, ..interpolate_at(series, &at_s, between).into() })
+        Ok(Channel { turn_m: read.turn_m, ..interpolate_at(&own_s, &values, step_s, &at_s, between).into() })
     }
 }

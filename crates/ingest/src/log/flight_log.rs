@@ -12,7 +12,7 @@ use records::Position;
 use crate::channel::si_conversion::Geometry;
 use crate::channel::stats::span;
 use crate::error::{self, Error, Fault};
-use crate::log::assemble::{RawChannels, assemble, mean};
+use crate::log::assemble::{assemble, mean};
 use crate::log::channel_reader::{Channel, ChannelSampling};
 use crate::log::flight_rows::split_path;
 use crate::log::identity::{self, ClockSpan, Identity, IdentityFields, LONGEST_FLIGHT_H};
@@ -20,7 +20,7 @@ use crate::log::normalized;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::log::selection::SampleSelection;
 use crate::log::types::{ActuatorChannels, ActuatorColumns, LogFiles};
-use crate::mapping::column_pattern::ColumnPattern;
+use crate::mapping::column_pattern::{PLACEHOLDER, column_for, position_in};
 use crate::mapping::{ChannelMapping, Channels, IdentityField, IdentityMapping, Mapping, Role};
 use crate::parquet::log_file::LogFile;
 use crate::time::clock::TimeOrigin;
@@ -51,13 +51,15 @@ impl Log {
         });
         let mut tables = BTreeMap::new();
         for (group, paths) in std::iter::once(main).chain(groups).filter(|(_, paths)| !paths.is_empty()) {
-            let (clock, layout, identity) = mapping.of_group(group.as_deref());
+            let own = mapping.of_group(group.as_deref());
             let open = |path: &PathBuf| {
-                let (path, flight_rows) = split_path(path, identity);
-                LogFile::open(&path).map(|file| file.of_flight(flight_rows))
+                let (path, flight_rows) = split_path(path, &own.identity);
+                let mut file = LogFile::open(&path)?;
+                file.flight_rows = flight_rows;
+                Ok(file)
             };
             let files = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-            tables.insert(group, RowTable::new(files, clock.clone(), layout.clone()));
+            tables.insert(group, RowTable::new(files, own.clock, own.layout));
         }
         let Some(main) = tables.get(&None) else {
             return Err(Fault::from(io::Error::from(io::ErrorKind::NotFound)).in_file(Path::new("")));
@@ -72,8 +74,8 @@ impl Log {
     #[must_use]
     pub fn with_mapping(mut self, mapping: &Arc<Mapping>) -> Self {
         for (group, table) in &mut self.tables {
-            let (clock, layout, _) = mapping.of_group(group.as_deref());
-            *table = RowTable::new(std::mem::take(&mut table.files), clock.clone(), layout.clone());
+            let own = mapping.of_group(group.as_deref());
+            *table = RowTable::new(std::mem::take(&mut table.files), own.clock, own.layout);
         }
         Self { mapping: Arc::clone(mapping), selected: Mutex::new(None), ..self }
     }
@@ -252,7 +254,8 @@ impl Log {
     /// Names the channel that is not there: none of its columns fits, or it is lacking where others are.
     fn no_position(&self, channels: &Channels, partly: &[ActuatorColumns]) -> Result<Error, Error> {
         let fitting = |map: &&ChannelMapping| {
-            let is_here = |at: &&ActuatorColumns| !at.lacking.contains(&column_at(&map.column, &at.position));
+            let is_here =
+                |at: &&ActuatorColumns| !at.lacking.contains(&column_for(&map.column, at.position.as_str()));
             partly.iter().filter(is_here).count()
         };
         let needed = Role::NEEDED.iter().filter_map(|role| channels.of(*role));
@@ -269,11 +272,11 @@ impl Log {
         let (mut is_open, mut found) = (false, BTreeSet::new());
         for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)).flat_map(ChannelMapping::choices)
         {
-            let pattern = ColumnPattern::new(&map.column);
-            if pattern.is_open() {
+            if map.column.contains(PLACEHOLDER) {
                 is_open = true;
                 let names = self.names_for(map)?;
-                found.extend(names.iter().filter_map(|name| pattern.position_in(name)).map(str::to_owned));
+                let positions = names.iter().filter_map(|name| position_in(&map.column, name));
+                found.extend(positions.map(str::to_owned));
             }
         }
         Ok(is_open.then_some(found))
@@ -306,7 +309,7 @@ impl Log {
                 continue;
             };
             let first = self.present(map, &position)?.into_iter().next();
-            let name = column_at(&map.column, &position);
+            let name = column_for(&map.column, position.as_str());
             if first.is_none() && role != Role::Temperature {
                 // A group without a file is no lack of this actuator, and neither is a struct in a number's place.
                 self.table_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
@@ -452,8 +455,7 @@ impl<'c> ActuatorReader<'c> {
                 own.follow(&master, role, geometry, selection.wanted()).map(|read| (selection.cut(read), ()))
             })
         };
-        let output_locked = self.channels.output.is_locked();
-        let screw = if output_locked {
+        let screw = if self.channels.output.is_locked() {
             selection.cut(vec![0.0; motor.values.len()].into())
         } else {
             follower(Role::Screw, &selection)?.0
@@ -464,9 +466,8 @@ impl<'c> ActuatorReader<'c> {
         let temperature = self.channels.temperature.as_ref();
         let temperature = temperature.and_then(|_| follower(Role::Temperature, &whole).ok());
         let temperature_c = temperature.and_then(|(read, ())| mean(&read.values));
-        let is_relative = self.channels.is_relative();
-        let read = RawChannels { motor, screw, load, is_relative, output_locked, selection };
-        Ok(assemble(self.at.position.clone(), read, &master.base, temperature_c))
+        let (position, read) = (self.at.position.clone(), [motor, screw, load]);
+        Ok(assemble(position, read, self.channels, selection, &master.base, temperature_c))
     }
 
     /// Reads redundant channels until one is alive, and returns it as `read` gave it; the first channel where none is alive.
@@ -491,7 +492,7 @@ impl<'c> ActuatorReader<'c> {
             }
         }
         let Some((channel, rest)) = found else {
-            let name = column_at(&map.column, &self.at.position);
+            let name = column_for(&map.column, self.at.position.as_str());
             return Err(self.log.table(map).unwrap_or(self.log.main()).lacks(&name));
         };
         let counted = channel.values.len() - channel.excluded;
@@ -548,10 +549,6 @@ impl<'c> ActuatorReader<'c> {
     }
 }
 
-fn column_at(pattern: &str, position: &Position) -> String {
-    ColumnPattern::new(pattern).column_for(position.as_str())
-}
-
 /// Identity fields in the files of a row table.
 fn facts(table: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Error> {
     let first = &table.files[0];
@@ -567,20 +564,4 @@ fn facts(table: &RowTable, map: &IdentityMapping) -> Result<IdentityFields, Erro
     let stated = |(fact, key): (&IdentityField, &String)| Some((*fact, first.metadata_field(key)?));
     facts.extend(map.metadata.iter().filter_map(stated));
     Ok(facts)
-}
-
-/// Identity fields in a file of a group, from which its main log is found.
-///
-/// # Errors
-/// As [`Log::open`] and [`Log::identity`].
-pub fn companion_identity(
-    path: &Path,
-    mapping: &Mapping,
-    group: &str,
-    known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
-) -> Result<Identity, Error> {
-    let (clock, layout, identity) = mapping.of_group(Some(group));
-    let (clock, layout, identity) = (clock.clone(), layout.clone(), identity.clone());
-    let alone = Mapping { identity, clock, layout, ..Mapping::default() };
-    Log::open(&LogFiles::one(path), &Arc::new(alone))?.identity(known)
 }

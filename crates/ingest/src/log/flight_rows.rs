@@ -64,7 +64,7 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
     }
     let mut distinct = DistinctTexts::default();
     distinct.take_file(&file, &columns)?;
-    if distinct.0.is_empty() {
+    if distinct.found.is_empty() {
         return whole();
     }
     let escaped = |text: &String| utf8_percent_encode(text, ESCAPED).to_string();
@@ -74,5 +74,5 @@ pub fn flights_in(path: &Path, mapping: &IdentityMapping) -> Result<Vec<PathBuf>
         whole.push(format!("{MARK}{}", texts.join("/")));
         PathBuf::from(whole)
     };
-    Ok(distinct.0.iter().map(path_of).collect())
+    Ok(distinct.found.iter().map(path_of).collect())
 }

@@ -6,10 +6,10 @@ use records::Position;
 
 use crate::channel::si_conversion::reading;
 use crate::error::{Error, Fault, bad_table, channel_empty};
-use crate::log::assemble::{RawChannels, assemble};
+use crate::log::assemble::assemble;
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
-use crate::mapping::ClockMapping;
+use crate::mapping::{ChannelMapping, Channels, ClockMapping};
 use crate::time::clock::{self, TimeOrigin, Timestamps};
 
 /// Stamps and readings of one actuator, of one length; NaN where a reading is missing.
@@ -49,17 +49,9 @@ impl ChannelArrays<'_> {
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
         let base = clock::build_time_base(&mut stamps, &ClockMapping::default());
         let base = base.map_err(|fault| fail(fault.column(&stamps.column)))?;
-        let [motor, screw, load] =
-            named.map(|(_, values)| base.keep(values.iter().copied().map(reading).collect()).into());
-        let read = RawChannels {
-            motor,
-            screw,
-            load,
-            is_relative: false,
-            output_locked: false,
-            selection: SampleSelection::whole(&base),
-        };
-        Ok(assemble(position, read, &base, None))
+        let read = named.map(|(_, values)| base.keep(values.iter().copied().map(reading).collect()).into());
+        let channels = Channels { screw_position: Some(ChannelMapping::default()), ..Channels::default() };
+        Ok(assemble(position, read, &channels, SampleSelection::whole(&base), &base, None))
     }
 }
 

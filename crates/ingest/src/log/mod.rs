@@ -12,5 +12,5 @@ pub(crate) mod row_table;
 mod selection;
 mod types;
 
-pub use flight_log::{Log, companion_identity};
+pub use flight_log::Log;
 pub use types::{ActuatorChannels, ActuatorColumns, LogFiles};

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, UInt32Array};
 use arrow::compute::{cast, take};
 use arrow::datatypes::{DataType, Int32Type};
+use smart_default::SmartDefault;
 
 use crate::bounds;
 use crate::error::{Error, Fault};
@@ -192,8 +193,13 @@ fn gather(
 }
 
 /// The combinations of texts that the rows of some columns hold; a row without one of the texts holds none.
-#[derive(Debug, Default)]
-pub(crate) struct DistinctTexts(pub(crate) BTreeSet<Vec<String>>);
+#[derive(Debug, SmartDefault)]
+pub(crate) struct DistinctTexts {
+    pub(crate) found: BTreeSet<Vec<String>>,
+    /// More are an error.
+    #[default(MAX_COMBINATIONS)]
+    pub(crate) most: u64,
+}
 
 impl DistinctTexts {
     /// Looks at a file; a row group that holds but one combination, by its statistics, is not read.
@@ -201,7 +207,7 @@ impl DistinctTexts {
         let only = |group: usize| -> Option<Vec<String>> {
             names.iter().map(|name| Some(file.text_bounds(name, group)?.only()?.to_owned())).collect()
         };
-        self.0.extend(file.groups().filter_map(only));
+        self.found.extend(file.groups().filter_map(only));
         let wants_group = &|group| only(group).is_none();
         let scan = Scan { batch_rows: LONG_BATCH_ROWS, as_codes: true, wants_group };
         file.scan(names, scan, |arrays| self.take(names, arrays))
@@ -209,8 +215,8 @@ impl DistinctTexts {
 
     pub(crate) fn take(&mut self, names: &[&str], arrays: &[ArrayRef]) -> Result<(), Fault> {
         let owned = |texts: Vec<&str>| texts.into_iter().map(str::to_owned).collect();
-        self.0.extend(Combinations::of(names, arrays)?.texts().flatten().map(owned));
-        bounds::check("texts of columns that name rows", self.0.len() as u64, MAX_COMBINATIONS)
+        self.found.extend(Combinations::of(names, arrays)?.texts().flatten().map(owned));
+        bounds::check("texts of columns that name rows", self.found.len() as u64, self.most)
     }
 }
 

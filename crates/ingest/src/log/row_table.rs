@@ -7,9 +7,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray, Int64Array, Scalar};
+use arrow::array::{Array, ArrayRef, AsArray, Int64Array};
 use arrow::compute::cast;
-use arrow::compute::kernels::cmp;
 use arrow::datatypes::{DataType, UInt64Type};
 
 use crate::channel::column_builder::ColumnBuilder;
@@ -20,9 +19,9 @@ pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::{ChannelMapping, ClockMapping, Layout, RawValue};
+use crate::parquet::column_numbers::RowSelection;
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
-use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::{TimeBase, Timestamps};
 use crate::time::timestamps::{TickFormat, TimestampParser};
 
@@ -211,16 +210,22 @@ impl RowTable {
         if let Some(known) = texts().get(column) {
             return Ok(Arc::clone(known));
         }
+        self.files.iter().try_for_each(|file| file.leaf(column).map(drop))?;
         let mut distinct = DistinctTexts::default();
-        if self.is_of_many() {
-            let rows = SampleSelector::every_row(column);
-            self.each(&rows, column, |array| distinct.take(&[column], std::slice::from_ref(array)))?;
-        } else {
-            self.files.iter().try_for_each(|file| distinct.take_file(file, &[column]))?;
-        }
-        let found: Arc<BTreeSet<String>> = Arc::new(distinct.0.into_iter().flatten().collect());
+        self.read_texts(column, &mut distinct)?;
+        let found: Arc<BTreeSet<String>> = Arc::new(distinct.found.into_iter().flatten().collect());
         texts().insert(column.to_owned(), Arc::clone(&found));
         Ok(found)
+    }
+
+    /// The texts of a column, where files have it.
+    fn read_texts(&self, column: &str, into: &mut DistinctTexts) -> Result<(), Error> {
+        if self.is_of_many() {
+            let rows = SampleSelector::every_row(column);
+            return self.each(&rows, column, |array| into.take(&[column], std::slice::from_ref(array)));
+        }
+        let mut files = self.files.iter().filter(|file| file.has(column));
+        files.try_for_each(|file| into.take_file(file, &[column]))
     }
 
     /// One column as text that must not change; `None` when it is null throughout, or not there.
@@ -228,35 +233,21 @@ impl RowTable {
         if let Some((_, text)) = self.files[0].flight_rows.iter().find(|(own, _)| own == column) {
             return Ok(Some(text.clone()));
         }
-        let mut first: Option<String> = None;
-        let mut row = 0_u64;
-        let mut take = |array: &ArrayRef| {
-            let shown = if is_uniform(array) { array.slice(0, 1) } else { Arc::clone(array) };
-            let text = as_text(column, &shown)?;
-            for (row, value) in (row..).zip(text.as_string::<i32>()) {
-                let Some(value) = value else { continue };
-                let before = first.get_or_insert_with(|| value.to_owned());
-                if value != before {
-                    let message = format!("column `{column}` should hold one {fact}, but changes");
-                    let hint = "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight";
-                    let fault = Fault::new("identity_changes", message, hint).column(column).row(row);
-                    return Err(fault.found(format!("`{value}` after `{before}`")));
-                }
-            }
-            row += array.len() as u64;
-            Ok(())
-        };
-        if self.is_of_many() {
-            let rows = SampleSelector::every_row(column);
-            if self.files.iter().all(|file| file.has(column)) {
-                self.each(&rows, column, take)?;
-            }
-            return Ok(first);
+        if self.is_of_many() && !self.files.iter().all(|file| file.has(column)) {
+            return Ok(None);
         }
-        for file in self.files.iter().filter(|file| file.has(column)) {
-            file.scan(&[column], Scan { as_codes: true, ..Scan::PLAIN }, |arrays| take(&arrays[0]))?;
+        let mut distinct = DistinctTexts { most: 1, ..DistinctTexts::default() };
+        let read = self.read_texts(column, &mut distinct);
+        let mut found = distinct.found.into_iter().flatten();
+        match (found.next(), found.next()) {
+            (Some(one), Some(other)) => {
+                let message = format!("column `{column}` should hold one {fact}, but changes");
+                let hint = "where a file holds many flights, set `identity.by_row = true`; else a log must hold one flight";
+                let fault = Fault::new("identity_changes", message, hint).column(column);
+                Err(self.error(fault.found(format!("`{one}` and `{other}`"))))
+            }
+            (first, _) => read.map(|()| first),
         }
-        Ok(first)
     }
 
     /// The stamps of those samples, from the table's time column or the channel's own.
@@ -329,11 +320,6 @@ impl RowTable {
         let found = format!("{STRUCT}{}", shown.join(", "));
         Err(self.error(error::column_type(name, &found, "numbers")))
     }
-}
-
-fn is_uniform(array: &ArrayRef) -> bool {
-    let first = Scalar::new(array.slice(0, array.len().min(1)));
-    !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
 }
 
 /// Spreads the samples of each row's list evenly from the row's stamp to the next row's; the last list takes the interval

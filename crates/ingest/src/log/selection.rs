@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::log::channel_reader::Channel;
-use crate::parquet::row_selection::RowSelection;
+use crate::parquet::column_numbers::RowSelection;
 use crate::time::clock::TimeBase;
 
 /// The stretches of the motor's clock that count.

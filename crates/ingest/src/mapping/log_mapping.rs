@@ -31,16 +31,15 @@ pub struct Mapping {
 
 impl Mapping {
     /// Clock, layout and identity of the files of a group, or of the main logs.
-    pub(crate) fn of_group(&self, group: Option<&str>) -> (&ClockMapping, &Layout, &IdentityMapping) {
-        let (clock, identity) = (&self.clock, &self.identity);
+    #[must_use]
+    pub fn of_group(&self, group: Option<&str>) -> Self {
         let group = group.and_then(|name| self.groups.get(name));
-        group.map_or((clock, &self.layout, identity), |group| {
-            (
-                group.clock.as_ref().unwrap_or(clock),
-                &group.layout,
-                group.identity.as_ref().unwrap_or(identity),
-            )
-        })
+        Self {
+            clock: group.and_then(|group| group.clock.as_ref()).unwrap_or(&self.clock).clone(),
+            layout: group.map_or(&self.layout, |group| &group.layout).clone(),
+            identity: group.and_then(|group| group.identity.as_ref()).unwrap_or(&self.identity).clone(),
+            ..Self::default()
+        }
     }
 }
 

@@ -1,18 +1,30 @@
 //! Numeric column chunks into a channel: by the parquet crate's column reader, without an Arrow array in between.
 //!
-//! Chunks of doubles and floats that hold no lists are read here; the others by Arrow's reader.
+//! Chunks of doubles and floats that hold no lists are read here; the others by Arrow's reader. Pages without a selected row
+//! are not decompressed, which changes no value: rows that are not selected are removed from pages that hold both.
+
+use std::ops::Range;
 
 use parquet::basic::Type;
 use parquet::column::page::PageReader;
 use parquet::column::reader::ColumnReaderImpl;
-use parquet::data_type::{DataType, DoubleType, FloatType};
+use parquet::data_type::DataType;
 use parquet::errors::Result;
 use parquet::file::metadata::ColumnChunkMetaData;
 
 use crate::channel::column_builder::{BATCH, ColumnBuilder};
 use crate::parquet::page_reader::Pages;
-use crate::parquet::raw_footer::caught;
-use crate::parquet::row_selection::{RowSelection, intersects};
+
+/// Selected rows of a table: stretches in order and apart from each other; `None` for every row.
+pub(crate) type RowSelection<'a> = Option<&'a [Range<usize>]>;
+
+/// Whether any of these rows is selected.
+pub(crate) fn intersects(selection: RowSelection<'_>, rows: &Range<usize>) -> bool {
+    selection.is_none_or(|stretches| {
+        let next = stretches.partition_point(|stretch| stretch.end <= rows.start);
+        stretches.get(next).is_some_and(|stretch| stretch.start < rows.end)
+    })
+}
 
 /// Whether the numbers of a chunk are read here.
 pub(crate) fn is_plain(chunk: &ColumnChunkMetaData) -> bool {
@@ -24,19 +36,7 @@ pub(crate) fn is_plain(chunk: &ColumnChunkMetaData) -> bool {
 
 /// Appends the values of a chunk, page by page; a null is NaN, and so is all of a page of which nothing is wanted: it is
 /// not unpacked.
-pub(crate) fn append(
-    pages: Pages,
-    chunk: &ColumnChunkMetaData,
-    wanted: RowSelection<'_>,
-    into: &mut ColumnBuilder,
-) -> std::result::Result<(), String> {
-    caught(|| match chunk.column_type() {
-        Type::DOUBLE => append_typed::<DoubleType>(pages, chunk, wanted, into),
-        _ => append_typed::<FloatType>(pages, chunk, wanted, into),
-    })
-}
-
-fn append_typed<T: DataType>(
+pub(crate) fn append<T: DataType>(
     pages: Pages,
     chunk: &ColumnChunkMetaData,
     wanted: RowSelection<'_>,

@@ -12,26 +12,27 @@ use arrow::datatypes::{DataType, Field, Fields, Schema, TimeUnit};
 use blake3::Hasher;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
-use parquet::basic::Encoding;
+use parquet::basic::{Encoding, Type};
+use parquet::data_type::{DoubleType, FloatType};
 use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{self, Error, Fault, encrypted, not_parquet};
 use crate::io::byte_source::ByteSource;
-use crate::io::digest::add_stretches;
 use crate::io::read_at;
 use crate::mapping::column_pattern::composed;
 use crate::mapping::field_metadata::FieldMetadata;
-use crate::parquet::column_numbers;
+use crate::parquet::column_numbers::{self, RowSelection, intersects};
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
 use crate::parquet::page_reader::{self, BoundedGroups, Pages};
 use crate::parquet::raw_footer::{self, Claims, Footer, caught};
-use crate::parquet::row_selection::{RowSelection, intersects};
 
 /// Rows decoded at a time: few enough for the cache, many enough that the cost of a batch is small.
 const BATCH_ROWS: usize = 8192;
+/// Bytes that are read and hashed at a time: as many as stay in the cache in between.
+const HASHED_BYTES: usize = 1 << 17;
 
 /// An open Parquet file, of which only the footer has been read.
 #[derive(Debug)]
@@ -97,11 +98,6 @@ impl LogFile {
         let opened =
             Self { path, flight_rows, source, footer, footer_start, claims, coded, noted, leaves, by_name };
         if opened.rows() == 0 { Err(empty()) } else { Ok(opened) }
-    }
-
-    /// The same file, restricted to the rows of one flight.
-    pub(crate) fn of_flight(self, flight_rows: Vec<(String, String)>) -> Self {
-        Self { flight_rows, ..self }
     }
 
     pub(crate) fn error(&self, fault: Fault) -> Error {
@@ -264,8 +260,11 @@ impl LogFile {
             if column_numbers::is_plain(chunk) {
                 let pages = self.pages(group, leaf)?;
                 let pages = Pages::new(Arc::clone(&self.source.file), chunk, pages, BATCH_ROWS);
-                column_numbers::append(pages, chunk, wanted, into)
-                    .map_err(|detail| self.decode(leaf, group, &detail))?;
+                let read = caught(|| match chunk.column_type() {
+                    Type::DOUBLE => column_numbers::append::<DoubleType>(pages, chunk, wanted, into),
+                    _ => column_numbers::append::<FloatType>(pages, chunk, wanted, into),
+                });
+                read.map_err(|detail| self.decode(leaf, group, &detail))?;
                 self.all_rows(group, into.len() - before, leaf)?;
             } else {
                 self.each_batch(group, &[leaf], Scan::PLAIN, |columns| {
@@ -337,27 +336,16 @@ impl LogFile {
         has_dictionary && self.footer.schema().field(leaf.root).data_type() == &DataType::Utf8
     }
 
-    /// The pages of the named leaves, chunk by chunk; an error for a header that claims what is impossible.
-    fn all_pages(&self, names: &[&str]) -> Result<impl Iterator<Item = Result<Vec<Page>, Error>>, Error> {
+    /// Whether every page of the named leaves has a checksum; an error for a header that claims what is impossible, or for
+    /// pages that hold other rows than are declared.
+    pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         self.want(&leaves, self.groups())?;
-        let chunks =
-            self.groups().flat_map(move |group| leaves.clone().into_iter().map(move |leaf| (group, leaf)));
-        Ok(chunks.map(|(group, leaf)| self.pages(group, leaf)))
-    }
-
-    /// Checks that the headers of a leaf's pages claim only what is possible, and as many rows as are declared.
-    pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
-        self.all_pages(&[name])?.try_for_each(|pages| pages.map(drop))
-    }
-
-    pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
-        for pages in self.all_pages(names)? {
-            if pages?.iter().any(|page| page.header.crc.is_none()) {
-                return Ok(false);
-            }
+        let mut has_all = true;
+        for (group, leaf) in self.groups().flat_map(|group| leaves.iter().map(move |leaf| (group, leaf))) {
+            has_all &= self.pages(group, leaf)?.iter().all(|page| page.header.crc.is_some());
         }
-        Ok(true)
+        Ok(has_all)
     }
 
     pub(crate) fn groups(&self) -> Range<usize> {
@@ -409,8 +397,14 @@ impl LogFile {
         self.want(&wanted, self.groups())?;
         let chunks = self.groups().flat_map(|group| wanted.iter().map(move |leaf| self.chunk(group, leaf)));
         let pages = chunks.map(range_of).map(|Range { start, end }| start..length.min(end));
-        let stretches = pages.chain(once(self.footer_start..length));
-        add_stretches(hash, &self.source.file, stretches).map_err(unreadable)?;
+        let mut buffer = vec![0; HASHED_BYTES];
+        for stretch in pages.chain(once(self.footer_start..length)) {
+            for at in stretch.clone().step_by(HASHED_BYTES) {
+                let bytes = &mut buffer[..HASHED_BYTES.min((stretch.end - at) as usize)];
+                read_at::read_exact(&self.source.file, bytes, at).map_err(unreadable)?;
+                hash.update(bytes);
+            }
+        }
         for (_, text) in &self.flight_rows {
             hash.update(&text.len().to_le_bytes());
             hash.update(text.as_bytes());

@@ -1,6 +1,6 @@
 //! Parquet files: leaf columns as numbers, page by page, and a writer.
 
-mod column_numbers;
+pub(crate) mod column_numbers;
 pub(crate) mod leaf_columns;
 pub(crate) mod log_file;
 pub(crate) mod numeric;
@@ -8,5 +8,4 @@ pub(crate) mod page_crc;
 pub(crate) mod page_header;
 pub(crate) mod page_reader;
 pub(crate) mod raw_footer;
-pub(crate) mod row_selection;
 pub mod writer;

@@ -66,7 +66,8 @@ impl Flights {
     /// Every cell that cannot be read, or, when all can, every row that another one contradicts: a second flight of one id
     /// on one date without a time, and flight hours beyond the next departure.
     pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
-        let table = TableBatch::read(file).map_err(|e| vec![e])?.with_aliases(names);
+        let mut table = TableBatch::read(file).map_err(|e| vec![e])?;
+        table.names = Some(names.clone());
         let needed = table.columns(["tail_number", "flight_id", "departure_utc"])?;
         let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
         let ([tail, flight, departure], [hours, tail_hours, path, position]) = (needed, optional);

@@ -15,7 +15,8 @@ use crate::tables::column_batches::{ColumnAliases, TableBatch};
 /// # Errors
 /// Every cell that cannot be read, or, when all can, every contradiction between rows.
 pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
-    let table = TableBatch::read(file).map_err(|e| vec![e])?.with_aliases(names);
+    let mut table = TableBatch::read(file).map_err(|e| vec![e])?;
+    table.names = Some(names.clone());
     let [tail, position, part, serial, installed] =
         table.columns(["tail_number", "position", "part_number", "serial_number", "installed_utc"])?;
     let [removed, unit_hours, tail_hours] =

@@ -9,7 +9,7 @@ use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
 
 use crate::error::{Error, bad_table};
-use crate::tables::column_batches::{ColumnAliases, TableBatch, TableSplits, text_at};
+use crate::tables::column_batches::{TableBatch, TableSplits, text_at};
 
 impl TableBatch {
     /// Reads a whole table as text, a `.parquet` file as Parquet and anything else as CSV; an empty cell is none.
@@ -44,13 +44,6 @@ impl TableBatch {
         let schema = Arc::new(Schema::new(fields));
         whole.batch = RecordBatch::try_new_with_options(schema, texts, &rows).map_err(fail)?;
         Ok(whole)
-    }
-
-    /// The same table, whose columns go by a user's own names.
-    #[must_use]
-    pub(crate) fn with_aliases(mut self, names: &ColumnAliases) -> Self {
-        self.names = Some(names.clone());
-        self
     }
 
     /// Where columns stand; an error for each that is not there.

@@ -513,10 +513,6 @@ mod tests {
         }
         let even = found.keep_stamps(stamps(&seconds)).seconds;
         assert!((0..300).all(|row| (even[row] - 0.01 * row as f64).abs() < 1e-9), "{even:?}");
-        // A row that is seldom lost begins a new stretch.
-        let seldom: Vec<f64> =
-            (0..700).filter(|row| row % 350 != 3).map(|row| 0.01 * f64::from(row)).collect();
-        assert_eq!(base(&seldom, &usual()).unwrap().segments, [0..3, 3..352, 352..698]);
     }
 
     #[test]
@@ -568,20 +564,24 @@ mod tests {
         assert!(refused.0.message.contains("the first stamp is -1e50 s"), "{refused:?}");
     }
 
-    /// A recorder that rests for 40 s of each minute.
+    /// A row that is seldom lost begins a new stretch, and so does one after a rest of 40 s in each minute. 400 Hz in whole
+    /// milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.
     #[test]
-    fn pauses_of_forty_seconds_are_breaks() {
-        let t: Vec<f64> = (0..4000).map(|k| 60.0 * f64::from(k / 400) + 0.05 * f64::from(k % 400)).collect();
-        assert_eq!(base(&t, &usual()).unwrap().segments.len(), 10);
-    }
-
-    /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.
-    #[test]
-    fn a_step_between_two_ticks_is_their_mean() {
-        let t: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 2.5).floor() * 1e-3).collect();
-        let base = base(&t, &usual()).unwrap();
-        assert!((base.step_s - 2.5e-3).abs() < 1e-6, "{} s", base.step_s);
-        assert_eq!(base.segments.len(), 1);
+    fn clocks_have_their_usual_step_and_break_at_longer_ones() {
+        let seldom = (0..700).filter(|row| row % 350 != 3).map(|row| 0.01 * f64::from(row)).collect();
+        let resting = (0..4000).map(|k| 60.0 * f64::from(k / 400) + 0.05 * f64::from(k % 400)).collect();
+        let ticks = (0..4000).map(|k| (f64::from(k) * 2.5).floor() * 1e-3).collect();
+        let rests = (0..10).map(|k| 400 * k..400 * (k + 1)).collect();
+        for (seconds, step_s, segments) in [
+            (seldom, 0.01, vec![0..3, 3..352, 352..698]),
+            (resting, 0.05, rests),
+            (ticks, 0.0025, std::iter::once(0..4000).collect()),
+        ] {
+            let seconds: Vec<f64> = seconds;
+            let found = base(&seconds, &usual()).unwrap();
+            assert!((found.step_s - step_s).abs() < 1e-6, "{} s", found.step_s);
+            assert_eq!(found.segments, segments);
+        }
     }
 
     #[test]

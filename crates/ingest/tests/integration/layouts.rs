@@ -246,13 +246,6 @@ fn texts_of_numbers_are_read_and_other_texts_are_refused_by_name() {
     assert!(refused.message.contains("`1,5`"), "{refused}");
 }
 
-/// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.
-#[test]
-fn a_dot_in_a_name_is_part_of_the_name() {
-    let columns = ["t", "ail.m", "ail.s", "ail.f"].map(|name| (name, reals([1.0, 2.0])));
-    assert_eq!(only(&prefixed("ail."), &columns).unwrap().motor_m, [1.0, 2.0]);
-}
-
 /// Two flights of a minute and more, five hours apart, in a file that names no flight: their mean would be no gap of
 /// either. A pause of 50 minutes, and a few rows whose clock was wrong, are of one flight.
 #[test]
@@ -383,50 +376,45 @@ fn a_landing_stands_for_the_departure() {
     assert_eq!(of(&m), "2026-11-19T02:13:00Z");
 }
 
-/// `höhe` with a composed and a decomposed ö: a file of one system, and a configuration of another.
+/// `höhe` with a composed and a decomposed ö: a file of one system, and a configuration of another. `FLT_NO` begins as
+/// `{position}_FORCE_LBF` does, and is not meant.
 #[test]
-fn accents_of_names_are_composed() {
-    let composed = "{position}_h\u{f6}he";
-    let screw = channel("{position}_s", Unit::Metre);
-    let m = mapping(channel(composed, Unit::Metre), screw, channel("f", Unit::Newton));
-    let names = ["t", "au\u{df}eno\u{308}_ho\u{308}he", "au\u{df}en\u{f6}_s", "f"];
+fn accents_of_names_are_composed_and_the_closest_column_shares_the_end_of_the_pattern() {
+    let mut m = mapping(
+        channel("{position}_h\u{f6}he", Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("f", Unit::Newton),
+    );
+    let names =
+        ["t", "au\u{df}eno\u{308}_ho\u{308}he", "au\u{df}en\u{f6}_s", "f", "FLT_NO", "AIL_L_LOAD_LBF"];
     let (_dir, file) = written(&names.map(|name| (name, reals([1.0, 2.0]))));
     let log = opened(&file, &m);
     let found = log.actuators(&m.channels, None).unwrap();
     assert_eq!((found.len(), found[0].position.as_str()), (1, "au\u{df}en\u{f6}"));
     let a = log.read_actuator(&found[0], &m.channels, LINEAR).unwrap();
     assert_eq!(a.motor_m, [1.0, 2.0]);
-}
-
-/// `FLT_NO` begins as `{position}_FORCE_LBF` does, and is not meant.
-#[test]
-fn the_closest_column_shares_the_end_of_the_pattern() {
-    let mut m = plain();
-    m.channels.motor_position = channel("{position}_FORCE_LBF", Unit::Metre);
-    let names = ["t", "FLT_NO", "AIL_L_LOAD_LBF", "s", "f"];
-    let (_dir, file) = written(&names.map(|name| (name, reals([0.0, 1.0]))));
-    let log = opened(&file, &m);
+    m.channels.motor_position.column = "{position}_FORCE_LBF".into();
     let hint = log.actuators(&m.channels, None).unwrap_err().diagnostic().hint.unwrap();
     assert!(hint.contains("`AIL_L_LOAD_LBF`"), "{hint}");
 }
 
-/// Two columns of one name: neither is taken, and the error names them.
+/// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest. Of two columns of one name neither is taken,
+/// and of a struct in place of a number the fields are named.
 #[test]
-fn a_name_that_two_columns_have_is_refused() {
-    let columns = |last| ["t", "m", "s", "f", "spare", last].map(|name| (name, reals([1.0, 2.0])));
+fn a_name_with_a_dot_is_read_and_one_of_two_columns_or_of_a_struct_is_refused() {
+    let columns = |names: &[&'static str]| -> Vec<(&'static str, ArrayRef)> {
+        names.iter().map(|name| (*name, reals([1.0, 2.0]))).collect()
+    };
+    let dotted = only(&prefixed("ail."), &columns(&["t", "ail.m", "ail.s", "ail.f"])).unwrap();
+    assert_eq!(dotted.motor_m, [1.0, 2.0]);
+    assert!(only(&plain(), &columns(&["t", "m", "s", "f", "spare", "spare"])).is_ok());
     for column in ["t", "s"] {
-        let found = refusal(&plain(), &columns(column));
+        let found = refusal(&plain(), &columns(&["t", "m", "s", "f", column]));
         assert_eq!((found.code.as_str(), found.column.as_deref()), ("duplicate_column", Some(column)));
     }
-    assert!(only(&plain(), &columns("spare")).is_ok());
-}
-
-#[test]
-fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
     let field = |name| (Arc::new(Field::new(name, DataType::Float64, true)), reals([1.0, 2.0]));
     let record: ArrayRef = Arc::new(StructArray::from(["deg", "raw"].map(field).to_vec()));
-    let [t, s, f] = ["t", "s", "f"].map(|name| (name, reals([1.0, 2.0])));
-    let found = refusal(&plain(), &[t, ("m", record), s, f]);
+    let found = refusal(&plain(), &[columns(&["t", "s", "f"]), vec![("m", record)]].concat());
     assert_eq!((found.code.as_str(), found.column.as_deref()), ("column_type", Some("m")));
     assert!(found.to_string().contains("`deg`, `raw`"), "{found}");
 }

@@ -18,15 +18,7 @@ const ROWS: usize = 3000;
 /// Where the state is 1.
 const STRETCHES: [Range<usize>; 3] = [310..420, 1200..1300, 2890..2995];
 
-/// Rows and pages of a file.
-#[derive(Debug, Clone, Copy)]
-struct Laid {
-    group_rows: usize,
-    page_rows: usize,
-    is_coded: bool,
-}
-
-fn written(folder: &Path, laid: Laid) -> PathBuf {
+fn written(folder: &Path, group_rows: usize, page_rows: usize, is_coded: bool) -> PathBuf {
     let column = |value: fn(usize) -> f64| reals((0..ROWS).map(value));
     let state = |k: usize| f64::from(u8::from(STRETCHES.iter().any(|s| s.contains(&k))));
     // Few values, a hole within a stretch, and a leap that no stretch holds.
@@ -45,9 +37,9 @@ fn written(folder: &Path, laid: Laid) -> PathBuf {
     let batch = RecordBatch::try_from_iter(columns).unwrap();
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_dictionary_enabled(laid.is_coded)
-        .set_max_row_group_row_count(Some(laid.group_rows))
-        .set_data_page_row_count_limit(laid.page_rows)
+        .set_dictionary_enabled(is_coded)
+        .set_max_row_group_row_count(Some(group_rows))
+        .set_data_page_row_count_limit(page_rows)
         .set_write_batch_size(50)
         .build();
     let file = folder.join("N1_20261119T041300Z.parquet");
@@ -82,7 +74,7 @@ proptest! {
         group_rows in 60_usize..3500, page_rows in 50_usize..900, is_coded in any::<bool>(),
     ) {
         let folder = tempfile::tempdir().unwrap();
-        let file = written(folder.path(), Laid { group_rows, page_rows, is_coded });
+        let file = written(folder.path(), group_rows, page_rows, is_coded);
         let (all, some) = (read(&file, &conditional(false)).unwrap(), read(&file, &conditional(true)).unwrap());
         prop_assert_eq!(&some.segments, &STRETCHES.to_vec());
         let mut wanted = channels(&all);
@@ -132,7 +124,7 @@ fn spoilt(file: &Path, column: usize, which: impl Fn(Range<usize>) -> bool) -> P
 #[test]
 fn pages_outside_of_every_stretch_are_not_unpacked() {
     let folder = tempfile::tempdir().unwrap();
-    let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
+    let file = written(folder.path(), 1000, 100, false);
     let sound = read(&file, &conditional(true)).unwrap();
     let all = read(&file, &conditional(false)).unwrap();
     let touched = |rows: &Range<usize>| STRETCHES.iter().any(|s| s.start < rows.end && rows.start < s.end);

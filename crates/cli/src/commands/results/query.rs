@@ -11,7 +11,8 @@ use records::row_schema::to_batch;
 use records::{GapEstimate, GapRecord, Installations};
 use store::{Query, Store};
 
-use crate::args::{Format, Global, QUERY_KEYS, QueryArgs};
+use crate::args::{Format, Global, QueryArgs};
+use crate::completion::QUERY_KEYS;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::row_output;
@@ -134,7 +135,6 @@ fn unknown_word(word: &str) -> Failure {
     Failure::usage("unknown_name", what, &hint)
 }
 
-/// Records as a table.
 pub(crate) fn page(records: &[GapRecord]) -> String {
     let half_width_m = |e: &GapEstimate| e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low));
     let columns: &table::Columns<'_, GapRecord> = &[
@@ -161,7 +161,6 @@ fn remedies(records: &[GapRecord]) -> String {
     if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
-/// Rejection code of an estimate.
 fn rejection_code(e: &GapEstimate) -> Option<&str> {
     e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
 }

@@ -50,7 +50,6 @@ fn run_gauges(text: &mut String, started_utc: Timestamp, code: Code) {
     gauge(text, "run_exit_code", "Exit code of the last run.", f64::from(code as i32));
 }
 
-/// A value of a metrics file.
 fn value_in(file: &Path, name: &str) -> Option<f64> {
     let before = std::fs::read_to_string(file).ok()?;
     before.lines().find_map(|line| line.strip_prefix(name)?.parse().ok())

@@ -23,7 +23,6 @@ use crate::table::{self, count, number, text};
 
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
 
-/// Runs the pipeline.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let started_utc = Timestamp::now();
     let ended = execute(args, global, output, started_utc);
@@ -124,7 +123,6 @@ fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a run is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// It lists logs, or waits for another run: nothing is stored.

@@ -31,7 +31,6 @@ const IN_JSON: &str = "`freeplay run --json`";
 /// Command that prints every log of the latest run with its error.
 const LOGS_OF_RUN: &str = "`freeplay store runs --run last`";
 
-/// Labelled lines.
 struct Page(String);
 
 impl Page {
@@ -58,7 +57,6 @@ impl Page {
     }
 }
 
-/// Run summary as text.
 pub(super) fn text(report: &RunSummary, config: &str, code: Code) -> String {
     let started = report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ");
     let mut page = Page(format!("Freeplay {VERSION} · run {started} · {config}\n"));

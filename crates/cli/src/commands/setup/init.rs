@@ -28,7 +28,6 @@ const FILES: [(&str, &str); 2] = [
 /// JSON schema with which editors complete and check the configuration.
 const SCHEMA: &str = "pipeline.schema.json";
 
-/// Next steps after `init`.
 const NEXT: &str = "next: set the log paths and column names in pipeline.toml, enter in installations.csv which serial \
                     number was installed where, then run `freeplay check`";
 const NEXT_OF_PROPOSAL: &str = "next: review pipeline.toml and correct wrong guesses, enter in installations.csv which part and \

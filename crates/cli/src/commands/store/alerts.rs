@@ -13,7 +13,6 @@ use crate::output::Output;
 use crate::row_output;
 use crate::table::{self, count, number, or_dash, text, unit_name};
 
-/// Lists alerts.
 pub(crate) fn alerts(
     store: &Store,
     is_unsent: bool,

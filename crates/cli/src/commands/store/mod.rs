@@ -23,7 +23,6 @@ use crate::table::count;
 use crate::commands::context::load_config;
 use crate::commands::results::query;
 
-/// Runs a command on the configured store.
 pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let config = load_config(global)?;
     let store = Store::open(config.store())?;
@@ -188,8 +187,8 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
         tail_number: args.tail.clone(),
         flight_id: args.flight.clone(),
         position: args.position.clone(),
-        since_utc: args.since,
-        until_utc: args.until,
+        since_utc: args.departures.since,
+        until_utc: args.departures.until,
         ..Query::default()
     };
     let selects = query != Query::default() || args.log.is_some();

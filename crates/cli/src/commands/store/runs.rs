@@ -80,7 +80,6 @@ pub(crate) fn run_status(run: &RunRecord, is_held: bool) -> &'static str {
     }
 }
 
-/// Text shown for a status.
 pub(crate) fn status_text(status: &'static str) -> &'static str {
     match status {
         "well" => "completed",
@@ -131,7 +130,6 @@ fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output)
     Ok(Code::Success)
 }
 
-/// Count by reason.
 type Reasons = std::collections::BTreeMap<String, usize>;
 
 /// Rejection reasons of a run's records by log; records superseded by a later run are not included.
