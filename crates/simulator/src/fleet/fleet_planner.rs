@@ -258,7 +258,7 @@ impl<'a> Planner<'a> {
             sensors,
         };
         let part_number = &spec.parts[unit.part].part_number;
-        spec.all_changes().for_each(|change| change.apply(&mut actuator, tail, part_number, number));
+        spec.changes.iter().for_each(|change| change.apply(&mut actuator, tail, part_number, number));
         actuator.profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
         actuator
     }

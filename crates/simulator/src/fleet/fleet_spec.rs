@@ -67,8 +67,6 @@ pub struct Spec {
     pub play_checks: Vec<PlayCheck>,
     /// Log files that do not arrive as recorded.
     pub log_faults: Vec<LogFault>,
-    /// Another name for `changes`, which are applied after these.
-    pub aircraft: Vec<PlantedChange>,
     /// Changes that come over the flights.
     pub changes: Vec<PlantedChange>,
 }
@@ -220,7 +218,7 @@ impl Spec {
         self.units.iter().try_for_each(|unit| self.check_place("a unit", &unit.tail, &unit.position))?;
         self.check_events()?;
         self.log_faults.iter().try_for_each(|fault| self.check_log_fault(fault))?;
-        self.all_changes().try_for_each(|change| self.check_change(change))
+        self.changes.iter().try_for_each(|change| self.check_change(change))
     }
 
     /// The longest flight fits between two departures.
@@ -260,11 +258,6 @@ impl Spec {
             return Err(Error::Value { key: "log_faults log".to_owned(), value: fault.log as f64, must });
         }
         self.check_tail("a log fault", &fault.tail)
-    }
-
-    /// The changes of `aircraft`, then those of `changes`.
-    pub(crate) fn all_changes(&self) -> impl Iterator<Item = &PlantedChange> {
-        self.aircraft.iter().chain(&self.changes)
     }
 
     fn check_change(&self, change: &PlantedChange) -> Result<(), Error> {

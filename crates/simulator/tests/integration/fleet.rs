@@ -127,7 +127,7 @@ fn one_aircraft_may_have_load_cells_and_buffet_of_its_own() {
         ..PlantedChange::default()
     };
     let flown = |rms, index: usize| {
-        let spec = Spec { aircraft: vec![with(rms)], ..spec.clone() };
+        let spec = Spec { changes: vec![with(rms)], ..spec.clone() };
         let load = fly(&spec, index).actuators[0].load.clone();
         let own = &fly(&plain, index).actuators[0].load;
         load.iter().zip(own).map(|(a, b)| a - b).collect::<Vec<f64>>()
