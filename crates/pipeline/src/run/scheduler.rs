@@ -135,7 +135,7 @@ pub(crate) fn execute_run(
     let started_utc = Timestamp::now();
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed;
-    report.unknown_units = unknown_units(config, &installations);
+    report.unknown_units = unknown_units(config, &installations, &maintenance, &inspections);
     let others = maintenance_log::dates(&maintenance).chain(inspections.iter().map(InspectionRow::date));
     report.dates_ahead = dates_ahead(&installations, others, started_utc);
     let config_path = config.file.display().to_string();
@@ -199,6 +199,7 @@ pub(crate) fn execute_run(
     let follow_up = FollowUp {
         config,
         installations: &inputs.installations,
+        maintenance: &maintenance,
         run_id: &report.run_id,
         is_partial: report.not_reached + report.left > 0,
         stop: context.stop,
