@@ -128,7 +128,7 @@ pub(crate) fn execute_run(
     let inspections = inspections::read(config)?.unwrap_or_default();
     let maintenance = maintenance_log::read(config)?;
     let found = discover::discover(config)?;
-    let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
+    let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(&Holder::this_process(), context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
