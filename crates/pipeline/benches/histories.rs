@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let histories = if source.ends_with(".parquet") {
         external_estimates::read(Path::new(&source), &BTreeSet::new())?
     } else {
-        load_histories(&Store::open(&source)?)?
+        load_histories(&Store::open(&source)?, &BTreeSet::new())?
     };
     let rows: usize = histories.units.values().map(|history| history.flights().len()).sum();
     println!("{} units, {rows} flights, {:.3} s", histories.units.len(), begun.elapsed().as_secs_f64());

@@ -136,7 +136,9 @@ pub(crate) fn backtest_forecasts(
     let rows = config.with(py, |config, installations| {
         let histories = match batches {
             Some(batches) => external(batches, config)?,
-            None => trends::load_histories(&open_store(config, installations)?)?,
+            None => {
+                trends::load_histories(&open_store(config, installations)?, &config.parts_by_largest_gap())?
+            }
         };
         backtest::of_histories(config, installations, histories)
     })?;

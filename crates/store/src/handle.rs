@@ -1,6 +1,6 @@
 //! Store handle: the location, the tables and the digest check of data files.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -44,8 +44,6 @@ pub struct Store {
     pub(crate) states: Table,
     /// Bookkeeping that is joined to records when they are read.
     pub(crate) join: Option<Join>,
-    /// Parts whose largest gaps along the stroke a scan reads as their gaps.
-    pub(crate) parts_by_largest_gap: BTreeSet<String>,
     /// Data files whose digests this process has verified.
     verified: Arc<Mutex<HashSet<PathBuf>>>,
 }
@@ -61,7 +59,6 @@ impl Store {
             work: table("work", versioned::schema::<WorkEvent>()),
             states: table("states", versioned::schema::<UnitState>()),
             join: None,
-            parts_by_largest_gap: BTreeSet::new(),
             verified: Arc::default(),
             display_path: location.display_path(location.dir()),
             location,

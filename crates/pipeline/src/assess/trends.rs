@@ -7,14 +7,14 @@ use job::Config;
 use job::config::AsOf;
 use rayon::prelude::*;
 use records::{Diagnostic, Installations, QuantityChange, QuantityRow, TrendRow, UnitState};
-use store::{Query, Store};
+use store::{ColumnScan, Query, Store};
 use trend::{Assessment, FleetPrior, Series};
 
 use crate::assess::changes::{Changes, RunFacts, changes};
 use crate::assess::limits::Limits;
 use crate::assess::priors::FleetPriors;
 use crate::assess::quantities::follow::{FollowedQuantities, follow};
-use crate::assess::quantities::values::{self, FleetValues, Units, by_unit};
+use crate::assess::quantities::values::{Units, by_unit, covariates};
 use crate::assess::quantities::{peers, rows};
 use crate::assess::tail_wide_steps::TailWide;
 use crate::error::Error;
@@ -31,7 +31,6 @@ use crate::fleet::builder;
 use crate::fleet::external_estimates::AsOfQuery;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::unit_rows;
 use crate::run::summary::RunSummary;
 
 /// Assessments of units, and steps of the gap that whole tails made.
@@ -100,29 +99,22 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
-    let (histories, values) = values::load(store)?;
-    assess_histories(config, installations, histories, Some(values), ask)
+    let histories = load_histories(store, &config.parts_by_largest_gap())?;
+    assess_histories(config, installations, histories, ask)
 }
 
-/// Assesses the selected units of some histories, with the followed values that their store holds.
 fn assess_histories(
     config: &Config,
     installations: &Installations,
     mut histories: Histories,
-    mut values: Option<FleetValues>,
     ask: &UnitSelection,
 ) -> Result<StoreAssessment, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
-    if let Some(values) = &mut values {
-        values::drop_old(values, &histories, as_of);
-    }
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    if let Some(values) = values {
-        fleet.add_diagnostics(&values, as_of);
-    }
+    fleet.add_diagnostics(as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(fleet.assessed(now, &tail_wide, ask.as_of_utc))
 }
@@ -138,12 +130,10 @@ pub(crate) fn assess_run(
     with_records: &BTreeSet<UnitKey>,
     summary: &mut RunSummary,
 ) -> Result<(Vec<Finding>, Vec<UnitState>), Error> {
-    let (mut histories, mut values) = values::load(store)?;
+    let mut histories = load_histories(store, &config.parts_by_largest_gap())?;
     let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(Default::default()) };
-    values::drop_old(&mut values, &histories, as_of);
     let mut fleet = FleetContext::new(config, installations, &mut histories, &[as_of])?;
-    summary.samples_repeated = repeated_samples::detect(&fleet.add_diagnostics(&values, as_of));
-    drop(values);
+    summary.samples_repeated = repeated_samples::detect(&fleet.add_diagnostics(as_of)?);
     let (mut now, tail_wide) = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut quantity_changes = fleet.followed.changes.clone();
@@ -184,13 +174,11 @@ pub(crate) struct ReportAssessments {
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
 
-/// Assesses the selected units at the date, and at earlier dates given in days before, from the histories and values of the
-/// store.
+/// Assesses the selected units at the date, and at earlier dates given in days before, from the histories of the store.
 pub(crate) fn assess_for_report(
     config: &Config,
     installations: &Installations,
     histories: &mut Histories,
-    values: &FleetValues,
     ask: &UnitSelection,
     days_before: &[i64],
 ) -> Result<ReportAssessments, Error> {
@@ -201,7 +189,7 @@ pub(crate) fn assess_for_report(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let mut fleet = FleetContext::new(config, installations, histories, &days)?;
-    fleet.add_diagnostics(values, as_of);
+    fleet.add_diagnostics(as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
@@ -241,11 +229,12 @@ pub fn assess(
     let store = || open_store(config, installations);
     let Some(queries) = queries else {
         return match histories {
-            Some(histories) => assess_histories(config, installations, histories, None, ask),
+            Some(histories) => assess_histories(config, installations, histories, ask),
             None => assess_store(config, installations, &store()?, ask),
         };
     };
-    let mut histories = histories.map_or_else(|| load_histories(&store()?), Ok)?;
+    let stored = || load_histories(&store()?, &config.parts_by_largest_gap());
+    let mut histories = histories.map_or_else(stored, Ok)?;
     let days: Vec<Timestamp> = queries.iter().map(|(_, as_of)| *as_of).collect();
     let selected = queries.iter().map(|(named, _)| unit_of(named, &histories));
     let selected = selected.collect::<Result<Vec<UnitKey>, Error>>()?;
@@ -278,14 +267,12 @@ fn unit_of(named: &UnitKey, histories: &Histories) -> Result<UnitKey, Error> {
     }
 }
 
-/// Every unit's flights in the store.
+/// Every unit's flights in the store; of the parts `by_largest`, with the largest gap along the stroke as the gap.
 ///
 /// # Errors
 /// When the store cannot be read.
-pub fn load_histories(store: &Store) -> Result<Histories, Error> {
-    let scan = store.scan_columns(&Query::default(), &builder::stored_columns())?;
-    let add = |rows: &mut _, chunk: &_, batch: &_| builder::add_stored(rows, chunk, batch, |_| ());
-    Ok(builder::histories(unit_rows::of_store(&scan, add)?, true).0)
+pub fn load_histories(store: &Store, by_largest: &BTreeSet<String>) -> Result<Histories, Error> {
+    builder::of_store(store, &Query::default(), by_largest)
 }
 
 /// All units, and the fleet prior of each part by training cut-off.
@@ -293,6 +280,7 @@ pub(crate) struct FleetContext<'a> {
     pub(super) limits: Limits<'a>,
     pub(super) units: Units<'a>,
     priors: FleetPriors<'a>,
+    stored: Option<&'a ColumnScan>,
     /// Followed quantities of all units; nothing for external tables.
     followed: FollowedQuantities,
     /// Their states, by unit.
@@ -313,10 +301,10 @@ impl<'a> FleetContext<'a> {
         histories: &'a mut Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
-        let tables = OperatorTables::read(config, installations, histories.is_booked)?;
+        let tables = OperatorTables::read(config, installations, histories.stored.is_some())?;
         let read = |(name, history): (&UnitKey, &mut History)| {
             let series = tables.series(name, history)?;
-            history.drop_secondary();
+            history.extras = Vec::new();
             Ok(series)
         };
         let units: Vec<_> = histories.units.iter_mut().collect();
@@ -331,6 +319,7 @@ impl<'a> FleetContext<'a> {
             limits,
             units,
             priors,
+            stored: histories.stored.as_deref(),
             followed: FollowedQuantities::default(),
             conditions: BTreeMap::new(),
             moved: Vec::new(),
@@ -359,19 +348,18 @@ impl<'a> FleetContext<'a> {
 
     /// Adds what the values of flights show besides gaps: followed quantities, and wrong mappings. Returns the flights of the
     /// last months, which show these.
-    fn add_diagnostics<'v>(&mut self, values: &'v FleetValues, as_of: Timestamp) -> RecentFlights<'v>
-    where
-        'a: 'v,
-    {
-        let units = by_unit(&self.units, values, as_of);
-        self.followed = follow(&units, &self.units, self.limits, as_of);
+    fn add_diagnostics(&mut self, as_of: Timestamp) -> Result<RecentFlights<'a>, Error> {
+        let Some(stored) = self.stored else { return Ok(RecentFlights::default()) };
+        let covariates = covariates(stored)?;
+        let units = by_unit(&self.units, &covariates, as_of);
+        let mut recent = recent_flights(&units, &covariates, as_of);
+        self.followed = follow(&units, &self.units, (stored, &covariates), &mut recent, self.limits, as_of)?;
         self.moved = recorder_changes(&self.followed.changes, as_of);
         for (row, state) in self.followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
             self.conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
-        let recent = recent_flights(&units, as_of);
         self.mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
-        recent
+        Ok(recent)
     }
 
     /// Assessments of some units, with what was found about them in addition to gaps.

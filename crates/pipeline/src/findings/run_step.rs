@@ -17,11 +17,12 @@ use crate::findings::finding::Finding;
 use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
-use crate::fleet::bookkeeping::maintenance_log;
+use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
 
 pub(crate) struct FollowUp<'a> {
     pub(crate) config: &'a Config,
     pub(crate) installations: &'a Installations,
+    pub(crate) maintenance: &'a MaintenanceLog,
     pub(crate) run_id: &'a str,
     /// Whether the run left logs for later: its states are not those of the whole history.
     pub(crate) is_partial: bool,
@@ -70,10 +71,9 @@ impl FollowUp<'_> {
         let mut events = writer.store().work_events()?;
         let mut added = Vec::new();
         if !self.is_partial {
-            let maintenance = maintenance_log::read(self.config)?;
             let newest = findings.iter().map(|finding| finding.as_of_utc).max();
             let at = newest.map_or(now, |newest| newest.max(now));
-            let tables = Tables { installations: self.installations, maintenance: &maintenance, at };
+            let tables = Tables { installations: self.installations, maintenance: self.maintenance, at };
             added = work_update::update(&events, findings, &tables, self.run_id, now);
             writer.add_work_events(&added)?;
         }

@@ -1,15 +1,17 @@
 //! Flights of units from tables: the store's own, or estimates made elsewhere.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use arrow::array::{Array, AsArray, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use rayon::prelude::*;
+use store::{ColumnScan, Query, Store};
 
+use crate::error::Error;
 use crate::fleet::flight_row::{FlightExtras, FlightRow, signed_error};
-use crate::fleet::histories::{Histories, History, UnitKey};
-use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, number};
+use crate::fleet::histories::{Histories, History};
+use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, batches, number, of_parts};
 
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
@@ -42,32 +44,37 @@ pub(crate) const COLUMNS: [&str; 16] = [
     "flags",
 ];
 
-/// The columns of the store that a history is made from.
-pub(crate) fn stored_columns() -> Vec<&'static str> {
-    // The store returns the largest gap as the gap of a part whose limits apply to it.
-    let elsewhere = ["serial", "tail", LARGEST_GAP, LARGEST_GAP_ERROR];
-    let stored = COLUMNS.into_iter().filter(|name| !elsewhere.contains(name));
-    stored.chain([OTHER_GAP, SETTINGS]).collect()
+/// The histories of units, and the `stored` rows that they were made from.
+pub(crate) fn histories(parts: PartsByUnit, stored: Option<ColumnScan>) -> Histories {
+    let parts: Vec<_> = parts.into_iter().collect();
+    let history = |(name, parts)| (name, History::of_rows(UnitRows::concatenated(parts)));
+    let units: Vec<_> = parts.into_par_iter().map(history).collect();
+    Histories { units: units.into_iter().collect(), stored: stored.map(Box::new) }
 }
 
-/// The histories of units, and what else `R` holds of each flight, by unit in the order of the flights.
-pub(crate) fn histories<R: Send>(
-    parts: PartsByUnit<R>,
-    is_booked: bool,
-) -> (Histories, BTreeMap<UnitKey, Vec<R>>) {
-    let parts: Vec<_> = parts.into_iter().collect();
-    let history = |(name, parts): (UnitKey, Vec<UnitRows<_>>)| {
-        let (history, further) = History::of_rows(UnitRows::concatenated(parts));
-        ((name.clone(), history), (name, further))
-    };
-    let (units, further): (Vec<_>, Vec<_>) = parts.into_par_iter().map(history).unzip();
-    (Histories { units: units.into_iter().collect(), is_booked }, further.into_iter().collect())
+/// Every unit's flights in the matching records of the store; `by_largest` as in an estimates table.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(crate) fn of_store(
+    store: &Store,
+    query: &Query,
+    by_largest: &BTreeSet<String>,
+) -> Result<Histories, Error> {
+    let stored = COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
+    let names: Vec<&str> = stored.chain([OTHER_GAP, SETTINGS]).collect();
+    let scan = store.scan_columns(query, &names)?;
+    let parts = of_parts(scan.file_count(), |rows, part| {
+        let mut chunks = batches(&scan, part)?.into_iter();
+        chunks.try_for_each(|(chunk, batch)| Ok(add_stored(rows, &chunk, &batch, by_largest)?))
+    })?;
+    Ok(histories(parts, Some(scan)))
 }
 
 /// Adds the flights of an estimates table to those of their units. In flights of the parts `by_largest`, the largest gap along
 /// the stroke is the gap, where the table has it.
 pub(crate) fn add_external(
-    rows: &mut RowsByUnit<()>,
+    rows: &mut RowsByUnit,
     chunk: &TableBatch,
     by_largest: &BTreeSet<String>,
 ) -> Result<(), ingest::Error> {
@@ -76,14 +83,14 @@ pub(crate) fn add_external(
     // A record with any flag contradicts itself, so that it alone confirms nothing.
     let is_flag = |text: &&str| !NO_FLAG.contains(&text.to_ascii_lowercase().as_str());
     let other_gap_m = |row, gap_m| flags.get(row).filter(is_flag).map(|_| gap_m);
-    add(rows, chunk, by_largest, other_gap_m, |_| ())
+    add(rows, chunk, by_largest, other_gap_m)
 }
 
-pub(crate) fn add_stored<R>(
-    rows: &mut RowsByUnit<R>,
+fn add_stored(
+    rows: &mut RowsByUnit,
     chunk: &TableBatch,
     batch: &RecordBatch,
-    further: impl Fn(usize) -> R,
+    by_largest: &BTreeSet<String>,
 ) -> Result<(), ingest::Error> {
     let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
     let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
@@ -94,16 +101,15 @@ pub(crate) fn add_stored<R>(
         let is_disputed = of_row.as_string_opt::<i32>()?.iter().any(|flag| flag == Some(DISAGREE));
         at(&others_m, row).filter(|_| is_disputed)
     };
-    add(rows, chunk, &BTreeSet::new(), other_gap_m, further)
+    add(rows, chunk, by_largest, other_gap_m)
 }
 
 /// Adds the flights of some rows. `other_gap_m` gives the gap that contradicts that of a row, m.
-fn add<R>(
-    rows: &mut RowsByUnit<R>,
+fn add(
+    rows: &mut RowsByUnit,
     chunk: &TableBatch,
     by_largest: &BTreeSet<String>,
     other_gap_m: impl Fn(usize, f64) -> Option<f64>,
-    further: impl Fn(usize) -> R,
 ) -> Result<(), ingest::Error> {
     let numbers = |name: &str| chunk.numbers(chunk.find(&[name]));
     let departure = chunk.column(&["departure_utc"])?;
@@ -142,7 +148,7 @@ fn add<R>(
             gap_se_m: signed_error(gap_se_m, gap_m.zip(other_m)),
             load_reversals: at(&reversals, row).map_or(u64::MAX, |n| n as u64),
         };
-        unit.rows.push(((flown, extras), further(row)));
+        unit.rows.push((flown, extras));
         Ok(())
     })
 }
@@ -156,10 +162,9 @@ mod tests {
     use arrow::datatypes::DataType;
 
     use super::*;
-    use crate::error::Error;
-    use crate::fleet::unit_rows::of_parts;
+    use crate::fleet::histories::UnitKey;
 
-    type Rows = RowsByUnit<()>;
+    type Rows = RowsByUnit;
     type Add = fn(&mut Rows, &RecordBatch) -> Result<(), ingest::Error>;
 
     fn chunk(batch: &RecordBatch) -> TableBatch {
@@ -167,7 +172,7 @@ mod tests {
     }
 
     fn add_batch(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        add_stored(rows, &chunk(batch), batch, |_| ())
+        add_stored(rows, &chunk(batch), batch, &BTreeSet::new())
     }
 
     fn add_plain(rows: &mut Rows, batch: &RecordBatch) -> Result<(), ingest::Error> {
@@ -176,11 +181,11 @@ mod tests {
 
     /// The histories of a table in batches.
     fn of_batches(batches: &[RecordBatch], add: Add) -> Histories {
-        let put = |rows: &mut RowsByUnit<_>, part: usize| {
+        let put = |rows: &mut Rows, part: usize| {
             add(rows, &batches[part]).unwrap();
             Ok(())
         };
-        histories(of_parts(batches.len(), put).unwrap(), true).0
+        histories(of_parts(batches.len(), put).unwrap(), None)
     }
 
     /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
@@ -228,10 +233,11 @@ mod tests {
     /// All that is known of all units.
     fn row_texts(histories: &Histories) -> Vec<String> {
         let of_unit = |(name, history): (&UnitKey, &History)| {
-            let flight = |f: &FlightRow| {
-                format!("{f:?} {:?} {:?} {:?}", history.place(f), history.flight_id(f), history.extras(f))
+            let flight = |(f, extras): (&FlightRow, &FlightExtras)| {
+                format!("{f:?} {:?} {:?} {extras:?}", history.place(f), history.flight_id(f))
             };
-            format!("{name:?} {:?}", history.flights().iter().map(flight).collect::<Vec<_>>())
+            let flights = history.flights().iter().zip(&history.extras);
+            format!("{name:?} {:?}", flights.map(flight).collect::<Vec<_>>())
         };
         histories.units.iter().map(of_unit).collect()
     }
@@ -251,7 +257,7 @@ mod tests {
             let is_same = found.iter().all(|found| row_texts(found) == expected);
             assert!(is_same, "{rows_of_part} rows a part, {workers} workers");
         }
-        assert!(of_parts::<()>(0, |_, _| Ok(())).unwrap().is_empty());
+        assert!(of_parts(0, |_, _| Ok(())).unwrap().is_empty());
     }
 
     /// Independent of the order of the workers, the first error of the table is returned.

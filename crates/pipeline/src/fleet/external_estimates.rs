@@ -25,7 +25,7 @@ pub fn read(file: &Path, by_largest: &BTreeSet<String>) -> Result<Histories, Err
         let mut chunks = table.batches(part..part + 1)?;
         Ok(chunks.try_for_each(|chunk| add_external(rows, &chunk?, by_largest))?)
     })?;
-    Ok(builder::histories(with_parts(parts), false).0)
+    Ok(builder::histories(with_parts(parts), None))
 }
 
 /// The histories of an estimates table in memory.
@@ -34,11 +34,11 @@ pub fn read(file: &Path, by_largest: &BTreeSet<String>) -> Result<Histories, Err
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch], by_largest: &BTreeSet<String>) -> Result<Histories, Error> {
     let parts = of_parts(chunks.len(), |rows, part| Ok(add_external(rows, &chunks[part], by_largest)?))?;
-    Ok(builder::histories(with_parts(parts), false).0)
+    Ok(builder::histories(with_parts(parts), None))
 }
 
 /// The same rows, those without a part number as flights of the one unit with their serial number that has a part.
-fn with_parts(mut parts: PartsByUnit<()>) -> PartsByUnit<()> {
+fn with_parts(mut parts: PartsByUnit) -> PartsByUnit {
     let mut named: BTreeMap<String, Vec<UnitKey>> = BTreeMap::new();
     for unit in parts.keys().filter(|unit| unit.0.is_some()) {
         named.entry(unit.1.clone()).or_default().push(unit.clone());

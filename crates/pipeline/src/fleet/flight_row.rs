@@ -56,7 +56,7 @@ pub struct FlightRow {
     gap_m: f64,
     /// Which of its unit's places it was flown in.
     pub(crate) place: u32,
-    /// Which of its unit's flights it is, by departure.
+    /// Which row of the table it was read from: that of its further columns.
     pub(crate) row: u32,
     /// Where its name begins and ends among its unit's names; at one place where it has none.
     name: [u32; 2],
@@ -67,24 +67,19 @@ impl FlightRow {
     pub(crate) fn new(
         departure_us: i64,
         gap_m: Option<f64>,
-        place: u32,
+        (place, row): (u32, u32),
         name: &str,
         names: &mut String,
     ) -> Self {
         let begin = names.len() as u32;
         names.push_str(name);
-        Self {
-            departure_us,
-            gap_m: gap_m.unwrap_or(f64::NAN),
-            place,
-            row: 0,
-            name: [begin, names.len() as u32],
-        }
+        Self { departure_us, gap_m: gap_m.unwrap_or(f64::NAN), place, row, name: [begin, names.len() as u32] }
     }
 
-    /// The same among more flights: its place has another number, and its name comes after others.
-    pub(crate) fn relocate(&mut self, places: &[u32], names: u32) {
+    /// The same among more flights: its place has another number, and its row and its name come after others.
+    pub(crate) fn relocate(&mut self, places: &[u32], rows: u32, names: u32) {
         self.place = places[self.place as usize];
+        self.row += rows;
         self.name = self.name.map(|at| at + names);
     }
 
@@ -153,7 +148,8 @@ pub(crate) fn signed_error(gap_se_m: Option<f64>, contradicting_m: Option<(f64, 
     }
 }
 
-fn known(number: f64) -> Option<f64> {
+/// A number; none of NaN.
+pub(crate) fn known(number: f64) -> Option<f64> {
     (!number.is_nan()).then_some(number)
 }
 

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use records::Installation;
+use store::ColumnScan;
 
 use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
 use crate::fleet::unit_rows::{SettingsCounts, UnitRows};
@@ -19,8 +20,8 @@ pub use crate::fleet::flight_row::{TailPosition, UnitKey};
 pub struct History {
     places: Vec<TailPosition>,
     flights: Vec<FlightRow>,
-    /// Their secondary columns; empty once they were [dropped](History::drop_secondary).
-    extras: Vec<FlightExtras>,
+    /// Their secondary columns; empty once their usage is added up.
+    pub(crate) extras: Vec<FlightExtras>,
     /// The flights' names, one after the other.
     names: String,
     /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
@@ -63,15 +64,6 @@ impl History {
         flown.name_in(&self.names)
     }
 
-    pub(crate) fn extras(&self, flown: &FlightRow) -> FlightExtras {
-        self.extras[flown.row as usize]
-    }
-
-    /// Frees the secondary columns, which are not needed from now on.
-    pub(crate) fn drop_secondary(&mut self) {
-        self.extras = Vec::new();
-    }
-
     pub(crate) fn place(&self, flown: &FlightRow) -> &TailPosition {
         &self.places[flown.place as usize]
     }
@@ -92,27 +84,21 @@ impl History {
         installations.iter().position(is_here)
     }
 
-    /// The history of a unit's rows, each with what else `R` holds of it; sorted, so that it does not depend on the order of
-    /// arrival.
-    pub(crate) fn of_rows<R>(rows: UnitRows<R>) -> (Self, Vec<R>) {
-        let UnitRows { places, names, settings, mut rows } = rows;
+    /// The history of a unit's rows; sorted, so that it does not depend on the order of arrival.
+    pub(crate) fn of_rows(rows: UnitRows) -> Self {
+        let UnitRows { places, names, settings, mut rows, .. } = rows;
         let place = |flown: &FlightRow| &places[flown.place as usize];
-        let order = |((a, _), _): &(StoredFlight, R), ((b, _), _): &(StoredFlight, R)| {
+        let order = |(a, _): &StoredFlight, (b, _): &StoredFlight| {
             let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(&names).cmp(&b.name_in(&names)));
             a.departure_us().cmp(&b.departure_us()).then_with(rest)
         };
         if !rows.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
             rows.sort_by(order);
         }
-        let disputed = rows.iter().filter(|((_, extras), _)| extras.is_disputed());
-        let disputed_us = disputed.map(|((flown, _), _)| flown.departure_us()).collect();
-        let (stored, further): (Vec<StoredFlight>, Vec<R>) = rows.into_iter().unzip();
-        let numbered = |((mut flown, extras), row): (StoredFlight, u32)| {
-            flown.row = row;
-            (flown, extras)
-        };
-        let (flights, extras) = stored.into_iter().zip(0..).map(numbered).unzip();
-        (Self { places, flights, extras, names, disputed_us, settings }, further)
+        let disputed = rows.iter().filter(|(_, extras)| extras.is_disputed());
+        let disputed_us = disputed.map(|(flown, _)| flown.departure_us()).collect();
+        let (flights, extras) = rows.into_iter().unzip();
+        Self { places, flights, extras, names, disputed_us, settings }
     }
 }
 
@@ -121,9 +107,9 @@ impl History {
 pub struct Histories {
     /// Each unit's flights.
     pub units: BTreeMap<UnitKey, History>,
-    /// Whether these are the store's own, whose flights belong to rows of the installations table. Those of a table made
-    /// elsewhere may be of other aircraft under the same names.
-    pub(crate) is_booked: bool,
+    /// Of the store's own, the rows that they were made from: their flights belong to rows of the installations table. Those
+    /// of a table made elsewhere may be of other aircraft under the same names.
+    pub(crate) stored: Option<Box<ColumnScan>>,
 }
 
 impl Histories {

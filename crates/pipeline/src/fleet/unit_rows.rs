@@ -46,25 +46,20 @@ impl SettingsCounts {
     }
 }
 
-/// Flights of one unit, in the order of arrival, each with what else `R` holds of it.
-#[derive(Debug)]
-pub(crate) struct UnitRows<R> {
+/// Flights of one unit, in the order of arrival.
+#[derive(Debug, Default)]
+pub(crate) struct UnitRows {
     /// Where the unit was; a flight holds the number of its place.
     pub(crate) places: Vec<TailPosition>,
     pub(crate) names: String,
     /// Gaps by the settings that they were estimated with.
     pub(crate) settings: SettingsCounts,
-    pub(crate) rows: Vec<(StoredFlight, R)>,
+    /// Rows of the table before those that the flights count from.
+    rows_before: u32,
+    pub(crate) rows: Vec<StoredFlight>,
 }
 
-impl<R> Default for UnitRows<R> {
-    fn default() -> Self {
-        let (names, settings) = (String::new(), SettingsCounts::default());
-        Self { places: Vec::new(), names, settings, rows: Vec::new() }
-    }
-}
-
-impl<R> UnitRows<R> {
+impl UnitRows {
     pub(crate) fn concatenated(parts: Vec<Self>) -> Self {
         let mut all = Self::default();
         all.rows.reserve_exact(parts.iter().map(|part| part.rows.len()).sum());
@@ -75,7 +70,8 @@ impl<R> UnitRows<R> {
             };
             let places: Vec<u32> = part.places.iter().map(number).collect();
             let names = all.names.len() as u32;
-            part.rows.iter_mut().for_each(|((flown, _), _)| flown.relocate(&places, names));
+            let moved = |(flown, _): &mut StoredFlight| flown.relocate(&places, part.rows_before, names);
+            part.rows.iter_mut().for_each(moved);
             all.rows.append(&mut part.rows);
             all.names.push_str(&part.names);
             all.settings.add_all(&part.settings);
@@ -136,29 +132,25 @@ impl KeyColumns {
 }
 
 /// Flights by unit, while they come in.
-#[derive(Debug)]
-pub(crate) struct RowsByUnit<R> {
+#[derive(Debug, Default)]
+pub(crate) struct RowsByUnit {
     /// Units by serial number; a serial number is unique only with its part number.
     by_serial: HashMap<String, Vec<usize>>,
-    units: Vec<(UnitKey, UnitRows<R>)>,
+    units: Vec<(UnitKey, UnitRows)>,
+    /// Number of rows that came in.
+    count: u32,
 }
 
 /// The parts of each unit's rows, in the order of the parts of the table.
-pub(crate) type PartsByUnit<R> = BTreeMap<UnitKey, Vec<UnitRows<R>>>;
+pub(crate) type PartsByUnit = BTreeMap<UnitKey, Vec<UnitRows>>;
 
-impl<R> Default for RowsByUnit<R> {
-    fn default() -> Self {
-        Self { by_serial: HashMap::new(), units: Vec::new() }
-    }
-}
-
-impl<R> RowsByUnit<R> {
+impl RowsByUnit {
     /// Reads the rows of a table: `read` gets the number of a row, the rows of its unit, to which it adds, and the index of
-    /// its place.
+    /// its place with the number of the row among all that came in.
     pub(crate) fn add_rows(
         &mut self,
         chunk: &TableBatch,
-        mut read: impl FnMut(usize, &mut UnitRows<R>, u32) -> Result<(), ingest::Error>,
+        mut read: impl FnMut(usize, &mut UnitRows, (u32, u32)) -> Result<(), ingest::Error>,
     ) -> Result<(), ingest::Error> {
         let mut keys = KeyColumns::of(chunk)?;
         for row in chunk.rows() {
@@ -169,7 +161,8 @@ impl<R> RowsByUnit<R> {
                 let places = &mut self.units[unit].1.places;
                 Ok((unit, place_number(places, keys.tails.get(row), keys.positions.get(row))))
             })?;
-            read(row, &mut self.units[unit].1, place)?;
+            read(row, &mut self.units[unit].1, (place, self.count))?;
+            self.count += 1;
         }
         Ok(())
     }
@@ -191,10 +184,10 @@ impl<R> RowsByUnit<R> {
 ///
 /// # Errors
 /// The first of the parts' errors.
-pub(crate) fn of_parts<R: Send>(
+pub(crate) fn of_parts(
     parts: usize,
-    put: impl Fn(&mut RowsByUnit<R>, usize) -> Result<(), Error> + Sync,
-) -> Result<PartsByUnit<R>, Error> {
+    put: impl Fn(&mut RowsByUnit, usize) -> Result<(), Error> + Sync,
+) -> Result<PartsByUnit, Error> {
     let share = parts.div_ceil(SHARES * rayon::current_num_threads()).max(1);
     let shares: Vec<usize> = (0..parts).step_by(share).collect();
     let rows = |first: &usize| {
@@ -202,30 +195,45 @@ pub(crate) fn of_parts<R: Send>(
         (*first..parts.min(first + share)).try_for_each(|part| put(&mut rows, part))?;
         Ok(rows)
     };
-    let of_shares: Vec<Result<RowsByUnit<R>, Error>> = shares.par_iter().map(rows).collect();
-    let mut found = PartsByUnit::new();
+    let of_shares: Vec<Result<RowsByUnit, Error>> = shares.par_iter().map(rows).collect();
+    let (mut found, mut rows_before) = (PartsByUnit::new(), 0);
     for rows in of_shares {
-        for (name, rows) in rows?.units {
-            found.entry(name).or_default().push(rows);
+        let RowsByUnit { units, count, .. } = rows?;
+        for (name, rows) in units {
+            found.entry(name).or_default().push(UnitRows { rows_before, ..rows });
         }
+        rows_before += count;
     }
     Ok(found)
 }
 
-/// The rows of the store by unit; `put` adds a batch.
+/// Further columns of the rows of the store, in the order of the rows: what `read` makes of a row of a batch.
 ///
 /// # Errors
-/// When a part cannot be read, and what `put` cannot take.
-pub(crate) fn of_store<R: Send>(
-    scan: &ColumnScan,
-    put: impl Fn(&mut RowsByUnit<R>, &TableBatch, &RecordBatch) -> Result<(), ingest::Error> + Sync,
-) -> Result<PartsByUnit<R>, Error> {
-    of_parts(scan.file_count(), |rows, part| {
-        scan.read(part)?.iter().try_for_each(|batch| {
-            let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-            Ok(put(rows, &chunk, batch)?)
-        })
-    })
+/// When a part cannot be read, and what `read` cannot take.
+pub(crate) fn further_columns<R: Send, F: Fn(usize) -> R>(
+    stored: &ColumnScan,
+    names: &[&str],
+    read: impl Fn(&TableBatch, &RecordBatch) -> Result<F, ingest::Error> + Sync,
+) -> Result<Vec<R>, Error> {
+    let scan = stored.with_columns(names)?;
+    let of_part = |part| {
+        let mut rows = Vec::new();
+        for (chunk, batch) in batches(&scan, part)? {
+            rows.extend(chunk.rows().map(read(&chunk, &batch)?));
+        }
+        Ok(rows)
+    };
+    let parts = (0..scan.file_count()).into_par_iter().map(of_part).collect::<Result<Vec<_>, Error>>()?;
+    let mut all = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    parts.into_iter().for_each(|part| all.extend(part));
+    Ok(all)
+}
+
+/// The rows of a part of the store, by name of column and as they are.
+pub(crate) fn batches(scan: &ColumnScan, part: usize) -> Result<Vec<(TableBatch, RecordBatch)>, Error> {
+    let named = |batch: RecordBatch| (TableBatch::new(Path::new("results"), batch.clone(), 0), batch);
+    Ok(scan.read(part)?.into_iter().map(named).collect())
 }
 
 /// The number of a row.

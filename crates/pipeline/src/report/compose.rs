@@ -4,26 +4,29 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use records::report_rows::{
     ReportFlight, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow, ReportTailRow,
 };
+use records::row_schema::NoColumn;
 use records::time::{days_after, days_between};
+use records::uncertainty::NORMAL_95;
 use records::{
     ChangePoint, Flight, Installation, Installations, PartNumber, QuantityRow, TrendRow, WorkRequest,
 };
-use store::{LogOutcome, LogRecord, Store};
+use store::{ColumnScan, LogOutcome, LogRecord, Query, Store};
 use trend::Forecast;
 
-use crate::assess::quantities::values::{FleetValues, READ};
+use crate::assess::quantities::values::{self, READ};
 use crate::assess::trends::{self, EarlierAssessments, ReportAssessments, StoreAssessment, UnitSelection};
 use crate::error::Error;
 use crate::findings::work_requests;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
-use crate::fleet::flight_row::FlightRow as FlownRow;
+use crate::fleet::builder;
+use crate::fleet::flight_row::{FlightRow as FlownRow, known};
 use crate::fleet::histories::{Histories, History, TailPosition, UnitKey as Name};
-use crate::report::flight_columns::{FlightExtras, StoreContents};
+use crate::report::flight_columns::{FlightDetails, flight_details};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -53,12 +56,13 @@ pub fn compose(
         processed_utc: account.processed_utc,
     };
     let mut log_errors: Vec<ReportLogErrorRow> = failed.map(log_error).collect();
-    let StoreContents { mut histories, mut extras, values, store_version } =
-        StoreContents::until(ask.as_of_utc, store)?;
+    let by_largest = config.parts_by_largest_gap();
+    let until_utc = ask.as_of_utc.and_then(|last| last.checked_add(SignedDuration::from_micros(1)).ok());
+    let mut histories = builder::of_store(store, &Query { until_utc, ..Query::default() }, &by_largest)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let ReportAssessments { fleet, drawn, earlier, priors } =
-        trends::assess_for_report(config, installations, &mut histories, &values, ask, &days)?;
+        trends::assess_for_report(config, installations, &mut histories, ask, &days)?;
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
@@ -69,21 +73,18 @@ pub fn compose(
     let mut tails = tails(&histories, config, as_of_utc);
     // An aircraft whose units flew on others alone has a page too: theirs lead to it.
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
-    let compose = ReportComposer {
-        config,
-        earlier: &earlier,
-        checks: checks.as_deref().unwrap_or(&[]),
-        installations,
-        quantities: by_unit(&followed.rows, |row| row.unit()),
-        values: &values,
-    };
+    let checks_known = checks.as_deref().unwrap_or(&[]);
+    let compose =
+        ReportComposer { config, earlier: &earlier, checks: checks_known, installations, by_largest };
+    let mut quantities = quantities(&followed.rows, &histories)?;
+    let mut details = histories.stored.as_deref().map(flight_details).transpose()?.unwrap_or_default();
     let unit = |(row, drawn): (TrendRow, &Forecast)| {
         let name = row.unit();
-        let extras = extras.remove(&name).unwrap_or_default();
         let work_requests = requests.remove(&name).unwrap_or_default();
+        let quantities = quantities.remove(&name).unwrap_or_default();
         let history = histories.units.get(&name);
-        let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), extras);
-        UnitView { work_requests, ..view }
+        let view = compose.unit(row, drawn, history.unwrap_or(&History::default()), &mut details);
+        UnitView { work_requests, quantities, ..view }
     };
     let units: Vec<UnitView> = now.into_iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.row.tail_number.as_deref()).collect();
@@ -99,7 +100,7 @@ pub fn compose(
     Ok(Report {
         made_utc,
         program: program.to_owned(),
-        store_version: Some(store_version),
+        store_version: histories.stored.as_deref().map(ColumnScan::version),
         scope,
         as_of_utc,
         newest_departure_utc,
@@ -124,6 +125,24 @@ fn by_unit<R>(rows: impl IntoIterator<Item = R>, unit: impl Fn(&R) -> Name) -> B
     units
 }
 
+/// The followed quantities other than the gap, with the values of the flights.
+fn quantities(
+    rows: &[QuantityRow],
+    histories: &Histories,
+) -> Result<BTreeMap<Name, Vec<QuantityView>>, Error> {
+    let mut views = Vec::new();
+    let Some(stored) = &histories.stored else { return Ok(BTreeMap::new()) };
+    for (index, (quantity, _)) in READ.into_iter().enumerate() {
+        let column = values::quantity(stored, index)?;
+        views.extend(rows.iter().filter(|row| row.quantity == quantity.as_str()).map(|row| {
+            let flights = histories.units.get(&row.unit()).map_or(&[][..], History::flights);
+            let values = flights.iter().map(|flown| column[flown.row as usize].0).collect();
+            QuantityView { row: row.clone(), values }
+        }));
+    }
+    Ok(by_unit(views, |view| view.row.unit()))
+}
+
 fn scope(ask: &UnitSelection) -> Option<String> {
     let tail = ask.tail_number.as_ref().map(|tail| format!("Tail {tail} only"));
     let serial = ask.serial_number.as_ref().map(|serial| format!("Serial {serial} only"));
@@ -138,8 +157,8 @@ struct ReportComposer<'a> {
     earlier: &'a EarlierAssessments,
     checks: &'a [InspectionRow],
     installations: &'a Installations,
-    quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
-    values: &'a FleetValues,
+    /// Parts whose gap is the largest along the stroke.
+    by_largest: BTreeSet<String>,
 }
 
 impl ReportComposer<'_> {
@@ -148,9 +167,10 @@ impl ReportComposer<'_> {
         row: TrendRow,
         drawn: &Forecast,
         history: &History,
-        extras: Vec<FlightExtras>,
+        details: &mut [FlightDetails],
     ) -> UnitView {
         let name = row.unit();
+        let is_by_largest = name.0.as_ref().is_some_and(|part| self.by_largest.contains(part));
         let installations: Vec<Installation> = self.installations.of_unit(&name).cloned().collect();
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let before = self.earlier.get(&1).and_then(|units| units.get(&name));
@@ -165,27 +185,16 @@ impl ReportComposer<'_> {
             forecast: forecast(drawn, &row),
             watch_m: part.and_then(|part| self.config.parts.get(&part)?.settings.watch_m),
             state_day_before: before.map(|row| row.state.map(str::to_owned)),
-            quality: quality(history, &extras, &row),
+            quality: quality(history, details, &row),
             events: events(&row, &installations),
             past_forecasts: self.past(&row, &name),
             inspections: checks.map(|check| compared(check, &row, history.flights())).collect(),
-            quantities: self.quantities(&name),
-            flights: flights(history, extras),
+            flights: flights(history, details, is_by_largest),
             installations,
             work_requests: Vec::new(),
+            quantities: Vec::new(),
             row,
         }
-    }
-
-    /// The followed quantities other than the gap, with the values of the flights.
-    fn quantities(&self, name: &Name) -> Vec<QuantityView> {
-        let values = self.values.get(name).map_or(&[][..], Vec::as_slice);
-        let view = |of: &&QuantityRow| {
-            let index = READ.iter().position(|(quantity, _)| quantity.as_str() == of.quantity)?;
-            let values = values.iter().map(|of_flight| of_flight.values[index].0).collect();
-            Some(QuantityView { row: (*of).clone(), values })
-        };
-        self.quantities.get(name).into_iter().flatten().filter_map(view).collect()
     }
 
     /// The forecasts that were made for the date of the report, and the level found.
@@ -263,14 +272,14 @@ fn events(row: &TrendRow, installations: &[Installation]) -> Vec<Event> {
     changes.iter().filter(|c| !changes.iter().any(|by| explained(by, c))).map(event).collect()
 }
 
-fn quality(history: &History, extras: &[FlightExtras], row: &TrendRow) -> Quality {
+fn quality(history: &History, details: &[FlightDetails], row: &TrendRow) -> Quality {
     let records = history.flights();
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
-    for (flown, extras) in records.iter().map(|flown| (flown, &extras[flown.row as usize])) {
+    for (flown, details) in records.iter().map(|flown| (flown, &details[flown.row as usize])) {
         if flown.gap_m().is_none() {
-            *reasons.entry(extras.reason.as_deref().unwrap_or_default().to_owned()).or_default() += 1;
+            *reasons.entry(details.reason.as_deref().unwrap_or_default().to_owned()).or_default() += 1;
         }
-        for flag in &extras.flags {
+        for flag in &details.flags {
             *doubts.entry(flag.to_string()).or_default() += 1;
         }
     }
@@ -298,11 +307,29 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
     counts
 }
 
-/// The flights of a unit, which share the names of its places.
-fn flights(history: &History, extras: Vec<FlightExtras>) -> Vec<ReportFlight> {
+/// The flights of a unit, which share the names of its places. The bounds of a gap that is the largest along the stroke are
+/// of that.
+fn flights(history: &History, details: &mut [FlightDetails], is_by_largest: bool) -> Vec<ReportFlight> {
     let shared = |name: &Option<String>| Arc::from(name.as_deref().unwrap_or_default());
     let mut names: Option<(&TailPosition, [Arc<str>; 2])> = None;
-    let row = |(flown, extras): (&FlownRow, FlightExtras)| {
+    let row = |flown: &FlownRow| {
+        let details = std::mem::take(&mut details[flown.row as usize]);
+        let [
+            unit_hours,
+            gap_p05_m,
+            gap_p95_m,
+            gap_midrange_m,
+            gap_largest_m,
+            gap_largest_se_m,
+            load_p05_n,
+            load_p95_n,
+            load_reversals,
+        ] = details.numbers.map(known);
+        let reach_m = gap_largest_se_m.map(|se_m| NORMAL_95 * se_m);
+        let (gap_p05_m, gap_p95_m) = match gap_largest_m.filter(|_| is_by_largest) {
+            Some(gap_m) => (reach_m.map(|reach_m| gap_m - reach_m), reach_m.map(|reach_m| gap_m + reach_m)),
+            None => (gap_p05_m, gap_p95_m),
+        };
         let place = history.place(flown);
         let known = names.take().filter(|(of, _)| *of == place);
         let shared = || (place, [&place.tail_number, &place.position].map(shared));
@@ -313,20 +340,29 @@ fn flights(history: &History, extras: Vec<FlightExtras>) -> Vec<ReportFlight> {
             tail_number: Arc::clone(tail_number),
             position: Arc::clone(position),
             gap_m: flown.gap_m(),
-            remarks: remarks(flown, &extras),
-            ..extras.shown
+            remarks: remarks(flown, &details),
+            unit_hours,
+            gap_p05_m,
+            gap_p95_m,
+            gap_midrange_m,
+            gap_largest_m: NoColumn(gap_largest_m),
+            profile: NoColumn(details.profile),
+            load_reversals: load_reversals.map(|n| n as i64),
+            load_p05_n,
+            load_p95_n,
+            ..ReportFlight::default()
         }
     };
-    history.flights().iter().zip(extras).map(row).collect()
+    history.flights().iter().map(row).collect()
 }
 
 /// Rejection reason, or quality flags with the most severe first.
-fn remarks(flown: &FlownRow, extras: &FlightExtras) -> Box<str> {
-    let reason = extras.reason.as_deref().map(|reason| match flown.gap_m() {
+fn remarks(flown: &FlownRow, details: &FlightDetails) -> Box<str> {
+    let reason = details.reason.as_deref().map(|reason| match flown.gap_m() {
         None => format!("refused: {reason}"),
         Some(_) => reason.to_owned(),
     });
-    let others = extras.flags.iter().filter(|flag| Some(*flag) != extras.reason.as_ref());
+    let others = details.flags.iter().filter(|flag| Some(*flag) != details.reason.as_ref());
     reason.into_iter().chain(others.map(ToString::to_string)).collect::<Vec<_>>().join(", ").into()
 }
 

@@ -128,14 +128,14 @@ pub(crate) fn execute_run(
     let inspections = inspections::read(config)?.unwrap_or_default();
     let maintenance = maintenance_log::read(config)?;
     let found = discover::discover(config)?;
-    let store = Store::create_or_open(config.store())?.by_largest_gap(config.parts_by_largest_gap());
+    let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(&Holder::this_process(), context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let started_utc = Timestamp::now();
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed;
-    report.unknown_units = unknown_units(config, &installations);
+    report.unknown_units = unknown_units(config, &installations, &maintenance, &inspections);
     let others = maintenance_log::dates(&maintenance).chain(inspections.iter().map(InspectionRow::date));
     report.dates_ahead = dates_ahead(&installations, others, started_utc);
     let config_path = config.file.display().to_string();
@@ -199,6 +199,7 @@ pub(crate) fn execute_run(
     let follow_up = FollowUp {
         config,
         installations: &inputs.installations,
+        maintenance: &maintenance,
         run_id: &report.run_id,
         is_partial: report.not_reached + report.left > 0,
         stop: context.stop,

@@ -1,25 +1,25 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::assess::backtest;
 use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
-use pipeline::fleet::histories::Histories;
 use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
+use store::Store;
 
 use crate::fleet::{self, config, day};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
 
-/// What a store of some records reads back.
-fn histories(rows: &[GapRecord]) -> Histories {
-    let folder = tempfile::tempdir().unwrap();
+/// A store of some records, below a folder.
+fn store(folder: &Path, rows: &[GapRecord]) -> Store {
     let results: Vec<_> = rows.iter().map(|row| fleet::result(vec![row.clone()])).collect();
-    trends::load_histories(&fleet::store(folder.path(), &results)).unwrap()
+    fleet::store(folder, &results)
 }
 
 /// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
@@ -41,20 +41,21 @@ fn unit(record: &GapRecord) -> i32 {
     record.serial_number.as_str()[1..].parse().unwrap()
 }
 
-/// Assessments of the units of some histories.
-fn assess_histories(
+/// Assessments of the units of some records.
+fn assess_rows(
     config: &Config,
     installations: &Installations,
-    histories: Histories,
+    rows: &[GapRecord],
     ask: &UnitSelection,
 ) -> Vec<TrendRow> {
-    trends::assess(config, installations, Some(histories), None, ask).unwrap().now
+    let folder = tempfile::tempdir().unwrap();
+    trends::assess_store(config, installations, &store(folder.path(), rows), ask).unwrap().now
 }
 
 /// Assessments of all units at a date, by default that of the newest record.
 fn assess_with(config: &Config, flown: &[GapRecord], as_of_utc: Option<Timestamp>) -> Vec<TrendRow> {
     let ask = UnitSelection { as_of_utc, ..UnitSelection::default() };
-    assess_histories(config, &Installations::default(), histories(flown), &ask)
+    assess_rows(config, &Installations::default(), flown, &ask)
 }
 
 fn assess(flown: &[GapRecord], as_of: Timestamp) -> Vec<TrendRow> {
@@ -119,7 +120,7 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
     let installed = |unit| installation(unit, (unit == 3).then(|| "2024-07-20T00:00:00Z".parse().unwrap()));
     let installations = Installations::new((0..14).map(installed).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
-    let rows = assess_histories(&config(), &installations, histories(&flown(200)), &ask);
+    let rows = assess_rows(&config(), &installations, &flown(200), &ask);
     for row in &rows {
         let is_removed = row.serial_number == "S03";
         assert_eq!(row.state.is_none(), is_removed, "{row:?}");
@@ -139,7 +140,9 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
 
 #[test]
 fn a_fleet_without_a_failure_is_compared_with_the_levels_that_it_has_reached() {
-    let past = backtest::of_histories(&config(), &Installations::default(), histories(&flown(700))).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let histories = trends::load_histories(&store(folder.path(), &flown(700)), &BTreeSet::new()).unwrap();
+    let past = backtest::of_histories(&config(), &Installations::default(), histories).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
         let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;
@@ -177,7 +180,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight.flight_id.as_str().ends_with(['1', '3', '5', '7', '9']));
         logged.iter_mut().for_each(|row| row.flight.tail_hours_end = None);
-        assess_histories(config, &installations, histories(&logged), &ask)
+        assess_rows(config, &installations, &logged, &ask)
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in assess(&config_with).iter().zip(assess(&config())).enumerate() {
@@ -288,7 +291,7 @@ fn a_step_of_all_units_of_a_tail_is_reported_as_one_of_its_sensors() {
         serial_number: Some("S02".into()),
         ..UnitSelection::default()
     };
-    let alone = assess_histories(&config(), &Installations::default(), histories(&rows), &ask);
+    let alone = assess_rows(&config(), &Installations::default(), &rows, &ask);
     assert_eq!(alone, assess[2..3]);
 }
 

@@ -7,17 +7,13 @@
 //! reads ([`Store::joined`]), so that a corrected table counts at once. What was written with the records is what other
 //! programs read.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{AsArray, Float64Array, RecordBatch};
-use arrow::compute::kernels::numeric::{add, mul, sub};
-use arrow::compute::kernels::zip::zip;
-use arrow::compute::{and_kleene, cast, filter_record_batch, is_not_null};
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::array::RecordBatch;
+use arrow::compute::filter_record_batch;
+use arrow::datatypes::{Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
-use records::uncertainty::NORMAL_95;
 use records::{GapRecord, Status};
 
 use crate::delta::snapshot::Snapshot;
@@ -26,13 +22,14 @@ use crate::handle::{Join, Store};
 use crate::read::query::Query;
 use crate::read::scan::{self, Condition};
 
-/// Columns that bookkeeping supplies.
+/// Columns that bookkeeping supplies, and those of them that a query has conditions on.
+const BOOKED: [&str; 5] = ["part_number", "serial_number", "unit_hours", "flight_hours", "tail_hours_end"];
 const JOINED: [&str; 2] = ["part_number", "serial_number"];
 /// Columns that a join needs besides those that it supplies.
 const NEEDED: [&str; 4] = ["tail_number", "position", "departure_utc", "flight_id"];
 
 /// Scan of the files that may hold matching records, in one version of the table.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct ColumnScan {
     store: Store,
     files: Vec<PathBuf>,
@@ -53,10 +50,7 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
     pub fn scan_columns(&self, query: &Query, names: &[&str]) -> Result<ColumnScan, Error> {
-        let is_replaced = !self.parts_by_largest_gap.is_empty() && names.contains(&"gap_m");
-        let needed = LARGEST.into_iter().filter(|name| is_replaced && !names.contains(name));
-        let names: Vec<&str> = names.iter().copied().chain(needed).collect();
-        Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), &names)?))
+        Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), names)?))
     }
 
     /// The scan of one version of the table.
@@ -84,17 +78,23 @@ impl Store {
         self.join = Some(Join(Arc::new(join)));
         self
     }
-
-    /// The same store, whose [scans](Store::scan_columns) return the largest gap along the stroke as the gap of these parts,
-    /// where the gap varies.
-    #[must_use]
-    pub fn by_largest_gap(mut self, parts: BTreeSet<String>) -> Self {
-        self.parts_by_largest_gap = parts;
-        self
-    }
 }
 
 impl ColumnScan {
+    /// Other columns of the same rows, in the same order.
+    ///
+    /// # Errors
+    /// For a name that no column has.
+    pub fn with_columns(&self, names: &[&str]) -> Result<Self, Error> {
+        let mut scan = Self { wanted: scan::only(&GapRecord::schema(), names)?, ..self.clone() };
+        if self.joined.is_empty() && !BOOKED.iter().any(|name| names.contains(name)) {
+            // The join costs as much as all columns.
+            scan.store.join = None;
+        }
+        scan.read = if scan.store.join.is_some() { widened(&scan.wanted) } else { Arc::clone(&scan.wanted) };
+        Ok(scan)
+    }
+
     /// Number of files to read.
     pub fn file_count(&self) -> usize {
         self.files.len()
@@ -111,15 +111,10 @@ impl ColumnScan {
     /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
     /// [`Error::Arrow`] when it cannot be read.
     pub fn read(&self, part: usize) -> Result<Vec<RecordBatch>, Error> {
-        let rows = self.read_file(&self.files[part])?;
-        let parts = &self.store.parts_by_largest_gap;
-        if parts.is_empty() {
-            return Ok(rows);
-        }
-        rows.into_iter().map(|batch| Ok(with_largest_gaps(batch, parts)?)).collect()
+        self.read_file(&self.files[part])
     }
 
-    /// The matching rows of all files, each with its own gap, in one batch or more.
+    /// The matching rows of all files, in one batch or more.
     pub(crate) fn read_all(&self) -> Result<Vec<RecordBatch>, Error> {
         // A joined condition applies to each file as soon as it is read, or all rows of the store would be held.
         scan::read_each(&self.files, &self.wanted, |file| self.read_file(file))
@@ -153,33 +148,4 @@ fn widened(wanted: &SchemaRef) -> SchemaRef {
     let fields: Vec<Field> =
         wanted.fields().iter().map(|field| field.as_ref().clone()).chain(missing).collect();
     Arc::new(Schema::new(fields))
-}
-
-/// The columns that [`with_largest_gaps`] needs.
-const LARGEST: [&str; 3] = ["gap_largest_m", "gap_largest_se_m", "part_number"];
-
-/// Replaces `gap_m`, its error and its bounds by the largest gap along the stroke, in records of these parts in which the
-/// gap varies.
-fn with_largest_gaps(batch: RecordBatch, parts: &BTreeSet<String>) -> Result<RecordBatch, ArrowError> {
-    let [Some(largest_m), Some(errors_m), Some(of_part)] = LARGEST.map(|name| batch.column_by_name(name))
-    else {
-        return Ok(batch);
-    };
-    let of_part = cast(of_part, &DataType::Utf8)?;
-    let is_of_part = of_part.as_string::<i32>().iter().map(|part| part.map(|part| parts.contains(part)));
-    let mask = and_kleene(&is_of_part.collect(), &is_not_null(largest_m)?)?;
-    let reach_m = mul(errors_m, &Float64Array::new_scalar(NORMAL_95))?;
-    let replaced = [
-        ("gap_m", Arc::clone(largest_m)),
-        ("gap_se_m", Arc::clone(errors_m)),
-        ("gap_p05_m", sub(largest_m, &reach_m)?),
-        ("gap_p95_m", add(largest_m, &reach_m)?),
-    ];
-    let mut columns = batch.columns().to_vec();
-    for (name, with) in replaced {
-        if let Ok(at) = batch.schema_ref().index_of(name) {
-            columns[at] = zip(&mask, &with, &columns[at])?;
-        }
-    }
-    RecordBatch::try_new(batch.schema(), columns)
 }

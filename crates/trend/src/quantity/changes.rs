@@ -105,7 +105,7 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
         while model.steps.len() < MAX_STEPS && model.add_best() {}
         while model.remove_worst() {}
     }
-    let (beta, covariance) = model.solve()?;
+    let (beta, covariance) = model.solve_with(model.has_drift)?;
     let (x_first, x_last) = (model.row(0), model.row(sound.len().checked_sub(1)?));
     let variance = |x: &Row| (x.transpose() * covariance * x)[(0, 0)].max(0.0);
     let moved = x_last - x_first;
@@ -220,10 +220,6 @@ impl<'a> Model<'a> {
         Some((factor.solve(&right), factor.inverse()))
     }
 
-    fn solve(&self) -> Option<(Row, Square)> {
-        self.solve_with(self.has_drift)
-    }
-
     /// The same with a drift; none where usage is constant.
     fn solve_with_drift(&self) -> Option<(Row, Square)> {
         self.solve_with(true).filter(|_| self.half_span_hours > 0.0)
@@ -237,8 +233,7 @@ impl<'a> Model<'a> {
             with_drift.map_or(0.0, |(beta, covariance)| beta[DRIFT].powi(2) / covariance[(DRIFT, DRIFT)]);
         let (step_gain, at) = self.best_step();
         // A drift explains with one number what steps would follow in stairs.
-        let excess = (drift_gain / DRIFT_GAIN, step_gain / STEP_GAIN);
-        if excess.0.max(excess.1) < 1.0 {
+        if (drift_gain / DRIFT_GAIN).max(step_gain / STEP_GAIN) < 1.0 {
             return false;
         }
         if drift_gain + STEP_GAIN - DRIFT_GAIN >= step_gain {
@@ -252,21 +247,21 @@ impl<'a> Model<'a> {
 
     /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.
     fn best_step(&self) -> (f64, usize) {
-        let Some((beta, covariance)) = self.solve() else { return (0.0, 0) };
-        let (mut best, columns) = ((0.0, 0), self.columns());
-        let over_columns = |term: &dyn Fn(usize) -> f64| columns.clone().map(term).sum::<f64>();
+        let Some((beta, covariance)) = self.solve_with(self.has_drift) else { return (0.0, 0) };
+        let (mut best, columns) = ((0.0, 0), self.columns().collect::<Vec<_>>());
         let (mut residual, mut weight, mut shared) = (0.0, 0.0, Row::zeros());
         for (index, value) in self.values.iter().enumerate().rev() {
             let row = self.row(index);
             let w = self.weights[index];
-            residual += w * (value.value - over_columns(&|c| row[c] * beta[c]));
+            residual += w * (value.value - columns.iter().map(|&c| row[c] * beta[c]).sum::<f64>());
             weight += w;
             shared.axpy(w, &row, 1.0);
             if !self.is_free(index) {
                 continue;
             }
-            let of_column = |c: usize| over_columns(&|other| shared[other] * covariance[(other, c)]);
-            let own = weight - over_columns(&|c| of_column(c) * shared[c]);
+            let of_column =
+                |c: usize| columns.iter().map(|&other| shared[other] * covariance[(other, c)]).sum::<f64>();
+            let own = weight - columns.iter().map(|&c| of_column(c) * shared[c]).sum::<f64>();
             if own > 1e-9 * weight && residual * residual / own > best.0 {
                 best = (residual * residual / own, index);
             }
@@ -282,7 +277,7 @@ impl<'a> Model<'a> {
 
     /// Removes the least significant regressor, if it is not significant in addition to the others.
     fn remove_worst(&mut self) -> bool {
-        let Some((beta, covariance)) = self.solve() else { return false };
+        let Some((beta, covariance)) = self.solve_with(self.has_drift) else { return false };
         let gain = |column: &usize| {
             let needed = if *column == DRIFT { DRIFT_GAIN } else { STEP_GAIN };
             beta[*column] * beta[*column] / covariance[(*column, *column)] / needed

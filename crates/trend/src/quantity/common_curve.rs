@@ -65,7 +65,8 @@ impl CommonCurve {
         let noise: f64 = curve.iter().map(|week| week.variance).sum();
         let seen: f64 = curve.iter().map(|week| week.value * week.value).sum();
         let kept = if seen > 0.0 { (1.0 - noise / seen).max(0.0) } else { 0.0 };
-        Self { weeks: curve.into_iter().map(|week| (week.week, kept * week.value)).collect() }
+        let kept_weeks = curve.into_iter().filter(|_| kept > 0.0);
+        Self { weeks: kept_weeks.map(|week| (week.week, kept * week.value)).collect() }
     }
 
     /// Takes the curve off the values of a unit, in order of departure.

@@ -33,47 +33,50 @@ impl Slopes {
     /// Fits the slopes to the values of all units of a part, each in order of departure. A slope that is not
     /// significant is zero.
     pub fn fit<'a>(units: impl Iterator<Item = &'a [QuantityValue]> + Clone) -> Self {
-        let all = || units.clone().flatten();
-        let temperature_c = median(all().filter_map(|v| v.temperature_c).collect()).unwrap_or_default();
-        let ln_load = median(all().filter_map(|v| v.ln_load).collect()).unwrap_or_default();
-        let slopes = Self { temperature_c, ln_load, ..Self::default() };
-        let differences: Vec<(f64, Vector2<f64>)> = units.flat_map(differences).collect();
-        let Some((beta, covariance)) = huber(&differences) else { return slopes };
-        let significant = |k: usize| {
-            if beta[k].abs() > SIGNIFICANT * covariance[(k, k)].sqrt() { beta[k] } else { 0.0 }
+        let differences = || units.clone().flat_map(differences);
+        let is_varied = differences().any(|(_, covariates)| covariates != Vector2::zeros());
+        let fitted = is_varied.then(|| huber(&differences().collect::<Vec<_>>())).flatten();
+        let Some((beta, covariance)) = fitted else { return Self::default() };
+        let [per_celsius, per_ln_load] = [0, 1]
+            .map(|k| if beta[k].abs() > SIGNIFICANT * covariance[(k, k)].sqrt() { beta[k] } else { 0.0 });
+        let middle = move |of: fn(&QuantityValue) -> f64| {
+            let known = units.clone().flatten().map(of).filter(|number| !number.is_nan());
+            median(known.collect()).unwrap_or_default()
         };
-        Self { per_celsius: significant(0), per_ln_load: significant(1), ..slopes }
+        let (temperature_c, ln_load) = (middle(|v| v.temperature_c), middle(|v| v.ln_load));
+        Self { per_celsius, per_ln_load, temperature_c, ln_load }
     }
 
     /// The value at the middle temperature and load.
     pub fn adjusted(&self, value: &QuantityValue) -> f64 {
-        let by_temperature = value.temperature_c.map_or(0.0, |t| self.per_celsius * (t - self.temperature_c));
-        let by_load = value.ln_load.map_or(0.0, |l| self.per_ln_load * (l - self.ln_load));
-        value.value - by_temperature - by_load
+        let by_temperature = known(self.per_celsius * (value.temperature_c - self.temperature_c));
+        value.value - by_temperature - known(self.per_ln_load * (value.ln_load - self.ln_load))
     }
 }
 
 /// Differences of successive values, and of their covariates; of a covariate that is not known, zero.
 fn differences(values: &[QuantityValue]) -> impl Iterator<Item = (f64, Vector2<f64>)> {
     values.array_windows().map(|[a, b]| {
-        let of = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| b - a);
-        (b.value - a.value, Vector2::new(of(a.temperature_c, b.temperature_c), of(a.ln_load, b.ln_load)))
+        let covariates = Vector2::new(known(b.temperature_c - a.temperature_c), known(b.ln_load - a.ln_load));
+        (b.value - a.value, covariates)
     })
+}
+
+/// An effect of covariates; zero where one is not known.
+fn known(effect: f64) -> f64 {
+    if effect.is_nan() { 0.0 } else { effect }
 }
 
 /// Robust regression through the origin by reweighted least squares; a covariate that never varies has slope zero.
 fn huber(rows: &[(f64, Vector2<f64>)]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    if rows.len() < MIN_DIFFERENCES || rows.iter().all(|(_, x)| *x == Vector2::zeros()) {
+    if rows.len() < MIN_DIFFERENCES {
         return None;
     }
-    let mut beta = Vector2::zeros();
-    let mut covariance = Matrix2::zeros();
+    let (mut beta, mut covariance) = (Vector2::zeros(), Matrix2::zeros());
     for _ in 0..ITERATIONS {
         let residual = |(y, x): &(f64, Vector2<f64>)| y - x.dot(&beta);
-        let scale = SD_OVER_MAD * median(rows.iter().map(|row| residual(row).abs()).collect())?;
-        if scale.is_nan() || scale <= 0.0 {
-            return None;
-        }
+        let spread = median(rows.iter().map(|row| residual(row).abs()).collect());
+        let scale = spread.map(|middle| SD_OVER_MAD * middle).filter(|scale| *scale > 0.0)?;
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for row in rows {
             let weight = (HUBER * scale / residual(row).abs()).min(1.0);

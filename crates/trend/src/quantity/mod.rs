@@ -23,8 +23,8 @@ pub struct QuantityValue {
     pub value: f64,
     /// Its standard error; zero where none is stated.
     pub se: f64,
-    /// Mean temperature of the flight, °C, where it is known.
-    pub temperature_c: Option<f64>,
-    /// Natural logarithm of the flight's 95 % load, where it is known.
-    pub ln_load: Option<f64>,
+    /// Mean temperature of the flight, °C; NaN where it is not known.
+    pub temperature_c: f64,
+    /// Natural logarithm of the flight's 95 % load; NaN where it is not known.
+    pub ln_load: f64,
 }

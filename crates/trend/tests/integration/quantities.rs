@@ -115,8 +115,8 @@ fn temperature_and_load_are_taken_off_by_slopes_that_a_part_shares() {
             let season = 15.0 * (k as f64 / 200.0 * 1.5).sin();
             let temperature_c = 5.0 + season + 8.0 * random.normal();
             let ln_load = 8.5 + 0.2 * random.normal();
-            value.temperature_c = Some(temperature_c);
-            value.ln_load = Some(ln_load);
+            value.temperature_c = temperature_c;
+            value.ln_load = ln_load;
             value.value += -0.01 * (temperature_c - 5.0) + 0.5 * (ln_load - 8.5);
         }
         units.push(values);

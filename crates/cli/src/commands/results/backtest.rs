@@ -22,9 +22,10 @@ const SHARES: [(f64, f64, &str); 4] = [
 /// Prints a summary table, or one row per past forecast in the machine-readable formats.
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
+    let by_largest = config.parts_by_largest_gap();
     let histories = match &args.external.estimates {
-        Some(file) => pipeline::fleet::external_estimates::read(file, &config.parts_by_largest_gap())?,
-        None => trends::load_histories(&pipeline::open_store(&config, &installations)?)?,
+        Some(file) => pipeline::fleet::external_estimates::read(file, &by_largest)?,
+        None => trends::load_histories(&pipeline::open_store(&config, &installations)?, &by_largest)?,
     };
     let found = backtest::of_histories(&config, &installations, histories)?;
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;

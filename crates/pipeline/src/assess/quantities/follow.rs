@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use rayon::prelude::*;
-use records::{ChangeScope, QuantityChange, QuantityRow};
+use records::{ChangeScope, Quantity, QuantityChange, QuantityRow};
+use store::ColumnScan;
 use trend::quantity::MIN_FLIGHTS;
-use trend::quantity::changes::QuantityStep;
+use trend::quantity::changes::{QuantityChanges, QuantityStep};
 use trend::quantity::common_curve::CommonCurve;
 use trend::quantity::covariates::Slopes;
 
@@ -14,8 +15,10 @@ use crate::assess::limits::Limits;
 use crate::assess::quantities::attribution::common_steps;
 use crate::assess::quantities::limits::Treatment;
 use crate::assess::quantities::rows;
-use crate::assess::quantities::subject::{Subject, fit_all};
-use crate::assess::quantities::values::{FollowedUnits, READ, Units, by_position};
+use crate::assess::quantities::subject::{QuantityColumns, Subject, fit_all};
+use crate::assess::quantities::values::{self, Covariates, FollowedUnits, READ, Units, by_position};
+use crate::error::Error;
+use crate::findings::monitoring::recent::RecentFlights;
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -37,29 +40,44 @@ pub struct FollowedQuantities {
     pub changes: Vec<QuantityChange>,
 }
 
+/// Follows the quantities of all units, and adds their values to the recent flights.
 pub(crate) fn follow(
     units: &FollowedUnits<'_>,
     fleet: &Units<'_>,
+    (stored, covariates): (&ColumnScan, &[Covariates]),
+    recent: &mut RecentFlights<'_>,
     limits: Limits<'_>,
     as_of: Timestamp,
-) -> FollowedQuantities {
+) -> Result<FollowedQuantities, Error> {
     let positions = by_position(units);
-    let of_quantity = |index: usize| {
-        let usual = Treatment::of(READ[index].0, &limits.quantities(None));
-        let units = if usual.is_of_channel { &positions } else { units };
-        let subjects = units
-            .par_iter()
-            .filter_map(|(name, unit)| Subject::new(name, unit, &fleet.get(*name)?.1, limits, index));
-        follow_quantity(subjects.collect(), usual.limit, as_of)
-    };
     let mut all = FollowedQuantities::default();
     // One after the other: the values of one quantity of a whole fleet take hundreds of megabytes.
-    for of_quantity in (0..READ.len()).map(of_quantity) {
+    for (index, (quantity, _)) in READ.into_iter().enumerate() {
+        let usual = Treatment::of(quantity, &limits.quantities(None));
+        let units = if usual.is_of_channel { &positions } else { units };
+        // In `READ`, its parts follow the friction.
+        let parts = match quantity {
+            Quantity::FrictionN => {
+                Some([values::quantity(stored, index + 1)?, values::quantity(stored, index + 2)?])
+            }
+            _ => None,
+        };
+        let columns =
+            QuantityColumns { quantity, values: values::quantity(stored, index)?, parts, covariates };
+        for flight in recent.values_mut().flatten() {
+            flight.values[index] = columns.values[flight.row as usize].0;
+        }
+        let subjects = units
+            .par_iter()
+            .filter_map(|(name, unit)| Subject::new(name, unit, &fleet.get(*name)?.1, limits, &columns));
+        let subjects = subjects.collect();
+        drop(columns);
+        let of_quantity = follow_quantity(subjects, usual.limit, as_of);
         all.rows.extend(of_quantity.rows);
         all.changes.extend(of_quantity.changes);
     }
     all.changes.sort_by(|a, b| b.since_utc.cmp(&a.since_utc).then_with(|| a.quantity.cmp(b.quantity)));
-    all
+    Ok(all)
 }
 
 /// Follows one quantity of all units, sorted by part. `limit` is the usual change, over the scale, from which there is a
@@ -131,17 +149,27 @@ fn take_off_moves(subjects: &mut [Subject<'_>]) {
 fn take_off_curves(subjects: &mut [Subject<'_>]) {
     parts(subjects).for_each(|part| {
         let all = curve(part.iter());
-        let follows = |subject: &Subject<'_>| {
+        let fitted = |subject: &Subject<'_>| {
+            if all == CommonCurve::default() && subject.is_fitted {
+                return subject.fit.clone();
+            }
             let mut left = subject.values.clone();
             all.take_off(&mut left);
-            subject.fitted(&left).is_none_or(|fit| {
+            subject.fitted(&left)
+        };
+        let fits: Vec<Option<QuantityChanges>> = part.par_iter().map(fitted).collect();
+        let follows = |fit: &Option<QuantityChanges>| {
+            fit.as_ref().is_none_or(|fit| {
                 fit.change == 0.0 && fit.rate_per_hour.is_none_or(|(rate, se)| rate.abs() <= DEPARTS_SE * se)
             })
         };
-        let follows: Vec<bool> = part.par_iter().map(follows).collect();
-        let curve =
-            curve(part.iter().zip(follows).filter_map(|(subject, follows)| follows.then_some(subject)));
-        part.iter_mut().for_each(|subject| curve.take_off(&mut subject.values));
+        let common =
+            curve(part.iter().zip(&fits).filter_map(|(subject, fit)| follows(fit).then_some(subject)));
+        let is_same = common == all;
+        part.par_iter_mut().zip(fits).for_each(|(subject, fit)| {
+            common.take_off(&mut subject.values);
+            (subject.fit, subject.is_fitted) = (fit, is_same);
+        });
     });
 }
 

@@ -9,7 +9,7 @@ use trend::quantity::changes::{self, QuantityChanges, QuantityStep};
 
 use crate::assess::limits::Limits;
 use crate::assess::quantities::limits::{Scale, Treatment};
-use crate::assess::quantities::values::{FlightValues, FollowedFlights, READ};
+use crate::assess::quantities::values::{Covariates, FollowedFlights, QuantityColumn};
 use crate::findings::monitoring::median;
 use crate::fleet::flight_row::FlightRow;
 use crate::fleet::histories::{TailPosition, UnitKey};
@@ -27,46 +27,51 @@ pub(crate) struct Subject<'a> {
     pub(crate) values: Vec<QuantityValue>,
     /// Changes of the values as they are: at the end, those of the unit alone.
     pub(crate) fit: Option<QuantityChanges>,
+    /// Whether the values are those that were fitted.
+    pub(crate) is_fitted: bool,
     /// Steps of tail or part, with their scope.
     pub(crate) common: Vec<(QuantityStep, ChangeScope)>,
 }
 
 impl<'a> Subject<'a> {
-    /// The series of one quantity, by its index in [`READ`], of one unit; none without a value.
+    /// The series of one quantity of one unit; none without a value.
     pub(crate) fn new(
         name: &'a UnitKey,
         unit: &'a FollowedFlights<'a>,
         series: &Series,
         limits: Limits<'_>,
-        index: usize,
+        columns: &QuantityColumns<'_>,
     ) -> Option<Self> {
-        let quantity = READ[index].0;
+        let quantity = columns.quantity;
         let treatment = Treatment::of(quantity, &limits.quantities(name.0.as_deref()));
-        let (last, _) = unit.flights.last()?;
+        let last = unit.flights.last()?;
         // The channels of a position have no hours and no maintenance of their own.
         let series = Some(series).filter(|_| !treatment.is_of_channel);
         let maintained = series.and_then(|s| s.maintenance_until(last.departure_us()).last());
-        let moved = unit.flights.iter().rposition(|(flown, _)| flown.place != last.place);
+        let moved = unit.flights.iter().rposition(|flown| flown.place != last.place);
         let begin = moved.filter(|_| treatment.is_of_position).map_or(0, |k| k + 1);
         let followed = unit.flights[begin..]
             .iter()
-            .filter(|(flown, _)| maintained.is_none_or(|done| flown.departure_us() >= done.utc_us));
+            .filter(|flown| maintained.is_none_or(|done| flown.departure_us() >= done.utc_us));
         let mut by_usage = series.map_or(&[][..], Series::flights).iter().peekable();
         let mut usage_hours = None;
-        let value = |(k, (flown, of_flight)): (usize, &(&FlightRow, &FlightValues))| {
+        let known = |number: f32, beyond: f32| {
+            if number.is_finite() && number > beyond { f64::from(number) } else { f64::NAN }
+        };
+        let value = |(k, flown): (usize, &FlightRow)| {
             let departure_us = flown.departure_us();
             while let Some(flight) = by_usage.next_if(|flight| flight.departure_us <= departure_us) {
                 usage_hours = Some(flight.hours);
             }
-            let (value, se) = value_of(quantity, of_flight, index, unit.usual_load_n)?;
-            let known = |number: f32| number.is_finite().then_some(f64::from(number));
+            let (value, se) = columns.at(flown, unit.usual_load_n)?;
+            let Covariates { temperature_c, load_p95_n, .. } = columns.covariates[flown.row as usize];
             Some(QuantityValue {
                 departure_us,
                 usage_hours: usage_hours.unwrap_or(k as f64),
                 value,
                 se,
-                temperature_c: known(of_flight.temperature_c),
-                ln_load: known(of_flight.load_p95_n).filter(|n| *n > 0.0).map(f64::ln),
+                temperature_c: known(temperature_c, f32::MIN),
+                ln_load: known(load_p95_n, 0.0).ln(),
             })
         };
         let values: Vec<QuantityValue> = followed.enumerate().filter_map(value).collect();
@@ -75,8 +80,9 @@ impl<'a> Subject<'a> {
             Scale::UsualLoad => unit.usual_load_n?,
             Scale::Median => median(values.iter().map(|v| v.value.abs()).collect()),
         };
-        let (fit, common, is_followed) = (None, Vec::new(), !values.is_empty() && scale > 0.0);
-        is_followed.then_some(Self { name, unit, quantity, scale, treatment, values, fit, common })
+        let (fit, is_fitted, common) = (None, false, Vec::new());
+        let is_followed = !values.is_empty() && scale > 0.0;
+        is_followed.then_some(Self { name, unit, quantity, scale, treatment, values, fit, is_fitted, common })
     }
 
     /// Fits steps and drift to some values of the subject.
@@ -95,13 +101,13 @@ impl<'a> Subject<'a> {
     }
 
     pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&'a str> {
-        let at = self.unit.flights.partition_point(|(flown, _)| flown.departure_us() < departure_us);
-        self.unit.place(self.unit.flights.get(at)?.0).tail_number.as_deref()
+        let at = self.unit.flights.partition_point(|flown| flown.departure_us() < departure_us);
+        self.unit.place(self.unit.flights.get(at)?).tail_number.as_deref()
     }
 
     /// Where the last flight was flown.
     pub(crate) fn last_place(&self) -> Option<&'a TailPosition> {
-        Some(self.unit.place(self.unit.flights.last()?.0))
+        Some(self.unit.place(self.unit.flights.last()?))
     }
 
     pub(crate) fn tail(&self) -> Option<&'a str> {
@@ -115,30 +121,39 @@ impl<'a> Subject<'a> {
         }
         let after = self.values.iter_mut().filter(|v| v.departure_us >= step.departure_us);
         after.for_each(|v| v.value -= step.size);
+        self.is_fitted = false;
         self.common.push((step, scope));
     }
 }
 
-/// Value and standard error of a flight. Friction is taken at the unit's usual load, so that a flight under less load
-/// has not less friction.
-fn value_of(
-    quantity: Quantity,
-    flight: &FlightValues,
-    index: usize,
-    usual_load_n: Option<f64>,
-) -> Option<(f64, f64)> {
-    let (value, se) = flight.values[index];
-    let se = if se.is_finite() { f64::from(se.max(0.0)) } else { 0.0 };
-    if quantity == Quantity::FrictionN
-        && let (Some(dry_n), Some(share), Some(load_n)) =
-            (flight.of(Quantity::FrictionDryN), flight.of(Quantity::FrictionLoadShare), usual_load_n)
-    {
-        return Some((dry_n + share * load_n, se));
+/// What the values of one quantity are made from.
+pub(crate) struct QuantityColumns<'a> {
+    pub(crate) quantity: Quantity,
+    pub(crate) values: QuantityColumn,
+    /// Of the friction, its dry part and its share of the load.
+    pub(crate) parts: Option<[QuantityColumn; 2]>,
+    pub(crate) covariates: &'a [Covariates],
+}
+
+impl QuantityColumns<'_> {
+    /// Value and standard error of a flight. Friction is taken at the unit's usual load, so that a flight under less load
+    /// has not less friction.
+    fn at(&self, flown: &FlightRow, usual_load_n: Option<f64>) -> Option<(f64, f64)> {
+        let of_flight = |column: &QuantityColumn| {
+            let (value, se) = column[flown.row as usize];
+            (f64::from(value), if se.is_finite() { f64::from(se.max(0.0)) } else { 0.0 })
+        };
+        let (value, se) = of_flight(&self.values);
+        let parts = self.parts.as_ref().map(|parts| parts.each_ref().map(|part| of_flight(part).0));
+        let at_usual_load = parts.zip(usual_load_n).map(|([dry_n, share], load_n)| dry_n + share * load_n);
+        let value = at_usual_load.filter(|value| value.is_finite()).unwrap_or(value);
+        value.is_finite().then_some((value, se))
     }
-    value.is_finite().then_some((f64::from(value), se))
 }
 
 /// Fits steps and drift of all subjects to their present values.
 pub(crate) fn fit_all(subjects: &mut [Subject<'_>]) {
-    subjects.par_iter_mut().for_each(|subject| subject.fit = subject.fitted(&subject.values));
+    subjects.par_iter_mut().filter(|subject| !subject.is_fitted).for_each(|subject| {
+        (subject.fit, subject.is_fitted) = (subject.fitted(&subject.values), true);
+    });
 }

@@ -119,7 +119,7 @@ pub(crate) fn detect(
 /// Rejection of a flight, or the code of a stiffness that is not the configured one.
 fn code(flight: &RecentFlight<'_>, configured_n_per_m: Option<f64>) -> Option<&'static str> {
     let unlike = || {
-        let is_unlike = rejection::is_stiffness_unlike(flight.stiffness_n_per_m?, configured_n_per_m?);
+        let is_unlike = rejection::is_stiffness_unlike(flight.stiffness_n_per_m()?, configured_n_per_m?);
         is_unlike.then_some(rejection::STIFFNESS_UNLIKE)
     };
     flight.rejection.or_else(unlike)
@@ -128,20 +128,26 @@ fn code(flight: &RecentFlight<'_>, configured_n_per_m: Option<f64>) -> Option<&'
 #[cfg(test)]
 mod tests {
     use jiff::{SignedDuration, Timestamp};
+    use records::Quantity;
 
     use super::*;
+    use crate::assess::quantities::values::READ;
 
     const SIGN: Option<&str> = Some("load_sign_flipped");
 
     /// Tail, position and part number of a unit, rejections of its flights, and their stiffness, N/m.
-    type Unit = (&'static str, [Option<&'static str>; 5], Option<f64>);
+    type Unit = (&'static str, [Option<&'static str>; 5], Option<f32>);
 
     fn faults(units: &[Unit]) -> Vec<MappingFault> {
         let unit = |(name, rejections, stiffness_n_per_m): &Unit| {
             let flight = |(k, rejection)| RecentFlight {
                 departure_utc: Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k),
                 rejection,
-                stiffness_n_per_m: *stiffness_n_per_m,
+                has_gap: true,
+                values: READ.map(|(of, _)| match (of, stiffness_n_per_m) {
+                    (Quantity::StiffnessNPerM, Some(stiffness_n_per_m)) => *stiffness_n_per_m,
+                    _ => f32::NAN,
+                }),
                 ..RecentFlight::default()
             };
             let [tail_number, position, part_number] =

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use jiff::{SignedDuration, Timestamp};
 use records::Quantity;
 
-use crate::assess::quantities::values::{FlightValues, FollowedUnits, READ};
-use crate::fleet::flight_row::FlightRow;
+use crate::assess::quantities::values::{Covariates, FollowedUnits, READ};
 
 /// Maximum age of the flights: some months.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
@@ -17,10 +16,29 @@ pub(crate) struct RecentFlight<'a> {
     pub(crate) flight_id: &'a str,
     /// Code of a rejection that may point to a fault of the mapping.
     pub(crate) rejection: Option<&'static str>,
+    pub(crate) has_gap: bool,
+    /// Row of its further columns.
+    pub(crate) row: u32,
+    /// Values in the order of [`READ`]; NaN for none.
+    pub(crate) values: [f32; READ.len()],
+}
+
+impl RecentFlight<'_> {
+    fn value(&self, quantity: Quantity) -> Option<f64> {
+        let index = READ.iter().position(|(read, _)| *read == quantity)?;
+        Some(f64::from(self.values[index])).filter(|value| value.is_finite())
+    }
+
     /// Stiffness fitted in the flight, N/m; none of a flight without a gap.
-    pub(crate) stiffness_n_per_m: Option<f64>,
+    pub(crate) fn stiffness_n_per_m(&self) -> Option<f64> {
+        self.value(Quantity::StiffnessNPerM).filter(|_| self.has_gap)
+    }
+
     /// Bits of all quantities, of a flight with normalised innovations and a stiffness.
-    pub(crate) quantities: Option<[u32; READ.len()]>,
+    pub(crate) fn quantities(&self) -> Option<[u32; READ.len()]> {
+        let has_both = self.value(Quantity::StiffnessNPerM).and(self.value(Quantity::Nis)).is_some();
+        has_both.then(|| self.values.map(f32::to_bits))
+    }
 }
 
 /// Where which unit sits; empty where its records have none.
@@ -35,13 +53,17 @@ pub(crate) struct PositionKey<'a> {
 /// Flights of a unit at one position, by departure.
 pub(crate) type RecentFlights<'a> = BTreeMap<PositionKey<'a>, Vec<RecentFlight<'a>>>;
 
-/// The flights of the last months before a time.
-pub(crate) fn recent_flights<'a>(units: &FollowedUnits<'a>, until: Timestamp) -> RecentFlights<'a> {
+/// The flights of the last months before a time, without their values.
+pub(crate) fn recent_flights<'a>(
+    units: &FollowedUnits<'a>,
+    covariates: &[Covariates],
+    until: Timestamp,
+) -> RecentFlights<'a> {
     let since_utc = until.checked_sub(LOOKED_BACK).unwrap_or(Timestamp::MIN);
     let mut found = RecentFlights::new();
     for ((part_number, serial_number), unit) in units {
-        let first = unit.flights.partition_point(|(flown, _)| flown.departure_utc() < since_utc);
-        for (flown, values) in &unit.flights[first..] {
+        let first = unit.flights.partition_point(|flown| flown.departure_utc() < since_utc);
+        for flown in &unit.flights[first..] {
             let place = unit.place(flown);
             let key = PositionKey {
                 tail_number: place.tail_number.as_deref().unwrap_or_default(),
@@ -49,21 +71,15 @@ pub(crate) fn recent_flights<'a>(units: &FollowedUnits<'a>, until: Timestamp) ->
                 part_number: part_number.as_deref().unwrap_or_default(),
                 serial_number,
             };
-            let flight_id = unit.history.flight_id(flown).unwrap_or_default();
-            found.entry(key).or_default().push(recent_flight(flown, flight_id, values));
+            found.entry(key).or_default().push(RecentFlight {
+                departure_utc: flown.departure_utc(),
+                flight_id: unit.history.flight_id(flown).unwrap_or_default(),
+                rejection: covariates[flown.row as usize].fault_code().filter(|_| flown.gap_m().is_none()),
+                has_gap: flown.gap_m().is_some(),
+                row: flown.row,
+                values: [f32::NAN; READ.len()],
+            });
         }
     }
     found
-}
-
-fn recent_flight<'a>(flown: &FlightRow, flight_id: &'a str, values: &FlightValues) -> RecentFlight<'a> {
-    let (stiffness_n_per_m, is_refused) = (values.of(Quantity::StiffnessNPerM), flown.gap_m().is_none());
-    let has_both = stiffness_n_per_m.and(values.of(Quantity::Nis)).is_some();
-    RecentFlight {
-        departure_utc: flown.departure_utc(),
-        flight_id,
-        rejection: values.fault_code().filter(|_| is_refused),
-        stiffness_n_per_m: stiffness_n_per_m.filter(|_| !is_refused),
-        quantities: has_both.then(|| values.values.map(|(value, _)| value.to_bits())),
-    }
 }

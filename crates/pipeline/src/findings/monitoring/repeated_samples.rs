@@ -30,7 +30,7 @@ pub(crate) fn detect(recent: &RecentFlights<'_>) -> Vec<RepeatedSamples> {
     let mut pairs = BTreeMap::<(Flown<'_>, Flown<'_>), BTreeSet<(&str, &str)>>::new();
     for (key, flights) in recent {
         for flight in flights {
-            let Some(quantities) = flight.quantities else { continue };
+            let Some(quantities) = flight.quantities() else { continue };
             let flown = (key.tail_number, flight.departure_utc, flight.flight_id);
             let place = (flown, key.position);
             let known = *first.entry(quantities).or_insert(place);

@@ -298,6 +298,5 @@ fn add_moved(moved: &mut MovedByPlace, names: [&str; 6], at: Timestamp) {
 /// # Errors
 /// As [`Store::open`].
 pub fn open_store(config: &Config, installations: &Installations) -> Result<Store, Error> {
-    Bookkeeping::new(config, installations)
-        .join_to(Store::open(config.store())?.by_largest_gap(config.parts_by_largest_gap()))
+    Bookkeeping::new(config, installations).join_to(Store::open(config.store())?)
 }

@@ -11,6 +11,7 @@ use trend::MaintenanceEvent;
 
 use crate::error::Error;
 use crate::fleet::bookkeeping::dates_ahead::DateAhead;
+use crate::fleet::bookkeeping::inspections::InspectionRow;
 
 /// Entries by part and serial number.
 pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
@@ -59,32 +60,31 @@ pub struct UnknownUnit {
 }
 
 /// Units of the maintenance and the inspections table that the installations table does not know.
-///
-/// A table that cannot be read is an error where it is used, and has none here.
-pub fn unknown_units(config: &Config, installations: &Installations) -> Vec<UnknownUnit> {
+pub(crate) fn unknown_units(
+    config: &Config,
+    installations: &Installations,
+    maintenance: &MaintenanceLog,
+    inspections: &[InspectionRow],
+) -> Vec<UnknownUnit> {
     let known: BTreeSet<(&str, &str)> =
         installations.iter().map(|i| (i.part_number.as_str(), i.serial_number.as_str())).collect();
     let serials: BTreeSet<&str> = known.iter().map(|(_, serial)| *serial).collect();
+    let is_unknown = |(_, part, serial): &(&Option<String>, Option<&str>, &str)| {
+        part.map_or(!serials.contains(serial), |part| !known.contains(&(part, serial)))
+    };
     let logs = &config.document.logs;
-    let mut unknown = BTreeSet::new();
-    for file in [&logs.maintenance, &logs.inspections].into_iter().flatten() {
-        let Ok(table) = TableBatch::read(&config.path(file)) else { continue };
-        let Ok(serial) = table.column(&["serial_number", "serial"]) else { continue };
-        let part = table.find(&["part_number"]);
-        for row in table.rows() {
-            let Some(serial) = table.text(row, serial) else { continue };
-            let part = part.and_then(|column| table.text(row, column));
-            let is_known = part.map_or(serials.contains(serial), |part| known.contains(&(part, serial)));
-            if !is_known {
-                unknown.insert(UnknownUnit {
-                    table: file.clone(),
-                    part_number: part.map(str::to_owned),
-                    serial_number: serial.to_owned(),
-                });
-            }
-        }
-    }
-    unknown.into_iter().collect()
+    let maintained =
+        maintenance.keys().map(|(part, serial)| (&logs.maintenance, Some(part.as_str()), serial.as_str()));
+    let inspected = inspections
+        .iter()
+        .map(|row| (&logs.inspections, row.part_number.as_deref(), row.serial_number.as_str()));
+    let unit = |(table, part, serial): (&Option<String>, Option<&str>, &str)| UnknownUnit {
+        table: table.clone().unwrap_or_default(),
+        part_number: part.map(str::to_owned),
+        serial_number: serial.to_owned(),
+    };
+    let units: BTreeSet<UnknownUnit> = maintained.chain(inspected).filter(is_unknown).map(unit).collect();
+    units.into_iter().collect()
 }
 
 /// Whether what was done makes a worn unit as good as new.

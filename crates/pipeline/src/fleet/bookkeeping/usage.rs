@@ -44,7 +44,7 @@ impl<'a> OperatorTables<'a> {
 
     /// Where the hours of a unit are known from.
     fn source(&self, history: &History) -> UsageSource {
-        let has_meter = || history.flights().iter().any(|f| !history.extras(f).tail_hours_end.is_nan());
+        let has_meter = || history.extras.iter().any(|f| !f.tail_hours_end.is_nan());
         if history.tails().any(|tail| self.flights.of_tail(tail).next().is_some()) {
             UsageSource::FlightsTable
         } else if has_meter() {
@@ -85,7 +85,7 @@ fn observations(
 ) -> Vec<Observation> {
     let outside = history.place_ranks();
     let mut before: Option<(&FlightRow, u32)> = None;
-    let seen = history.flights().iter().map(|f| {
+    let seen = history.flights().iter().zip(&history.extras).map(|(f, extras)| {
         // Records of one day without a time are different flights if their names differ.
         let flight = match before.filter(|(last, _)| last.departure_us() == f.departure_us()) {
             Some((last, number)) if is_day(f.departure_us()) => {
@@ -97,7 +97,7 @@ fn observations(
         // Numbers beyond the installations are those of places without one.
         let installation = history.installation(f, installations);
         let installation = installation.unwrap_or_else(|| installations.len() + outside[f.place as usize]);
-        history.extras(f).observation(f, installation as u32, flight)
+        extras.observation(f, installation as u32, flight)
     });
     let mut observations: Vec<Observation> = seen.collect();
     let numbers = observations.len() as u32..;
