@@ -173,7 +173,7 @@ impl RowSources<'_> {
                 1e6 * latest.gap_m
             )
         });
-        let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
+        let counted = |count: usize, what: &str| (count > 0).then(|| format!("{what}: {count}"));
         // A report of a past date leaves later records out on purpose.
         let now = Timestamp::now().max(*as_of);
         [
@@ -184,7 +184,7 @@ impl RowSources<'_> {
             counted(faults.contradictions, "flights with records that contradict each other"),
             counted(
                 faults.overlaps,
-                "flights depart while the one before still flies: is one flight recorded twice?",
+                "flights that depart while the one before still flies (is one flight recorded twice?)",
             ),
             impossible,
             counted(faults.negative_usage, "rows with negative usage, left out"),

@@ -13,6 +13,8 @@ use crate::fleet::flight_row::{FlightExtras, FlightRow, signed_error};
 use crate::fleet::histories::{Histories, History};
 use crate::fleet::unit_rows::{PartsByUnit, RowsByUnit, UnitRows, at, batches, number, of_parts};
 
+/// Largest gap that a table made elsewhere may have, m: that of a limit in the configuration.
+const LARGEST_M: f64 = 1e-2;
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
 const OTHER_GAP: &str = "gap_midrange_fitted_m";
@@ -82,6 +84,13 @@ pub(crate) fn add_external(
     let flags = chunk.texts(chunk.find(&["flags"]))?;
     // A record with any flag contradicts itself, so that it alone confirms nothing.
     let is_flag = |text: &&str| !NO_FLAG.contains(&text.to_ascii_lowercase().as_str());
+    let column = chunk.column(&["gap_m"])?;
+    let gaps_m = chunk.numbers(Some(column))?;
+    if let Some(row) = chunk.rows().find(|row| at(&gaps_m, *row).is_some_and(|gap_m| gap_m.abs() > LARGEST_M))
+    {
+        let detail = format!("no gap is {} m wide: give metres, 60e-6 for 60 µm", gaps_m.value(row));
+        return Err(chunk.error(row, Some(column), detail));
+    }
     let other_gap_m = |row, gap_m| flags.get(row).filter(is_flag).map(|_| gap_m);
     add(rows, chunk, by_largest, other_gap_m)
 }

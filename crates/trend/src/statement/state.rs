@@ -92,6 +92,10 @@ fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
 
+fn days_ago(days: f64) -> String {
+    format!("{days:.0} day{} ago", if days.round() == 1.0 { "" } else { "s" })
+}
+
 fn um(m: f64) -> String {
     format!("{:.1} µm", 1e6 * m)
 }
@@ -108,7 +112,7 @@ impl fmt::Display for Reason {
             Self::Stale { days, gap_m } => {
                 write!(f, "no sound record for {days:.0} days; the gap was {} then", um(gap_m))
             }
-            Self::Renewed { days } => write!(f, "no record since the maintenance {days:.0} days ago"),
+            Self::Renewed { days } => write!(f, "no record since the maintenance {}", days_ago(days)),
             Self::AboveLimit { gap_m, limit_m, records: count } => {
                 let (gap, limit) = (um(gap_m), um(limit_m));
                 write!(f, "gap {gap} is at or above the limit of {limit}, by the last {}", records(count))
@@ -173,9 +177,9 @@ impl fmt::Display for Reason {
                 write!(f, "gap rose at once from {before_um:.1} to {after}, {} ago", records(count))
             }
             Self::Changed { kind: ChangePointKind::Onset, days } => {
-                write!(f, "wear began or sped up {days:.0} days ago")
+                write!(f, "wear began or sped up {}", days_ago(days))
             }
-            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
+            Self::Changed { kind, days } => write!(f, "{kind} {}, not on record", days_ago(days)),
             Self::Clear { records: count } => write!(f, "below all limits, by the last {}", records(count)),
         }
     }
