@@ -81,6 +81,7 @@ pub(crate) fn add_external(
     by_largest: &BTreeSet<String>,
 ) -> Result<(), ingest::Error> {
     chunk.column(&["serial_number", "serial"])?;
+    chunk.column(&["departure_utc"])?;
     let flags = chunk.texts(chunk.find(&["flags"]))?;
     // A record with any flag contradicts itself, so that it alone confirms nothing.
     let is_flag = |text: &&str| !NO_FLAG.contains(&text.to_ascii_lowercase().as_str());
@@ -210,7 +211,11 @@ mod tests {
                 (text("P", 2), text("T", 3), text("place ", 2), text(" F", 40));
             let serial = Some(format!("S{}", chance(4)));
             let departure_us = 1_000_000 * (at - chance(20) as i64);
-            ([part, serial, tail, position, flight], departure_us, (chance(5) > 0).then(|| chance(90) as f64))
+            (
+                [part, serial, tail, position, flight],
+                departure_us,
+                (chance(5) > 0).then(|| 1e-6 * chance(90) as f64),
+            )
         };
         (0..600).map(&mut row).collect()
     }
@@ -223,7 +228,7 @@ mod tests {
         };
         let departures: TimestampMicrosecondArray = rows.iter().map(|row| Some(row.1)).collect();
         let gaps_m: Float64Array = rows.iter().map(|row| row.2).collect();
-        let reversals: Int64Array = rows.iter().map(|row| row.2.map(|gap| gap as i64)).collect();
+        let reversals: Int64Array = rows.iter().map(|row| row.2.map(|gap_m| (1e6 * gap_m) as i64)).collect();
         let numbers: [(&str, ArrayRef); 3] = [
             ("departure_utc", Arc::new(departures)),
             ("gap_m", Arc::new(gaps_m)),
