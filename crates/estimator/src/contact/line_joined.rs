@@ -21,7 +21,9 @@ pub(crate) fn line_length(values: &[f64], rounding: f64) -> Option<usize> {
     let (mut from, mut bent, mut curved) = (None, 0, 0);
     for (k, [a, b, c]) in values.array_windows().enumerate() {
         let bend = (a - 2.0 * b + c).abs();
-        if !(bend > rounding) {
+        // A missing value makes no bend.
+        let is_straight = bend.is_nan() || bend <= rounding;
+        if is_straight {
             bent = 0;
             continue;
         }

@@ -202,9 +202,9 @@ impl Log {
         let middle_s = after.iter().copied().find(|s| !s.is_nan()).unwrap_or(f64::NAN);
         let mut last_s = middle_s;
         let mut is_near = |s: &f64| {
-            let is_near = !((s - last_s).abs() > 3600.0 * LONGEST_FLIGHT_H);
+            let is_far = (s - last_s).abs() > 3600.0 * LONGEST_FLIGHT_H;
             last_s = if s.is_nan() { last_s } else { *s };
-            is_near
+            !is_far
         };
         let from = before.len() - before.iter().rev().take_while(|s| is_near(s)).count();
         is_near(&middle_s);

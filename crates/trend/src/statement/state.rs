@@ -93,7 +93,10 @@ fn records(count: usize) -> String {
 }
 
 fn days_ago(days: f64) -> String {
-    format!("{days:.0} day{} ago", if days.round() == 1.0 { "" } else { "s" })
+    match days.round() as i64 {
+        1 => "1 day ago".to_owned(),
+        days => format!("{days} days ago"),
+    }
 }
 
 fn um(m: f64) -> String {
