@@ -20,7 +20,7 @@ const FAR_ZERO: f64 = 0.08;
 /// Number of blocks in each window of an excerpt.
 const WINDOW_BLOCKS: usize = 500;
 /// Minimum time of sound blocks, s: a flight with less is rejected.
-const SHORTEST_S: f64 = 9.0;
+pub(crate) const SHORTEST_S: f64 = 9.0;
 /// Length of the windows that standstill is looked for in, s: so much of it before and after each motion counts.
 const STILL_S: f64 = 2.0;
 /// Shares of the stroke seen and of the load's range below which a window is standstill.

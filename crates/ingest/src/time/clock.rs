@@ -269,7 +269,7 @@ fn with_lost_rows(base: TimeBase, breaks: &[Break]) -> TimeBase {
     let count = base.segments.last().map_or(0, |last| last.end);
     let is_often = breaks.len() as f64 > OFTEN_LOST * count as f64;
     let all_lost: usize = breaks.iter().filter_map(lost).sum();
-    if !is_often || all_lost == 0 || all_lost > count / 3 {
+    if !is_often || all_lost == 0 || all_lost > count {
         return TimeBase { breaks: breaks.iter().map(|found| (found.row, found.after_s)).collect(), ..base };
     }
     let (mut filled, mut left) = (Vec::new(), Vec::new());

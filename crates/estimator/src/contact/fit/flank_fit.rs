@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use crate::contact::block_means::BlockMeans;
+use crate::contact::block_means::{BlockMeans, SHORTEST_S};
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     COLUMNS, DRY, DesignRow, FIRM_SHARE, FORCE, GAP, PERIODIC, PLACE, dot, less_pressed, less_pressed_blocks,
@@ -232,7 +232,14 @@ fn rejection_without_rows(blocks: &BlockMeans, scaling: &Scaling, why: Rejection
     if pressed < 2.0 * reversals(&forces_n, least_n) as f64 {
         return Rejection::RateTooLow;
     }
-    if blocks.is_clipped() { Rejection::LoadHeld } else { why }
+    let complete = (0..blocks.len()).filter(|k| blocks.is_complete(*k)).count();
+    if blocks.is_clipped() {
+        Rejection::LoadHeld
+    } else if (complete as f64) * blocks.period_s < SHORTEST_S {
+        Rejection::TooShort
+    } else {
+        why
+    }
 }
 
 /// Whether errors that repeat with the position are significant and larger than 0.2 µm.
