@@ -7,7 +7,6 @@
 #![no_main]
 
 mod bare;
-#[path = "../../on_board/src/panics.rs"]
 mod panics;
 mod vector;
 
