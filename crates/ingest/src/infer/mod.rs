@@ -21,7 +21,7 @@ use crate::log::row_partition::DistinctTexts;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::PLACEHOLDER;
 use crate::mapping::units::{TimeUnit, Unit, from_symbol};
-use crate::mapping::{ClockMapping, Epoch, IdentityField, Layout, Role};
+use crate::mapping::{Epoch, IdentityField, Layout, Mapping, Role};
 use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
 use crate::time::clock::DAY_S;
@@ -77,7 +77,7 @@ const POSITION_WORDS: &str = "unit location ema servo actuator side surface lru"
 /// # Errors
 /// When it, or a column of texts in it, cannot be read.
 pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
-    let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
+    let table = RowTable::new(vec![LogFile::open(path)?], Mapping::default());
     let file = &table.files[0];
     let mut leaves = file.leaves.clone();
     for leaf in leaves.iter_mut().filter(|leaf| file.holds_numbers(&leaf.name)) {

@@ -12,6 +12,7 @@ use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
 use crate::channel::stats::ChannelStats;
 use crate::channel::turns::unwrap_turns;
 use crate::error::{self, Error, Fault};
+use crate::log::identity::in_zone;
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::column_for;
 use crate::mapping::{ChannelMapping, ClockMapping, RawValue, Role};
@@ -294,10 +295,16 @@ impl<'s> ChannelSampling<'s> {
         };
         let lead = master.stamps()?;
         let stamps = if shared { lead } else { self.stamps()? };
-        let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
+        let apart_s = lead.origin.since(stamps.origin).or_else(|| {
+            // One is an instant, and the other a local time.
+            let [lead, own] = [(lead, master), (stamps, &self)]
+                .map(|(stamps, channel)| in_zone(stamps.origin, channel.table.time_zone.as_deref()));
+            lead.since(own)
+        });
+        let apart_s = apart_s.ok_or_else(|| {
             let (column, other) = (&stamps.column, &lead.column);
             let message = format!("the clocks `{column}` and `{other}` cannot be brought together");
-            let hint = "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`";
+            let hint = "both must be instants, or both numbers from the same zero: see `clock.epoch`, and `identity.time_zone` for local times";
             self.table.error(Fault::new("clocks_differ", message, hint).column(column))
         })?;
         let at_s: Vec<f64> = lead.seconds.iter().map(|t| t + master.map.shift_s() + apart_s).collect();

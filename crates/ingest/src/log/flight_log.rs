@@ -59,7 +59,7 @@ impl Log {
                 Ok(file)
             };
             let files = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-            tables.insert(group, RowTable::new(files, own.clock, own.layout));
+            tables.insert(group, RowTable::new(files, own));
         }
         let Some(main) = tables.get(&None) else {
             return Err(Fault::from(io::Error::from(io::ErrorKind::NotFound)).in_file(Path::new("")));
@@ -75,7 +75,7 @@ impl Log {
     pub fn with_mapping(mut self, mapping: &Arc<Mapping>) -> Self {
         for (group, table) in &mut self.tables {
             let own = mapping.of_group(group.as_deref());
-            *table = RowTable::new(std::mem::take(&mut table.files), own.clock, own.layout);
+            *table = RowTable::new(std::mem::take(&mut table.files), own);
         }
         Self { mapping: Arc::clone(mapping), selected: Mutex::new(None), ..self }
     }
@@ -93,8 +93,7 @@ impl Log {
             }
             let mut starts = Vec::with_capacity(table.files.len());
             for file in std::mem::take(&mut table.files) {
-                let (clock, layout) = (table.clock.clone(), table.layout.clone());
-                let alone = RowTable::new(vec![file], clock, layout);
+                let alone = table.alone(file);
                 let stamps = alone.stamps(&SampleSelector::every_row(&column), None)?;
                 starts.push((stamps.origin, alone.files));
             }

@@ -49,6 +49,16 @@ impl ClockSpan {
     }
 }
 
+/// A local time of a zone as an instant; anything else as it is, as a local time that the zone has twice or never.
+pub(crate) fn in_zone(origin: TimeOrigin, zone: Option<&str>) -> TimeOrigin {
+    match (origin, zone) {
+        (TimeOrigin::Local(local), Some(zone)) => {
+            unambiguous(TimeZone::UTC.to_datetime(local), zone).map_or(origin, TimeOrigin::Utc)
+        }
+        _ => origin,
+    }
+}
+
 fn duration(seconds: f64) -> SignedDuration {
     SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
 }

@@ -18,7 +18,7 @@ use crate::error::{self, Error, Fault, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
 use crate::mapping::field_metadata::FieldMetadata;
-use crate::mapping::{ChannelMapping, ClockMapping, Layout, RawValue};
+use crate::mapping::{ChannelMapping, ClockMapping, Layout, Mapping, RawValue};
 use crate::parquet::column_numbers::RowSelection;
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::{append, as_text, wrong_type};
@@ -31,6 +31,8 @@ pub(crate) struct RowTable {
     pub(crate) files: Vec<LogFile>,
     pub(crate) clock: ClockMapping,
     pub(crate) layout: Layout,
+    /// The time zone of local times that name none.
+    pub(crate) time_zone: Option<String>,
     /// The clock of its rows, once it was read.
     pub(crate) base: OnceLock<TimeBase>,
     /// The names of all leaves, once they were asked for.
@@ -42,8 +44,15 @@ pub(crate) struct RowTable {
 }
 
 impl RowTable {
-    pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
-        Self { files, clock, layout, ..Self::default() }
+    pub(crate) fn new(files: Vec<LogFile>, mapping: Mapping) -> Self {
+        let Mapping { clock, layout, identity, .. } = mapping;
+        Self { files, clock, layout, time_zone: identity.time_zone, ..Self::default() }
+    }
+
+    /// A table of one file that is read the same way.
+    pub(crate) fn alone(&self, file: LogFile) -> Self {
+        let (clock, layout) = (self.clock.clone(), self.layout.clone());
+        Self { files: vec![file], clock, layout, time_zone: self.time_zone.clone(), ..Self::default() }
     }
 
     /// Whether a row holds a list of this leaf's samples in any file.

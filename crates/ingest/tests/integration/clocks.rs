@@ -234,14 +234,22 @@ fn every_clock_gives_its_step_and_an_absolute_one_its_first_instant() {
     }
 }
 
+/// A clock of local times belongs to one of instants by its zone, two hours ahead here, and to numbers by nothing.
 #[test]
 fn clocks_without_a_common_zero_are_refused() {
-    let instants = (0..ROWS as i64).map(|k| 1_763_525_580_250 + 10 * k);
-    let instants = Arc::new(TimestampMillisecondArray::from_iter_values(instants));
+    let stamps = |first_ms: i64| {
+        TimestampMillisecondArray::from_iter_values((0..ROWS as i64).map(|k| first_ms + 10 * k))
+    };
+    let local = with(columns(), "ts", Arc::new(stamps(1_763_525_580_000 + 2 * 3_600_000)));
     let mut m = plain();
     m.channels.screw_position =
         Some(ChannelMapping { time_column: Some("ts".into()), ..channel("s", Unit::Metre) });
-    assert_eq!(refusal(&m, &with(columns(), "ts", instants)).code, "clocks_differ");
+    assert_eq!(refusal(&m, &local).code, "clocks_differ");
+    let both = with(local, "t", Arc::new(stamps(1_763_525_580_000).with_timezone("UTC")));
+    (m.clock.unit, m.identity.time_zone) = (None, None);
+    assert_eq!(refusal(&m, &both).code, "clocks_differ");
+    m.identity.time_zone = Some("Africa/Cairo".into());
+    assert_eq!(worst(&only(&m, &both).unwrap()), (0.0, ROWS));
 }
 
 #[test]
