@@ -56,7 +56,7 @@ pub enum Rejection {
     /// δX falls with the load, and the sign of friction shows that motor and screw are exchanged.
     #[strum(
         message = "exchange `column` of `[channel.motor_position]` and `[channel.screw_position]`, or reverse both \
-        signs"
+        signs; where `relative_position` is mapped, reverse its `sign`"
     )]
     PositionsSwapped,
     /// The ratio of the two positions is not 1.

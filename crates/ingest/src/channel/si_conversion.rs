@@ -84,7 +84,14 @@ pub(crate) fn to_si(column: &str, map: &ChannelMapping, geometry: Geometry) -> R
         let message = format!(
             "column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part"
         );
-        let hint = "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`";
+        let hint = match geometry {
+            Geometry::Rotary { .. } => {
+                "correct the channel's `unit`, or remove `kind = \"rotary\"` of the part"
+            }
+            Geometry::Linear { .. } => {
+                "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`"
+            }
+        };
         Fault::new("unit_for_part", message, hint).column(column).expected(wanted)
     })?;
     let gear = match map.unit.dimension() {
