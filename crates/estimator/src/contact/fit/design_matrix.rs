@@ -65,8 +65,8 @@ pub(crate) struct DesignMatrix {
 
 #[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
 impl BlockMeans {
-    /// Rows of all blocks that keep their flank after a slip, none of which mixes flank and gap. A firm row is of blocks before which its
-    /// flank was pressed firmly for `settling` blocks.
+    /// Rows of all blocks that keep their flank, none of which mixes flank and gap, once the screw has slipped. A firm row is
+    /// of blocks before which its flank was pressed firmly for `settling` blocks.
     ///
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
     /// full or its stretch ends.
