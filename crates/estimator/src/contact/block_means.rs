@@ -35,6 +35,8 @@ pub(crate) struct BlockMeans {
     pub(crate) per_two_s: f64,
     /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
     is_calm: bool,
+    /// Whether standstill was left out.
+    is_without_standstill: bool,
     /// The blocks of each segment.
     pub(crate) segments: Vec<Range<usize>>,
     /// Middle of each block, s from the first sample of the log.
@@ -60,13 +62,20 @@ pub(crate) struct BlockMeans {
 }
 
 impl BlockMeans {
-    /// Replaces the blocks by those of a flight, in the same memory.
+    /// Replaces the blocks by those of a flight, in the same memory, without standstill unless it is wanted.
     ///
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
-    pub(crate) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
+    pub(crate) fn gather(
+        &mut self,
+        samples: &Samples<'_>,
+        prior: &PartPrior,
+        with_standstill: bool,
+    ) -> Result<(), Rejection> {
         self.take_means(samples)?;
-        if let Some(moving) = self.moving_segments(samples) {
+        let moving = if with_standstill { None } else { self.moving_segments(samples) };
+        self.is_without_standstill = moving.is_some();
+        if let Some(moving) = moving {
             self.take_means(&Samples { segments: &moving, ..*samples })?;
         }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
@@ -177,6 +186,11 @@ impl BlockMeans {
         // `pile / below` is 0.5 for evenly spread loads and 1.35 for a sine; a pile lasts for a second or more.
         let is_pile = pile > 2.0 * below && pile * count as f64 * self.period_s > 1.0;
         if is_pile { top_n - width_n } else { f64::INFINITY }
+    }
+
+    /// Whether standstill was left out that may be needed: of a flight whose only reversals are small, rejected for `why`.
+    pub(crate) fn needs_standstill(&self, why: Rejection) -> bool {
+        self.is_without_standstill && matches!(why, Rejection::NoLoadReversal | Rejection::OneSideBrief)
     }
 
     /// Whether loads pile up at the largest value of a side.

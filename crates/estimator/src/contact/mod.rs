@@ -88,7 +88,8 @@ pub fn find_rejection(
     workspace: &mut ContactWorkspace,
 ) -> Result<Option<Rejection>, Error> {
     check(samples, prior)?;
-    let found = prepare(samples, prior, workspace).and_then(|(scaling, signs)| {
+    let found = with_standstill_if_needed(workspace, |workspace, with_standstill| {
+        let (scaling, signs) = prepare(samples, prior, workspace, with_standstill)?;
         flank_fit::check_both_sides(&workspace.whole, &scaling, signs.shows_gap)?;
         if signs.follows_load { Ok(()) } else { Err(Rejection::MotionUnexplained) }
     });
@@ -125,6 +126,7 @@ fn prepare(
     samples: &Samples<'_>,
     prior: &PartPrior,
     workspace: &mut ContactWorkspace,
+    with_standstill: bool,
 ) -> Result<(Scaling, SignCheck), Rejection> {
     // Single-precision positions are rounded by less than this.
     let rounding_m = 5e-7 * samples.motor_m.iter().fold(0.0, |most, m| m.abs().max(most));
@@ -133,10 +135,21 @@ fn prepare(
     if is_too_slow(own_step_s(samples.motor_m).min(own_step_s(samples.dx_m))) {
         return Err(Rejection::RateTooLow);
     }
-    workspace.whole.gather(samples, prior)?;
+    workspace.whole.gather(samples, prior, with_standstill)?;
     let mut scaling = Scaling::of(&workspace.whole, prior)?;
     let signs = sign_check::check(&workspace.whole, &mut scaling)?;
     Ok((scaling, signs))
+}
+
+/// Looks at a flight without its standstill, and with it where nothing else reverses.
+fn with_standstill_if_needed<T>(
+    workspace: &mut ContactWorkspace,
+    look: impl Fn(&mut ContactWorkspace, bool) -> Result<T, Rejection>,
+) -> Result<T, Rejection> {
+    match look(workspace, false) {
+        Err(why) if workspace.whole.needs_standstill(why) => look(workspace, true),
+        found => found,
+    }
 }
 
 /// The fitted flanks, where they can be those of an actuator.
@@ -145,8 +158,11 @@ fn look(
     prior: &PartPrior,
     workspace: &mut ContactWorkspace,
 ) -> Result<(Scaling, FlankFit), Rejection> {
-    let (scaling, _) = prepare(samples, prior, workspace)?;
-    let contact = flank_fit::fit(samples, workspace, &scaling)?;
+    let (scaling, contact) = with_standstill_if_needed(workspace, |workspace, with_standstill| {
+        let (scaling, _) = prepare(samples, prior, workspace, with_standstill)?;
+        let contact = flank_fit::fit(samples, workspace, &scaling)?;
+        Ok((scaling, contact))
+    })?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
     let is_possible =

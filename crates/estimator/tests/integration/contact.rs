@@ -298,6 +298,31 @@ fn standstill_moves_no_gap() {
     }
 }
 
+/// A motor that moves for 8 s at either end of 8 min, under a large load of one side: only the small loads of the rest reverse.
+#[test]
+fn standstill_counts_where_nothing_else_reverses() {
+    let case = Case::nominal(100e-6);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let (mut motor_m, mut load_n, mut dx_m, mut screw_m) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+    for k in 0..480 * 125 {
+        let s = f64::from(k) / 125.0;
+        let is_moving = !(8.0..472.0).contains(&s);
+        let (place_m, usual_n) = if is_moving { (5e-3 * (0.8 * s).sin(), 12_000.0) } else { (0.0, 0.0) };
+        let force_n = usual_n + 600.0 * (4.1 * s).sin() + 300.0 * (9.7 * s).cos();
+        screw_m = f64::clamp(screw_m, place_m + at_m(force_n - 60.0), place_m + at_m(force_n + 60.0));
+        motor_m.push(place_m + 1e-6 * random.random_range(-1.7..1.7));
+        load_n.push(force_n + 20.0 * random.random_range(-1.7..1.7));
+        dx_m.push(screw_m - place_m + 3e-6 * random.random_range(-1.7..1.7));
+    }
+    let found = case.look(&motor_m, &dx_m, &load_n).unwrap();
+    assert!((found.gap_m - 100e-6).abs() < 1e-6 + 2.0 * found.gap_se_m && found.gap_se_m < 2e-6, "{found:?}");
+}
+
+/// Relative position under a force in the coupling: a gap of 100 µm between flanks of 5·10⁷ N/m, m.
+fn at_m(force_n: f64) -> f64 {
+    50e-6 * force_n.signum() + force_n / 5e7
+}
+
 /// Positions of 4 Hz in rows of 125 Hz, joined by lines, put the moment at which a flank is left anywhere between two samples.
 #[test]
 fn positions_joined_by_lines_count_at_their_own_rate() {
@@ -319,7 +344,6 @@ fn positions_joined_by_lines_count_at_their_own_rate() {
 /// the load takes off 16 µm of every distance between the flanks, and nothing tells it from the gap.
 #[test]
 fn an_interval_holds_a_gap_that_friction_hides() {
-    let at_m = |force_n: f64| 50e-6 * force_n.signum() + force_n / 5e7;
     for seed in 0..6 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let case = Case::nominal(100e-6);
