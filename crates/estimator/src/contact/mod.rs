@@ -39,6 +39,7 @@ pub use plot_data::{ContactPlot, Flank, Touch};
 pub use types::{ContactEstimate, ContactOutcome, GapAtPlace, PartPrior};
 
 use crate::error::Error;
+use crate::gap::statistic::range;
 use crate::{Samples, model};
 use fit::design_matrix::{DRY, FORCE, LOAD_RATE, SHARE, SPEED};
 use fit::flank_fit::{self, FlankFit};
@@ -129,10 +130,13 @@ fn prepare(
     with_standstill: bool,
 ) -> Result<(Scaling, SignCheck), Rejection> {
     // Single-precision positions are rounded by less than this.
-    let rounding_m = 5e-7 * samples.motor_m.iter().fold(0.0, |most, m| m.abs().max(most));
-    let own_step_s =
-        |values| line_length(values, rounding_m).map_or(samples.step_s, |n| n as f64 * samples.step_s);
-    if is_too_slow(own_step_s(samples.motor_m).min(own_step_s(samples.dx_m))) {
+    let (least_m, greatest_m) = range(samples.motor_m);
+    let rounding_m = 5e-7 * greatest_m.max(-least_m).max(0.0);
+    let is_slow = |values| {
+        let own_step_s = line_length(values, rounding_m).map_or(1.0, |n| n as f64) * samples.step_s;
+        is_too_slow(own_step_s)
+    };
+    if is_slow(samples.motor_m) && is_slow(samples.dx_m) {
         return Err(Rejection::RateTooLow);
     }
     workspace.whole.gather(samples, prior, with_standstill)?;
@@ -160,8 +164,7 @@ fn look(
 ) -> Result<(Scaling, FlankFit), Rejection> {
     let (scaling, contact) = with_standstill_if_needed(workspace, |workspace, with_standstill| {
         let (scaling, _) = prepare(samples, prior, workspace, with_standstill)?;
-        let contact = flank_fit::fit(samples, workspace, &scaling)?;
-        Ok((scaling, contact))
+        flank_fit::fit(samples, workspace, &scaling).map(|contact| (scaling, contact))
     })?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;

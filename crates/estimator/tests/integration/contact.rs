@@ -341,7 +341,7 @@ fn positions_joined_by_lines_count_at_their_own_rate() {
 }
 
 /// A bench load that is held at three sizes on both sides: each is reached from the other side, so that friction of 8 % of
-/// the load takes off 16 µm of every distance between the flanks, and nothing tells it from the gap.
+/// the load takes off 16 µm of every distance between the flanks, and nothing distinguishes it from the gap.
 #[test]
 fn an_interval_holds_a_gap_that_friction_hides() {
     for seed in 0..6 {

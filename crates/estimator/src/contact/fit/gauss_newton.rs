@@ -106,8 +106,8 @@ pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior
         FORCE_DRIFT => GaussianPrior::zero(0.03 * windup_m),
         // It differs by 4 % between the middle of the stroke and an end.
         FORCE_PLACE..SPEED => GaussianPrior::zero(0.04 * windup_m),
-        // Most likely value and spread of the lost share, and of the excess friction at rest.
         DRY => lack(DRY_SHARE, state.friction.dry_n / scaling.load_n),
+        // Most likely value and spread of the lost share, and of the excess friction at rest.
         SHARE => lack((0.03, 0.06), state.friction.lost_share),
         STRIBECK => lack((0.0, 0.3), state.stribeck),
         // A screw that is locked has no delay: what is left is viscous friction, 0.1 ms.
