@@ -53,7 +53,7 @@ pub(crate) fn search(
         integrate(blocks, &state, scaling.motor_sense);
         let design = settled_rows(blocks, scaling);
         rejection_of_contact(less_pressed(design.firm.iter(), blocks.period_s))?;
-        let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
+        let fit = fit(&design.firm, &priors(scaling, &state), rounds, true).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
         iterations -= 1;
         if iterations == 0 {

@@ -9,6 +9,7 @@ use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{FORCE, GAP, ORIGIN, SPEED, dot};
 use crate::contact::fit::gauss_newton::{DRY_SHARE, GaussNewtonResult, search};
 use crate::contact::fit::scaling::{Scaling, UNSEEN_GAP};
+use crate::contact::fit::sign_check;
 use crate::contact::friction::coupling_path::integrate;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
 use crate::contact::stats::spread;
@@ -20,6 +21,9 @@ const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 const ZERO_GAIN: f64 = 0.5;
 /// Reading of the load cell, over the 95 % load, from which a far zero counts where no other start succeeds.
 const ZERO_ALONE: f64 = 0.25;
+
+/// Residuals with its sides, over those with the sides of the logged load, below which such a zero explains δX better.
+const ZERO_EXPLAINS: f64 = 0.9;
 
 /// The best candidate.
 #[derive(Debug)]
@@ -105,10 +109,13 @@ impl<'a> ParameterSearch<'a> {
         let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
-        // Without a gap, and without a load on both sides, any zero fits.
+        // Without a gap, and without a load on both sides, any zero fits. Under a load that presses one flank only briefly, δX
+        // passes its middle in contact: a zero there explains it no better than the logged one.
+        let off_m = |zero_n| sign_check::misfit_m(self.blocks, self.scaling, zero_n);
         let is_sure = |far: &Candidate| {
-            zero_n.is_some_and(|zero_n| zero_n.abs() > ZERO_ALONE * self.scaling.load_n)
-                && far.found.fit.beta[GAP] > 2.0 * UNSEEN_GAP * self.scaling.windup_m()
+            zero_n.is_some_and(|n| {
+                n.abs() > ZERO_ALONE * self.scaling.load_n && off_m(n) < ZERO_EXPLAINS * off_m(0.0)
+            }) && far.found.fit.beta[GAP] > 2.0 * UNSEEN_GAP * self.scaling.windup_m()
         };
         match (near, far) {
             (Some(near), Some(far)) if far.misfit + ZERO_GAIN < near.misfit => Ok(far),

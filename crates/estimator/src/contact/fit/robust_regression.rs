@@ -45,7 +45,8 @@ pub(crate) struct RobustFit<const N: usize> {
     priors: [GaussianPrior; N],
 }
 
-/// Reweighted least squares: `rounds` rounds from even weights; `None` for too few rows.
+/// Reweighted least squares: `rounds` rounds from even weights; `None` for too few rows. Outliers are rejected in the last
+/// round where `rejects` is set.
 ///
 /// The weight of a prior is the variance of residuals over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would outweigh it.
@@ -53,6 +54,7 @@ pub(crate) fn fit<const N: usize>(
     rows: &[DesignRow<N>],
     priors: &[GaussianPrior; N],
     mut rounds: usize,
+    rejects: bool,
 ) -> Option<RobustFit<N>> {
     if rows.len() <= N {
         return None;
@@ -73,7 +75,7 @@ pub(crate) fn fit<const N: usize>(
         rounds -= 1;
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
         let spread_m = spread(residuals_m.iter().copied()).max(LEAST_SPREAD_M);
-        let trusts = residuals_m.iter().map(|e| trust(e.abs() / spread_m, rounds == 0));
+        let trusts = residuals_m.iter().map(|e| trust(e.abs() / spread_m, rejects && rounds == 0));
         weights = even.iter().zip(trusts).map(|(w, trust)| w * trust).collect();
         let noise = variance_of_a_row(rows, &weights, &residuals_m);
         lent = priors.map(|p| if p.sd.is_finite() { noise / (p.sd * p.sd) } else { 0.0 });

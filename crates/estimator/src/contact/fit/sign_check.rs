@@ -3,7 +3,7 @@
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::DesignRow;
-use crate::contact::fit::robust_regression::{GaussianPrior, fit};
+use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling, UNSEEN_GAP};
 use crate::contact::stats::LOOKS;
 
@@ -38,10 +38,7 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     if scaling.is_locked() {
         return Ok(SignCheck::NONE);
     }
-    // Every fourth block is used, and fewer of long flights.
-    let stride = (blocks.len() / LOOKS).max(4);
-    let rows: Vec<_> = (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, scaling, k)).collect();
-    let Some(found) = fit(&rows, &[GaussianPrior::NONE; 7], 4) else { return Ok(SignCheck::NONE) };
+    let Some((found, rows)) = regress(blocks, scaling, 0.0) else { return Ok(SignCheck::NONE) };
     let [_, side_m, load_m, slip_m, speed_m, place_m, _] = found.beta;
     let [side_se_m, load_se_m, place_se_m] =
         [1, 2, 5].map(|column| found.standard_error_m(&[(column, 1.0)], &rows));
@@ -56,8 +53,9 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     }
     let windup_m = side_m + load_m;
     let doubt_m = SIGNIFICANT * side_se_m.hypot(load_se_m);
-    // A wind-up that is negative for certain, by 30 % of the part's, is that of flipped or exchanged channels.
-    if windup_m + doubt_m > -0.3 * scaling.windup_m() {
+    // A wind-up that is negative for certain, by 30 % of the part's, is that of flipped or exchanged channels; but not where
+    // δX grows with the load on one side, and touches of the other are few.
+    if windup_m + doubt_m > -0.3 * scaling.windup_m() || load_m > SIGNIFICANT * load_se_m {
         let shows_gap = side_m > (UNSEEN_GAP * scaling.windup_m()).max(3.0 * side_se_m);
         let (load_doubt_m, part_m) = (SIGNIFICANT * load_se_m, scaling.windup_m());
         let is_softer = load_m - load_doubt_m > 3.0 * part_m;
@@ -70,8 +68,28 @@ pub(crate) fn check(blocks: &BlockMeans, scaling: &mut Scaling) -> Result<SignCh
     Err(if slip_m + speed_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
 }
 
-fn row(blocks: &BlockMeans, scaling: &Scaling, k: usize) -> Option<DesignRow<7>> {
-    let (load, speed) = (blocks.load_n[k] / scaling.load_n, blocks.speed_m_per_s(k));
+/// Mean size of the residuals of the regression with the sides of a load zero, m: it is least where δX jumps, which is at the
+/// zero of the load cell.
+pub(crate) fn misfit_m(blocks: &BlockMeans, scaling: &Scaling, load_zero_n: f64) -> f64 {
+    regress(blocks, scaling, load_zero_n).map_or(f64::INFINITY, |(found, rows)| {
+        rows.iter().map(|row| found.residual_m(row).abs()).sum::<f64>() / rows.len() as f64
+    })
+}
+
+/// The regression and its rows. Every fourth block is used, and fewer of long flights.
+fn regress(
+    blocks: &BlockMeans,
+    scaling: &Scaling,
+    load_zero_n: f64,
+) -> Option<(RobustFit<7>, Vec<DesignRow<7>>)> {
+    let stride = (blocks.len() / LOOKS).max(4);
+    let looks = (1..blocks.len()).step_by(stride);
+    let rows: Vec<_> = looks.filter_map(|k| row(blocks, scaling, load_zero_n, k)).collect();
+    Some((fit(&rows, &[GaussianPrior::NONE; 7], 4, false)?, rows))
+}
+
+fn row(blocks: &BlockMeans, scaling: &Scaling, load_zero_n: f64, k: usize) -> Option<DesignRow<7>> {
+    let (load, speed) = ((blocks.load_n[k] - load_zero_n) / scaling.load_n, blocks.speed_m_per_s(k));
     let place = (blocks.motor_m[k] - scaling.place_m.0) / scaling.place_m.1;
     // Slower than 1 mm/s the screw may stick.
     let slip = if speed.abs() > 1e-3 { speed.signum() } else { 0.0 };

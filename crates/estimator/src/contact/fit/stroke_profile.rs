@@ -54,7 +54,7 @@ pub(crate) fn stroke_profile(
         _ if column < COLUMNS + KNOTS => GaussianPrior::zero(60e-6),
         _ => GaussianPrior::zero(10e-6),
     });
-    let found = fit(&rows, &priors, REWEIGHTINGS)?;
+    let found = fit(&rows, &priors, REWEIGHTINGS, true)?;
     let shares = time_shares(blocks, scaling);
     let value_m = |weights: &[f64; KNOTS]| -> f64 { found.beta[GAP] + dot(weights, &found.beta[COLUMNS..]) };
     let error_m = |gap: f64, weights: &[f64; KNOTS]| {
