@@ -323,6 +323,38 @@ fn at_m(force_n: f64) -> f64 {
     50e-6 * force_n.signum() + force_n / 5e7
 }
 
+/// Gusts about a load of one side, 1.8 times their rms, press the other flank for moments: δX passes its middle in contact, and
+/// the load there is no zero of the load cell.
+#[test]
+fn brief_touches_of_the_other_flank_show_no_other_gap() {
+    for seed in 0..6 {
+        let case = Case::nominal(400e-6);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let at_m = |force_n: f64| at_m(force_n) + 150e-6 * force_n.signum();
+        let (mut lag_n, mut force_n, mut screw_m) = (0.0, 0.0, 0.0);
+        let (mut motor_m, mut load_n, mut dx_m) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..70 * 250 {
+            // White noise through two lags of 1/40 s: 1,100 N rms.
+            lag_n += 0.16 * (random.random_range(-1.7..1.7) - lag_n);
+            force_n += 0.16 * (lag_n - force_n);
+            let place_m = 5e-3 * (0.004 * f64::from(k)).sin();
+            let pressed_n = 2000.0 + 4900.0 * force_n;
+            screw_m =
+                f64::clamp(screw_m, place_m + at_m(pressed_n - 100.0), place_m + at_m(pressed_n + 100.0));
+            motor_m.push(place_m + 1e-6 * random.random_range(-1.7..1.7));
+            load_n.push(pressed_n + 20.0 * random.random_range(-1.7..1.7));
+            dx_m.push(screw_m - place_m + 3e-6 * random.random_range(-1.7..1.7));
+        }
+        let look = |samples: &Samples<'_>| fit(samples, &case.prior()).unwrap();
+        match case.with_samples(&motor_m, &dx_m, &load_n, look) {
+            Ok(found) => assert!((found.gap_m - 400e-6).abs() < 2.0 * found.gap_se_m, "{seed}: {found:?}"),
+            Err(why) => {
+                assert!(matches!(why, Rejection::NoLoadReversal | Rejection::OneSideBrief), "{why:?}")
+            }
+        }
+    }
+}
+
 /// Positions of 4 Hz in rows of 125 Hz, joined by lines, put the moment at which a flank is left anywhere between two samples.
 #[test]
 fn positions_joined_by_lines_count_at_their_own_rate() {
