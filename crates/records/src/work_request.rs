@@ -82,6 +82,8 @@ stored_row! {
         pub recorded_utc: Timestamp,
         /// The run that wrote it; empty for a command.
         pub run_id: Option<String>,
+        /// Departure of the latest flight behind the finding that opened the request.
+        pub latest_flight_utc: Option<Timestamp>,
     }
 }
 
@@ -111,6 +113,8 @@ row! {
         pub due_utc: Option<Timestamp>,
         /// Date of the assessment that opened the request.
         pub opened_utc: Timestamp,
+        /// Departure of the latest flight behind the finding that opened it.
+        pub latest_flight_utc: Option<Timestamp>,
         /// Who decided last; `freeplay` when a table closed the request.
         pub by: Option<String>,
         /// Their reason.
@@ -130,6 +134,11 @@ impl WorkRequest {
     /// Part number, if known, and serial number.
     pub fn unit(&self) -> (Option<String>, String) {
         (self.part_number.clone(), self.serial_number.clone())
+    }
+
+    /// Until when flights made the finding: a repair after it answers the request, also one that was done before a run saw them.
+    pub fn found_until(&self) -> Timestamp {
+        self.latest_flight_utc.map_or(self.opened_utc, |at| at.min(self.opened_utc))
     }
 
     /// Number and status: `W12 deferred to 2026-12-01`.

@@ -35,6 +35,7 @@ fn opened(event: &WorkEvent) -> WorkRequest {
         quantity: event.quantity.clone(),
         finding: event.reason.clone(),
         opened_utc: event.as_of_utc,
+        latest_flight_utc: event.latest_flight_utc,
         changed_utc: event.recorded_utc,
         ..WorkRequest::default()
     }
@@ -44,8 +45,8 @@ fn apply(request: &mut WorkRequest, event: &WorkEvent) {
     request.changed_utc = event.recorded_utc;
     match event.event {
         WorkEventKind::Opened | WorkEventKind::Reopened => {
-            let opened_utc = request.opened_utc;
-            *request = WorkRequest { opened_utc, ..opened(event) };
+            let WorkRequest { opened_utc, latest_flight_utc, .. } = *request;
+            *request = WorkRequest { opened_utc, latest_flight_utc, ..opened(event) };
         }
         WorkEventKind::StateChanged => {
             (request.state, request.finding) = (event.state.clone(), event.reason.clone());

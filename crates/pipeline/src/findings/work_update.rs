@@ -80,7 +80,7 @@ fn of_open(
         let state = state.map(str::to_owned).or_else(|| request.state.clone());
         vec![WorkEvent { state, reason: Some(reason), as_of_utc, ..event(kind) }]
     };
-    if let Some(repaired) = tables.repair_after(&name, request.opened_utc) {
+    if let Some(repaired) = tables.repair_after(&name, request.found_until()) {
         let reason = format!("repair of {} in the maintenance table", repaired.strftime("%Y-%m-%d"));
         return closed(WorkEventKind::Maintained, reason, repaired);
     }
@@ -128,7 +128,7 @@ fn of_closed(
         return state_change(request, finding, now);
     }
     let is_after = |fact: Option<Timestamp>| fact > request.closed_utc;
-    let is_withdrawn = || tables.repair_after(&finding.unit, request.opened_utc).is_none();
+    let is_withdrawn = || tables.repair_after(&finding.unit, request.found_until()).is_none();
     match request.closed_by.as_deref() {
         Some(by) if by == "removed" || (by == "maintained" && is_withdrawn()) => {
             let again = open(finding, tables, now)?;
@@ -171,6 +171,7 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
         reason: finding.reason.clone(),
         by: "freeplay".to_owned(),
         as_of_utc: finding.as_of_utc,
+        latest_flight_utc: finding.latest_flight_utc,
         recorded_utc: now,
         ..WorkEvent::default()
     })
