@@ -1,7 +1,7 @@
 //! Logs in shapes that are made row by row give the numbers of the plain ones. The other shapes are in
 //! `tests/data/logs.md`.
 
-use crate::harness::{Table, TestFleet, facts, without};
+use crate::harness::{Table, TestFleet, facts, rewrite, without};
 
 /// Every number of every record, without what names the log and the settings it was read by.
 fn numbers(fleet: &TestFleet) -> Vec<String> {
@@ -59,4 +59,36 @@ fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
         checked.contains("2 logs checked, 0 failed") && checked.contains("2.parquet#N412FP/"),
         "{checked}"
     );
+}
+
+/// A log is delivered again under another name with another departure, and then once more while the former file is there. The
+/// records of a file that is gone move; those of one that is there stay, and its samples count once.
+#[test]
+fn a_log_delivered_again_with_another_departure_counts_once() {
+    let fleet = one_tail();
+    fleet.run_ok(&["run"]);
+    let estimates = |fleet: &TestFleet| -> Vec<u64> {
+        let rows = fleet.rows(&["trend", "--tail", "N412FP"]);
+        rows.iter().map(|row| row["estimates"].as_u64().unwrap()).collect()
+    };
+    let (records, counted) = (numbers(&fleet).len(), estimates(&fleet));
+    let deliver = |from: &std::path::Path, name: &str, departure: &str| {
+        let mut facts = facts(from);
+        facts
+            .iter_mut()
+            .filter(|(key, _)| key == "departure_utc")
+            .for_each(|(_, at)| *at = departure.to_owned());
+        let to = fleet.path(&format!("sample-data/logs/N412FP/{name}.parquet"));
+        rewrite(from, &to, &facts, |_| true);
+        to
+    };
+    let log = fleet.logs_of("N412FP").pop().unwrap();
+    let again = deliver(&log, "again", "2026-11-17T01:02:03Z");
+    std::fs::remove_file(&log).unwrap();
+    fleet.run_ok(&["run"]);
+    assert_eq!((numbers(&fleet).len(), estimates(&fleet)), (records, counted.clone()));
+    deliver(&again, "once-more", "2026-11-15T01:02:03Z");
+    fleet.run_ok(&["run"]);
+    assert!(numbers(&fleet).len() > records);
+    assert_eq!(estimates(&fleet), counted);
 }

@@ -8,7 +8,7 @@
 //!
 //! A log that fails, or lost a position, takes nothing away: its last good records stay.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use job::Config;
@@ -22,6 +22,9 @@ use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{self, Plan, WorkItem};
 use crate::run::event::Event;
 use crate::run::summary::{self, DuplicateLog, LogError, Refusals, RunSummary};
+
+/// By how much a corrected departure may differ from the one before, µs: a month is easily mistaken.
+const MOST_CORRECTED_US: i64 = 40 * 24 * 3_600 * 1_000_000;
 
 /// Outcome of one log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -371,6 +374,32 @@ impl<'a> OwnershipLedger<'a> {
         let mut held = writer.held(&keys)?;
         held.retain(|_, stored| new.iter().any(|new| stored.is_same_as(new)));
         Ok(held.into_iter().map(|(key, stored)| (key, stored.log_digest)).collect())
+    }
+
+    /// Takes back the stored gaps of logs that are gone whose samples this run has stored under another departure or tail: their
+    /// log was delivered again with another identity. Its digest differs with its metadata; its estimates are equal to the bit.
+    pub(crate) fn moved_samples(&self, writer: &Writer) -> Result<Vec<LogResult>, Error> {
+        let gone: HashSet<&String> = self.plan.gone.values().flatten().map(|log| &log.log_path).collect();
+        let departures = || self.own.keys().map(|key| key.departure_us);
+        let (Some(first_us), Some(last_us), false) =
+            (departures().min(), departures().max(), gone.is_empty())
+        else {
+            return Ok(Vec::new());
+        };
+        let before = writer.held_between(first_us - MOST_CORRECTED_US, last_us + MOST_CORRECTED_US)?;
+        let own = self.own.values().map(|own| &own.held).filter(|held| held.is_estimated());
+        let own: HashMap<_, &HeldRecord> = own.map(|held| (held.samples_key(), held)).collect();
+        let mut moved = BTreeMap::<&str, Vec<(RecordKey, String)>>::new();
+        for (key, stored) in &before {
+            let is_gone = gone.contains(&stored.log_path) && !self.own.contains_key(key);
+            if let Some(own) = own.get(&stored.samples_key()).filter(|_| is_gone) {
+                moved.entry(&own.log_path).or_default().push((key.clone(), stored.log_digest.clone()));
+            }
+        }
+        let result = |(log, moved_from): (&str, Vec<(RecordKey, String)>)| {
+            Some(LogResult { account: self.accounts.get(log)?.clone(), records: Vec::new(), moved_from })
+        };
+        Ok(moved.into_iter().filter_map(result).collect())
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does

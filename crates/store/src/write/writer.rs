@@ -20,6 +20,7 @@ use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::column_scan::not_withdrawn;
+use crate::read::scan::Condition;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
 
@@ -72,13 +73,15 @@ impl HeldRecord {
         self.status == Status::Estimated
     }
 
-    /// Whether both were computed from the same log, or from the same samples: equal samples give equal bits.
+    /// The number of samples, and the bits of what was estimated from them: equal samples give equal bits.
+    pub fn samples_key(&self) -> (i64, [Option<u64>; 4]) {
+        let numbers = [self.gap_m, self.gap_midrange_m, self.load_p05_n, self.load_p95_n];
+        (self.samples, numbers.map(|number| number.map(f64::to_bits)))
+    }
+
+    /// Whether both were computed from the same log, or from the same samples.
     pub fn is_same_as(&self, other: &Self) -> bool {
-        let bits = |record: &Self| {
-            [record.gap_m, record.gap_midrange_m, record.load_p05_n, record.load_p95_n]
-                .map(|number| number.map(f64::to_bits))
-        };
-        self.log_digest == other.log_digest || (self.samples == other.samples && bits(self) == bits(other))
+        self.log_digest == other.log_digest || self.samples_key() == other.samples_key()
     }
 }
 
@@ -149,15 +152,37 @@ impl Writer {
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
         let wanted: MergeDecisions<'_> =
             keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
-        let snapshot = self.store.gaps.snapshot()?;
-        let files = snapshot.paths_where(|stats| may_hold_any(stats, &wanted));
+        self.held_where(&[not_withdrawn()], |stats| may_hold_any(stats, &wanted), |key| keys.contains(key))
+    }
+
+    /// The stored records of flights that departed from a time to another, µs since 1970 UTC; withdrawn ones are left out.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn held_between(
+        &self,
+        first_us: i64,
+        last_us: i64,
+    ) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
+        let departed = Condition::times("departure_utc", first_us, last_us);
+        let conditions = [not_withdrawn(), departed.clone()];
+        self.held_where(&conditions, |stats| departed.may_be_in(stats), |_| true)
+    }
+
+    fn held_where(
+        &self,
+        conditions: &[Condition],
+        may_hold: impl Fn(&Stats) -> bool,
+        is_wanted: impl Fn(&RecordKey) -> bool,
+    ) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
+        let files = self.store.gaps.snapshot()?.paths_where(may_hold);
         let all = GapRecord::schema();
         let names = row_schema::columns::<HeldRecord>().into_iter().map(|column| column.name);
         let columns = RecordKey::COLUMNS.into_iter().chain(names).map(|name| all.index_of(name));
         let schema = Arc::new(all.project(&columns.collect::<Result<Vec<_>, _>>()?)?);
         let mut held = BTreeMap::new();
-        for batch in self.store.read_files(&files, &schema, &[not_withdrawn()])? {
-            let is_wanted = keys_of(&batch)?.iter().map(|key| Some(keys.contains(key))).collect();
+        for batch in self.store.read_files(&files, &schema, conditions)? {
+            let is_wanted = keys_of(&batch)?.iter().map(|key| Some(is_wanted(key))).collect();
             let batch = filter_record_batch(&batch, &is_wanted)?;
             held.extend(keys_of(&batch)?.into_iter().zip(from_batch::<HeldRecord>(&batch)?));
         }

@@ -1,5 +1,7 @@
 //! The operator's tables, and the accumulated usage of a unit: its rows, flights without a row, and recorded maintenance.
 
+use std::collections::HashSet;
+
 use ingest::Flights;
 use job::Config;
 use records::{Installation, Installations};
@@ -60,6 +62,9 @@ impl<'a> OperatorTables<'a> {
         let installed = if self.is_booked { &installations[..] } else { &[] };
         let unlogged = unlogged_flights(self.flights, history, installed);
         let mut observations = observations(history, installed, &unlogged);
+        if self.is_booked {
+            count_samples_once(&mut observations);
+        }
         let dropped = drop_contradicting(&mut observations);
         let mut series = Series::new(observations)?;
         series.unit_hours_at_start = installations.first().and_then(|first| first.unit_hours_at_install);
@@ -74,6 +79,18 @@ impl<'a> OperatorTables<'a> {
             event.utc_us = of_day.last().map_or(event.utc_us, |last| event.utc_us.max(last.departure_us + 1));
         }
         Ok(series.with_maintenance(events))
+    }
+}
+
+/// Takes the gap from each flight whose gap and error are to the last bit those of an earlier one: its log was stored again with
+/// another departure, and the same samples must neither confirm nor clear what they showed.
+fn count_samples_once(observations: &mut [Observation]) {
+    let mut seen = HashSet::new();
+    for row in observations {
+        let bits = row.gap_m.zip(row.gap_se_m).map(|(gap_m, se_m)| [gap_m, se_m].map(f64::to_bits));
+        if bits.is_some_and(|bits| !seen.insert(bits)) {
+            (row.gap_m, row.gap_se_m, row.is_doubtful) = (None, None, false);
+        }
     }
 }
 
