@@ -1,4 +1,4 @@
-"""Writes src/vector.rs and the columns that it includes from the estimator's reference vectors: python3 make_vector.py (needs pyarrow)."""
+"""Writes src/vector.rs and the samples that it includes from the estimator's reference vectors: python3 make_vector.py (needs pyarrow)."""
 
 import json
 from pathlib import Path
@@ -17,12 +17,9 @@ def numbers(values):
     return "[" + ", ".join(repr(float(v)) for v in values) + "]"
 
 
-def column(name, said, key):
-    values = table[key].to_pylist()
-    file = f"{name.lower()}.txt"
-    (HERE / "src" / file).write_text("[\n" + "".join(f"    {float(v)!r},\n" for v in values) + "]\n")
-    return f'/// {said}\npub const {name}: [f64; {len(values)}] = include!("{file}");\n'
-
+columns = [table[key].to_pylist() for key in ("y", "u", "x_filt_2")]
+samples = "".join(f"    {numbers(row)},\n" for row in zip(*columns))
+(HERE / "src/samples.txt").write_text(f"[\n{samples}]\n")
 
 # W_d is symmetric, so that rows are columns.
 (HERE / "src/vector.rs").write_text(
@@ -39,8 +36,7 @@ pub const W_D: [[f64; 3]; 3] = [{", ".join(numbers(r) for r in row["W_d"])}];
 pub const V_D_M2: f64 = {row["V_d"]!r};
 /// ΔS, m.
 pub const GAP_M: f64 = {row["gap"]!r};
+/// δX, m, load, N, and S, m, of each sample.
+pub const SAMPLES: [[f64; 3]; {len(columns[0])}] = include!("samples.txt");
 """
-    + column("POSITION_M", "δX, m.", "y")
-    + column("LOAD_N", "Load, N.", "u")
-    + column("S_M", "S after each sample, m.", "x_filt_2")
 )

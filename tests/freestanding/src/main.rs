@@ -12,7 +12,7 @@ mod vector;
 
 use estimator::{ActuatorModel, Error, Filter, NoiseModel, Stream, gap};
 use nalgebra::Matrix3;
-use vector::{GAP_M, LOAD_N, POSITION_M, S_M};
+use vector::{GAP_M, SAMPLES};
 
 /// Largest difference of S, as a share of its peak, and of the gap.
 const TOLERANCE: f64 = 1e-12;
@@ -44,8 +44,8 @@ fn filter() -> Result<Filter, Error> {
 
 /// Whether S, sample by sample, and ΔS at the end are the reference's.
 fn follows(mut stream: Stream, wrong: bool) -> Result<bool, Error> {
-    let (mut peak_m, mut worst_m, mut found_m) = (0.0_f64, 0.0_f64, [0.0; S_M.len()]);
-    for (k, ((y_m, load_n), wanted_m)) in POSITION_M.iter().zip(LOAD_N).zip(S_M).enumerate() {
+    let (mut peak_m, mut worst_m, mut found_m) = (0.0_f64, 0.0_f64, [0.0; SAMPLES.len()]);
+    for (k, &[y_m, load_n, wanted_m]) in SAMPLES.iter().enumerate() {
         let error_m = if wrong && k == WRONG.0 { WRONG.1 } else { 0.0 };
         let s_m = stream.push(y_m + error_m, load_n)?.s_m();
         found_m[k] = s_m;

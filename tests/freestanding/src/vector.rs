@@ -15,9 +15,5 @@ pub const W_D: [[f64; 3]; 3] = [
 pub const V_D_M2: f64 = 1.6e-11;
 /// ΔS, m.
 pub const GAP_M: f64 = 0.00012280965042262714;
-/// δX, m.
-pub const POSITION_M: [f64; 300] = include!("position_m.txt");
-/// Load, N.
-pub const LOAD_N: [f64; 300] = include!("load_n.txt");
-/// S after each sample, m.
-pub const S_M: [f64; 300] = include!("s_m.txt");
+/// δX, m, load, N, and S, m, of each sample.
+pub const SAMPLES: [[f64; 3]; 300] = include!("samples.txt");
