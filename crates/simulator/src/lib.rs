@@ -22,16 +22,11 @@ mod seeded_streams;
 mod sensors;
 
 pub use error::Error;
-pub use fleet::fleet_events::{
-    FaultKind, LogFault, Place, PlantedChange, PlayCheck, Replacement, Reshim, Swap,
-};
+pub use fleet::fleet_events::{FaultKind, PlantedChange};
 pub use fleet::fleet_plan::{
-    ActuatorLog, ChannelUnit, Inspection, Installation, Maintenance, Plan, PlannedActuator, PlannedFlight,
-    SimulatedFlight,
+    ActuatorLog, ChannelUnit, Plan, PlannedActuator, PlannedFlight, SimulatedFlight,
 };
-pub use fleet::fleet_spec::{
-    MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
-};
+pub use fleet::fleet_spec::{MotorLogFormat, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec};
 pub use fleet::wear::WearLaw;
 pub use flight::{Flight, check, simulate};
 pub use load::flight_profile::Profile;
@@ -40,6 +35,5 @@ pub use load::vibration::{Line, Vibration};
 pub use plant::actuator_plant::Plant;
 pub use plant::backlash_contact::{Contact, ContactLaw};
 pub use plant::friction::{Friction, FrictionLaw};
-pub use plant::motor_controller::Drive;
 pub use plant::two_mass;
-pub use sensors::sensor::{Channel, Clock, NoiseColour, PeriodicError, Sensors};
+pub use sensors::sensor::{Channel, NoiseColour, PeriodicError, Sensors};

@@ -3,6 +3,7 @@
 //! A plan is cheap and made at once; a flight is costly and made alone, from random streams named
 //! after seed, tail, flight and position. Flights can be simulated in any order and on any thread, with
 //! bitwise identical results.
+#![expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,13 +19,9 @@ use crate::sensors::sensor::Sensors;
 /// One stay of one unit in one place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Installation {
-    /// The aircraft.
     pub tail_number: String,
-    /// The place on it.
     pub position: String,
-    /// The design.
     pub part_number: String,
-    /// The unit.
     pub serial_number: String,
     /// First instant of the stay, microseconds since 1970 UTC.
     pub installed_us: i64,
@@ -39,54 +36,40 @@ pub struct Installation {
 /// A row of the maintenance table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Maintenance {
-    /// The design.
     pub part_number: String,
-    /// The unit.
     pub serial_number: String,
-    /// When, microseconds since 1970 UTC.
     pub at_us: i64,
 }
 
 /// Play measured in the hangar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspection {
-    /// The design.
     pub part_number: String,
-    /// The unit.
     pub serial_number: String,
-    /// When, microseconds since 1970 UTC.
     pub at_us: i64,
-    /// The reading, metres.
     pub play_m: f64,
-    /// The instrument.
     pub instrument: String,
-    /// The force at which the play was read, N.
     pub force_n: f64,
 }
 
 /// One actuator in one flight: its unit, and everything needed to simulate it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedActuator {
-    /// The place.
     pub position: String,
     /// Index of the design in the plan's parts.
     pub part: usize,
-    /// The unit.
     pub serial_number: String,
     /// The unit's age after the flight, hours.
     pub unit_hours: f64,
     /// The actuator, with the gap that the wear of this flight leaves.
     pub plant: Plant,
-    /// Commands and loads.
     pub profile: Profile,
-    /// The sensors that read it.
     pub sensors: Sensors,
 }
 
 /// One flight of the calendar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedFlight {
-    /// The aircraft.
     pub tail_number: String,
     /// The operator's name for the flight, unique in the fleet.
     pub flight_id: String,
@@ -96,9 +79,7 @@ pub struct PlannedFlight {
     pub flight_hours: f64,
     /// The tail's meter after the flight, hours.
     pub tail_hours_end: f64,
-    /// Whether it has a log.
     pub has_log: bool,
-    /// What happens to the file of that log.
     pub log_fault: Option<FaultKind>,
     /// The actuators, in the spec's order of positions.
     pub actuators: Vec<PlannedActuator>,
@@ -108,32 +89,23 @@ pub struct PlannedFlight {
 /// The unit of a logged channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChannelUnit {
-    /// m.
     Metre,
-    /// µm.
     Micrometre,
-    /// rad.
     Radian,
-    /// N.
     Newton,
-    /// N·m.
     NewtonMetre,
 }
 
 /// What was recorded of one actuator; NaN where a sample is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActuatorLog {
-    /// The place.
     pub position: String,
-    /// Motor position, in `motor_unit`.
     pub motor: Vec<f64>,
     /// Metres at the screw or radians of the resolver.
     pub motor_unit: ChannelUnit,
-    /// Screw position, in `screw_unit`.
     pub screw: Vec<f64>,
     /// Metres or micrometres, or radians of a rotary output.
     pub screw_unit: ChannelUnit,
-    /// Load, in `load_unit`.
     pub load: Vec<f64>,
     /// Newtons, or newton metres of a rotary output.
     pub load_unit: ChannelUnit,
@@ -153,11 +125,8 @@ pub struct SimulatedFlight {
 pub struct Plan {
     /// The designs, with their limits and nominal mechanics.
     pub parts: Vec<Part>,
-    /// Every stay, by tail, position and time.
     pub installations: Vec<Installation>,
-    /// Recorded re-shims, by time.
     pub maintenance: Vec<Maintenance>,
-    /// Play checks, by time.
     pub inspections: Vec<Inspection>,
     /// Every flight, by flight number, then tail.
     pub flights: Vec<PlannedFlight>,

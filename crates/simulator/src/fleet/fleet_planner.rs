@@ -23,7 +23,6 @@ struct Planner<'a> {
     /// The unit of each seat, an index into `units`.
     unit_at: Vec<usize>,
     units: Vec<FleetUnit>,
-    wear: Vec<ChaCha8Rng>,
     tail_hours: Vec<f64>,
     plan: Plan,
 }
@@ -42,14 +41,11 @@ impl Plan {
 impl<'a> Planner<'a> {
     /// Every tail on the ground with its first units.
     fn new(spec: &'a Spec) -> Result<Self, Error> {
-        let units = fleet_units(spec)?;
-        let wear = units.iter().map(|unit| seeded_rng(spec.seed, &["wear", &unit.serial_number])).collect();
         let mut planner = Self {
             spec,
             start_us: spec.start_us()?,
             unit_at: (0..spec.tails.len() * spec.positions.len()).collect(),
-            units,
-            wear,
+            units: fleet_units(spec)?,
             tail_hours: (0..spec.tails.len()).map(|k| spec.tail_hours * (1.0 + 0.1 * k as f64)).collect(),
             plan: Plan { parts: spec.parts.clone(), ..Plan::default() },
         };
@@ -219,7 +215,7 @@ impl<'a> Planner<'a> {
         let before_m = unit.wear.growth_m(unit.age_hours);
         unit.age_hours += flight_hours;
         let growth_m = unit.wear.growth_m(unit.age_hours) - before_m;
-        unit.gap_m += wear::step_m(growth_m, scatter_m, &mut self.wear[index]);
+        unit.gap_m += wear::step_m(growth_m, scatter_m, &mut unit.wear_rng);
     }
 
     /// Applies the wear of the flight and draws plant, profile and sensors.
@@ -305,17 +301,20 @@ struct FleetUnit {
     gap_m: f64,
     stiffness_factor: f64,
     wear: WearLaw,
+    wear_rng: ChaCha8Rng,
 }
 
 /// Every unit of the fleet, in order of tail and position at the start; then the spares, in the spec's order.
 fn fleet_units(spec: &Spec) -> Result<Vec<FleetUnit>, Error> {
-    let places = spec.tails.iter().flat_map(|tail| spec.positions.iter().map(move |place| (tail, place)));
-    let mut units: Vec<FleetUnit> = places
-        .enumerate()
-        .map(|(count, (tail, place))| unit(spec, tail, place, count))
-        .collect::<Result<_, _>>()?;
-    let spares: Vec<_> = spec.replacements.iter().map(|spare| spare_unit(spec, &units, spare)).collect();
-    units.extend(spares);
+    let mut units = Vec::new();
+    for tail in &spec.tails {
+        for place in &spec.positions {
+            units.push(unit(spec, tail, place, units.len())?);
+        }
+    }
+    for spare in &spec.replacements {
+        units.push(spare_unit(spec, &units, spare));
+    }
     let names: Vec<_> = units.iter().map(|unit| (unit.part, unit.serial_number.as_str())).collect();
     match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
         Some((_, (_, name))) => Err(Error::Twice { kind: "serial number", name: (*name).to_owned() }),
@@ -331,11 +330,12 @@ fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<Fleet
     let (gap_m, age_hours) = (between(chances.gap_m), between(chances.unit_hours));
     let stiffness_factor = 1.0 + between([-spec.spread.stiffness, spec.spread.stiffness]);
     let declared = spec.units.iter().find(|unit| unit.tail == tail && unit.position == place.position);
+    let serial_number = declared.and_then(|u| u.serial_number.clone());
+    let serial_number = serial_number.unwrap_or(format!("S{}", 10_001 + count));
     Ok(FleetUnit {
         part,
-        serial_number: declared
-            .and_then(|u| u.serial_number.clone())
-            .unwrap_or(format!("S{}", 10_001 + count)),
+        wear_rng: seeded_rng(spec.seed, &["wear", &serial_number]),
+        serial_number,
         age_hours: declared.and_then(|u| u.unit_hours).unwrap_or(age_hours),
         gap_m: declared.and_then(|u| u.gap_m).unwrap_or(gap_m),
         stiffness_factor: declared.and_then(|u| u.stiffness_factor).unwrap_or(stiffness_factor),
@@ -348,6 +348,7 @@ fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUni
     let part = units[seat(spec, &spare.tail, &spare.position)].part;
     FleetUnit {
         part,
+        wear_rng: seeded_rng(spec.seed, &["wear", &spare.serial_number]),
         serial_number: spare.serial_number.clone(),
         age_hours: spare.unit_hours,
         gap_m: spare.gap_m,

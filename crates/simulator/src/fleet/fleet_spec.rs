@@ -1,4 +1,5 @@
 //! Fleet specification `SPEC.toml`: every key has a default except names, parts and positions.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -19,24 +20,18 @@ pub const SAMPLE_SPEC: &str = include_str!("../../specs/sample.toml");
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Spec {
-    /// Everything random follows from this. Default 1.
     #[default(1)]
     pub seed: u64,
     /// Midnight UTC of this day opens the plan, `2026-03-02`.
     #[default("2026-03-02")]
     pub start_date: String,
-    /// Tail numbers.
     pub tails: Vec<String>,
-    /// How many flights each tail makes. Default 10.
     #[default(10)]
     pub flights_per_tail: usize,
-    /// One flight of this many in a row, drawn at random, has a log. Default 1: each.
     #[default(1)]
     pub flights_per_log: usize,
-    /// Days from one flight of a tail to the next; below 1, several flights a day. Default 7.
     #[default(7.0)]
     pub days_between_flights: f64,
-    /// Mean length of a flight, hours. Default 1.8.
     #[default(1.8)]
     pub flight_hours: f64,
     /// Flights last evenly between ± this share of the mean. Default 0.3.
@@ -45,29 +40,17 @@ pub struct Spec {
     /// What the first tail's meter reads at the start, hours; each further tail has 10 % more. Default 2000.
     #[default(2000.0)]
     pub tail_hours: f64,
-    /// Length, rate and loads of the logs.
     pub profile: Profile,
-    /// The sensors of every actuator.
     pub sensors: Sensors,
-    /// How units, aircraft and flights differ from each other.
     pub spread: ParameterSpread,
-    /// The designs.
     pub parts: Vec<Part>,
-    /// The places on each tail.
     pub positions: Vec<Position>,
-    /// Units that are to differ from what chance gives.
     pub units: Vec<UnitSpec>,
-    /// Exchanges of two units.
     pub swaps: Vec<Swap>,
-    /// Removals of a unit for a spare.
     pub replacements: Vec<Replacement>,
-    /// Gaps set by a shim.
     pub reshims: Vec<Reshim>,
-    /// Play measured in the hangar.
     pub play_checks: Vec<PlayCheck>,
-    /// Log files that do not arrive as recorded.
     pub log_faults: Vec<LogFault>,
-    /// Changes that come over the flights.
     pub changes: Vec<PlantedChange>,
 }
 
@@ -99,23 +82,18 @@ pub struct ParameterSpread {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MotorLogFormat {
-    /// Metres at the screw.
     Position,
-    /// Resolver angle, radians, counted on through the turns.
     #[default]
     Angle,
-    /// Resolver angle, radians, −π to π.
     WrappedAngle,
 }
 
 /// Unit of a logged screw position.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ScrewLogUnit {
-    /// Millimetres.
     #[default]
     #[serde(rename = "mm")]
     Millimetre,
-    /// Micrometres.
     #[serde(rename = "um")]
     Micrometre,
 }
@@ -124,19 +102,15 @@ pub enum ScrewLogUnit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Part {
-    /// Its name.
     pub part_number: String,
     /// Travel of the screw per turn of the resolver, metres. Default 0.005.
     #[default(0.005)]
     pub lead_m: f64,
-    /// How its motor position is logged. Default `angle`.
     pub motor_log: MotorLogFormat,
-    /// Unit in which a linear screw position is logged. Default `mm`.
     pub screw_log: ScrewLogUnit,
     /// For a rotary actuator the radius r at which its metres and newtons are meant: the output is
     /// logged as `X/r` in radians and the load as `F·r` in N·m. Default none, a linear actuator.
     pub reference_radius_m: Option<f64>,
-    /// The gap at which a unit must be removed, metres. Default 200 µm.
     #[default(200e-6)]
     pub limit_m: f64,
     /// Least and greatest gap of a unit at the start, metres. Default 50 to 90 µm.
@@ -145,7 +119,6 @@ pub struct Part {
     /// Least and greatest age of a unit at the start, hours. Default 400 to 1600.
     #[default([400.0, 1600.0])]
     pub unit_hours: [f64; 2],
-    /// How its units wear. Default steady.
     pub wear: WearLaw,
     /// Unevenness of wear, metres: the variance of a growth is this times the growth. Default 0.
     pub wear_scatter_m: f64,
@@ -157,14 +130,10 @@ pub struct Part {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Position {
-    /// Its name, as logs and installations use it.
     pub position: String,
-    /// The design that fits there.
     pub part_number: String,
-    /// Its load over the profile's. Default 1.
     #[default(1.0)]
     pub load_factor: f64,
-    /// Its load never changes sign. Default false.
     pub no_reversal: bool,
 }
 
@@ -172,19 +141,13 @@ pub struct Position {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UnitSpec {
-    /// The tail it starts on.
     pub tail: String,
-    /// The place it starts in.
     pub position: String,
     /// Its serial number. Default: counted up from `S10001`.
     pub serial_number: Option<String>,
-    /// Its gap at the start, metres.
     pub gap_m: Option<f64>,
-    /// Its age at the start, hours.
     pub unit_hours: Option<f64>,
-    /// Its stiffness over the part's.
     pub stiffness_factor: Option<f64>,
-    /// How it wears.
     pub wear: Option<WearLaw>,
 }
 
@@ -198,19 +161,28 @@ impl Spec {
 
     /// Index of the part of a position.
     pub(crate) fn part_of(&self, place: &Position) -> Result<usize, Error> {
-        self.known_part(&format!("position \"{}\"", place.position), &place.part_number)
+        let who = format!("position \"{}\"", place.position);
+        known(&who, "part", &place.part_number, &self.part_numbers())
     }
 
-    fn known_part(&self, who: &str, part_number: &str) -> Result<usize, Error> {
-        known(who, "part", part_number, self.parts.iter().map(|part| part.part_number.as_str()))
+    fn tails(&self) -> Vec<&str> {
+        self.tails.iter().map(String::as_str).collect()
+    }
+
+    fn part_numbers(&self) -> Vec<&str> {
+        self.parts.iter().map(|part| part.part_number.as_str()).collect()
+    }
+
+    fn positions(&self) -> Vec<&str> {
+        self.positions.iter().map(|place| place.position.as_str()).collect()
     }
 
     /// Checks that every number is in its range and every name is declared once.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.start_us()?;
-        check_unique("tails", "tail", self.tails.iter().map(String::as_str))?;
-        check_unique("parts", "part", self.parts.iter().map(|part| part.part_number.as_str()))?;
-        check_unique("positions", "position", self.positions.iter().map(|of| of.position.as_str()))?;
+        check_unique("tails", "tail", &self.tails())?;
+        check_unique("parts", "part", &self.part_numbers())?;
+        check_unique("positions", "position", &self.positions())?;
         // Every seed is possible, but not every one is a number of TOML.
         ranges::check("", &Self { seed: 0, ..self.clone() })?;
         self.check_departures()?;
@@ -257,32 +229,24 @@ impl Spec {
             let must = "between 1 and the number of the tail's logs".to_owned();
             return Err(Error::Value { key: "log_faults log".to_owned(), value: fault.log as f64, must });
         }
-        self.check_tail("a log fault", &fault.tail)
+        known("a log fault", "tail", &fault.tail, &self.tails()).map(drop)
     }
 
     fn check_change(&self, change: &PlantedChange) -> Result<(), Error> {
         let tail = change.tail.as_deref().unwrap_or(&self.tails[0]);
         let position = change.position.as_deref().unwrap_or(&self.positions[0].position);
         self.check_place("a change", tail, position)?;
-        change.part_number.iter().try_for_each(|part| self.known_part("a change", part).map(drop))
-    }
-
-    fn check_tail(&self, who: &str, tail: &str) -> Result<(), Error> {
-        known(who, "tail", tail, self.tails.iter().map(String::as_str)).map(drop)
+        let part_numbers = change.part_number.iter();
+        part_numbers.map(|part| known("a change", "part", part, &self.part_numbers()).map(drop)).collect()
     }
 
     fn check_place(&self, who: &str, tail: &str, position: &str) -> Result<(), Error> {
-        self.check_tail(who, tail)?;
-        known(who, "position", position, self.positions.iter().map(|of| of.position.as_str())).map(drop)
+        known(who, "tail", tail, &self.tails())?;
+        known(who, "position", position, &self.positions()).map(drop)
     }
 }
 
-fn check_unique<'a>(
-    key: &'static str,
-    kind: &'static str,
-    names: impl Iterator<Item = &'a str>,
-) -> Result<(), Error> {
-    let names: Vec<&str> = names.collect();
+fn check_unique(key: &'static str, kind: &'static str, names: &[&str]) -> Result<(), Error> {
     if names.is_empty() || names.contains(&"") {
         return Err(Error::Empty { key });
     }
@@ -291,13 +255,7 @@ fn check_unique<'a>(
 }
 
 /// Index of a name among the declared ones; `who` uses it.
-fn known<'a>(
-    who: &str,
-    kind: &'static str,
-    name: &str,
-    declared: impl Iterator<Item = &'a str>,
-) -> Result<usize, Error> {
-    let declared: Vec<&str> = declared.collect();
+fn known(who: &str, kind: &'static str, name: &str, declared: &[&str]) -> Result<usize, Error> {
     declared.iter().position(|known| *known == name).ok_or_else(|| Error::Unknown {
         place: who.to_owned(),
         kind,

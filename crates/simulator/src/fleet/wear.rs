@@ -1,4 +1,5 @@
 //! How a gap grows with a unit's hours: a mean law, and the unevenness of real wear.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Gamma};
@@ -12,33 +13,13 @@ pub enum WearLaw {
     #[default]
     Steady,
     /// `rate · h`.
-    Linear {
-        /// Growth per flight hour, m/h.
-        rate_m_per_hour: f64,
-    },
+    Linear { rate_m_per_hour: f64 },
     /// `amplitude · (h / life)^exponent`.
-    Power {
-        /// Growth at the life, metres.
-        amplitude_m: f64,
-        /// The life, hours.
-        life_hours: f64,
-        /// Below one: running in; above one: wearing out.
-        exponent: f64,
-    },
+    Power { amplitude_m: f64, life_hours: f64, exponent: f64 },
     /// `amplitude · (e^(h / life) − 1)`.
-    Exponential {
-        /// The scale, metres.
-        amplitude_m: f64,
-        /// Hours in which growth rises e-fold.
-        life_hours: f64,
-    },
+    Exponential { amplitude_m: f64, life_hours: f64 },
     /// Nothing until `onset_hours`, then `rate` per hour.
-    Onset {
-        /// Age at which wear sets in, hours.
-        onset_hours: f64,
-        /// Growth per flight hour from then on, m/h.
-        rate_m_per_hour: f64,
-    },
+    Onset { onset_hours: f64, rate_m_per_hour: f64 },
 }
 
 impl WearLaw {

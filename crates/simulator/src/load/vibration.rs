@@ -1,4 +1,5 @@
 //! Vibration: band-limited noise and spectral lines, made at the integrator's step.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use std::f64::consts::TAU;
 
@@ -15,11 +16,8 @@ use crate::seeded_streams::seeded_rng;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Line {
-    /// Frequency, Hz, 0.5 to 500.
     pub frequency_hz: f64,
-    /// Amplitude, in the unit of the vibration. Default 0.
     pub amplitude: f64,
-    /// The phase walks at random, its variance growing by this squared each second, rad/√s. Default 0.
     pub phase_walk_rad: f64,
 }
 
@@ -29,15 +27,11 @@ pub struct Line {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vibration {
-    /// Lower edge of the band, Hz, 0.5 to 500. Default 5.
     #[default(5.0)]
     pub low_hz: f64,
-    /// Upper edge of the band, Hz. Default 60.
     #[default(60.0)]
     pub high_hz: f64,
-    /// Rms of the noise in the band. Default 0.
     pub rms: f64,
-    /// Spectral lines.
     pub lines: Vec<Line>,
 }
 
@@ -45,11 +39,6 @@ impl Vibration {
     /// Noise between two frequencies.
     pub fn band(low_hz: f64, high_hz: f64, rms: f64) -> Self {
         Self { low_hz, high_hz, rms, lines: Vec::new() }
-    }
-
-    /// Whether there is none.
-    pub fn is_silent(&self) -> bool {
-        self.rms == 0.0 && self.lines.iter().all(|line| line.amplitude == 0.0)
     }
 }
 

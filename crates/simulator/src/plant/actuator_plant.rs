@@ -1,4 +1,5 @@
 //! The actuator: two masses at the screw, the coupling between them, friction on both, and the drive.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
@@ -11,23 +12,16 @@ use crate::plant::motor_controller::Drive;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plant {
-    /// The motor's inertia seen at the screw, `J (2π/lead)²`, kg. Default 80.
     #[default(80.0)]
     pub motor_mass_kg: f64,
-    /// The screw and what is fixed to it, kg. Default 8.
     #[default(8.0)]
     pub screw_mass_kg: f64,
-    /// The coupling. Default 5·10⁷ N/m, 2000 N·s/m, gap 100 µm, offset 100 µm, linear.
     pub contact: Contact,
-    /// Friction on the motor. Default 250 N, 0.04, 3000 N·s/m.
     #[default(Friction::new(250.0, 0.04, 3000.0))]
     pub motor_friction: Friction,
-    /// Friction on the screw. Default 150 N, 0.03, 1000 N·s/m.
     #[default(Friction::new(150.0, 0.03, 1000.0))]
     pub screw_friction: Friction,
-    /// How dry friction answers to speed, for both masses. Default Coulomb, equation 1.
     pub friction_law: FrictionLaw,
-    /// The position loop of the motor.
     pub drive: Drive,
 }
 

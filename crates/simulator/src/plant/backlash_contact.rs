@@ -4,6 +4,7 @@
 //! and a step of the integrator uses the *mean* force along the step, ΔV/Δδ (a discrete gradient,
 //! Gonzalez 1996), so that elastic energy is exchanged exactly, whatever the step and wherever within
 //! it the flank is met.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
@@ -21,26 +22,11 @@ pub enum ContactLaw {
     #[default]
     Linear,
     /// Stiffness `share · K` while `p < depth_m`, K beyond: a flank bedding in at low load.
-    Soft {
-        /// The stiffness at low load, as a share of K, 0 to 1.
-        share: f64,
-        /// The penetration up to which it is soft, metres.
-        depth_m: f64,
-    },
+    Soft { share: f64, depth_m: f64 },
     /// `F = K ((1 − share) p + share · p^1.5 / √reference_m)`: point contacts among the linear ones.
-    Hertz {
-        /// The share of the force that follows Hertz, 0 to 1.
-        share: f64,
-        /// The penetration at which both parts are equally stiff in the secant, metres.
-        reference_m: f64,
-    },
+    Hertz { share: f64, reference_m: f64 },
     /// Stiffness `K (1 − (1 − share) e^(−p/depth_m))`: a toe that stiffens exponentially.
-    Toe {
-        /// The stiffness at the touch, as a share of K, 0 to 1.
-        share: f64,
-        /// The penetration within which the missing stiffness falls by a factor e, metres.
-        depth_m: f64,
-    },
+    Toe { share: f64, depth_m: f64 },
 }
 
 impl ContactLaw {
@@ -102,36 +88,23 @@ const LINE_POINTS: usize = 200;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Contact {
-    /// K, N/m: of one flank, beyond whatever softness `law` adds.
     #[default(5e7)]
     pub stiffness_n_per_m: f64,
-    /// f, N·s/m: acts while a flank is touched, and never makes it pull.
     #[default(2000.0)]
     pub damping_n_s_per_m: f64,
-    /// Total free travel, metres; negative for a preloaded nut, whose flanks both press that deep in the middle.
     #[default(100e-6)]
     pub gap_m: f64,
-    /// δX₀: the relative position X₂ − X₁ in the middle of the gap, metres.
     #[default(100e-6)]
     pub offset_m: f64,
-    /// How the force grows with the penetration.
     pub law: ContactLaw,
-    /// The law of the lower flank, which pushes the screw up. Default: `law`.
     pub lower_law: Option<ContactLaw>,
-    /// Stiffness of the lower flank over the upper's, 0.2 to 5. Default 1.
     #[default(1.0)]
     pub lower_stiffness_factor: f64,
-    /// Growth of the stiffness from the start to the end of the log, as a share, −0.5 to 1. Default 0.
     pub stiffness_drift: f64,
-    /// Growth of the gap from the start to the end of the log, as a share, −1 to 10. Default 0.
     pub gap_drift: f64,
-    /// Gap that the most worn place of the stroke has in addition to `gap_m`, metres. Default 0.
     pub worn_m: f64,
-    /// Screw position of that place, and distance at which the wear has fallen to 61 % (a bell curve), metres.
     #[default([0.0, 5e-3])]
     pub worn_at_m: [f64; 2],
-    /// Stiffness in the middle of each phase (preflight, take-off, climb, cruise, approach, landing)
-    /// over `stiffness_n_per_m`, changing linearly between, 0.2 to 5. Default 1 in each.
     #[default([1.0; 6])]
     pub stiffness_phase_factors: [f64; 6],
 }

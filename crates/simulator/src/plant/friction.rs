@@ -5,6 +5,7 @@
 //! ```
 //! sign(·) is a set at rest: a stopped mass holds any push up to the level in brackets. Nothing is
 //! smeared by a tanh, so a held mass does not creep.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
@@ -13,27 +14,16 @@ use smart_default::SmartDefault;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Friction {
-    /// `F_dry`, N.
     pub dry_n: f64,
-    /// η: the share of the load that is lost, about one minus the efficiency.
     pub load_share: f64,
-    /// `F_v`, N·s/m.
     pub viscous_n_s_per_m: f64,
-    /// η while the load drives the motion. Default: `load_share`, the same in both directions of power.
     pub backdriven_load_share: Option<f64>,
-    /// Dry and load-dependent friction is `1 + asymmetry` times as high in motion along +X and
-    /// `1 − asymmetry` times along −X, −0.9 to 0.9. Default 0.
     pub asymmetry: f64,
-    /// A grease film: drag `grease_n · 2u/(1 + u²)` with `u = |v|/grease_m_per_s`, zero at rest and
-    /// highest, `grease_n`, at that speed. Default 0.
     pub grease_n: f64,
-    /// Speed at which the drag of the grease film is highest, m/s. Default 0.002.
     #[default(2e-3)]
     pub grease_m_per_s: f64,
-    /// Viscous and grease drag at the start of the log over that of a warm actuator, 0.1 to 100. Default 1.
     #[default(1.0)]
     pub cold_factor: f64,
-    /// Time constant with which the drag falls to that of a warm actuator, seconds. Default 300.
     #[default(300.0)]
     pub warm_up_s: f64,
 }
@@ -102,30 +92,13 @@ pub enum FrictionLaw {
     #[default]
     Coulomb,
     /// The level is `ratio` times higher at rest and falls with speed as `exp(−(v/speed)²)`.
-    Stribeck {
-        /// Break-away level over sliding level, 1 or more.
-        ratio: f64,
-        /// The speed at which most of the difference is gone, m/s.
-        speed_m_per_s: f64,
-    },
+    Stribeck { ratio: f64, speed_m_per_s: f64 },
     /// Bristles that bend before they slide (Dahl's equation, the elastic heart of `LuGre`):
     /// `ṡ = (v − |v| s)/travel`, friction = level · s.
-    Presliding {
-        /// The travel over which the bristles bend, metres.
-        travel_m: f64,
-    },
+    Presliding { travel_m: f64 },
     /// The `LuGre` law: bristles of stiffness `level/travel` and a Stribeck curve g(v),
     /// `ż = v − |v| z/(g(v)/stiffness)`, friction = stiffness · z + damping · ż.
-    LuGre {
-        /// Sliding level over the bristles' stiffness, metres.
-        travel_m: f64,
-        /// Break-away level over sliding level, 1 or more.
-        ratio: f64,
-        /// The speed at which most of the difference is gone, m/s.
-        speed_m_per_s: f64,
-        /// Damping of the bristles, N·s/m.
-        damping_n_s_per_m: f64,
-    },
+    LuGre { travel_m: f64, ratio: f64, speed_m_per_s: f64, damping_n_s_per_m: f64 },
 }
 
 impl FrictionLaw {

@@ -9,16 +9,12 @@ use smart_default::SmartDefault;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Drive {
-    /// Bandwidth of the position loop, Hz. Default 6.
     #[default(6.0)]
     pub position_hz: f64,
-    /// Bandwidth of the speed loop, Hz. Default 40.
     #[default(40.0)]
     pub speed_hz: f64,
-    /// The most the motor can push, N. Default 40 000.
     #[default(40e3)]
     pub force_limit_n: f64,
-    /// Greatest commanded speed, m/s. Default 0.15.
     #[default(0.15)]
     pub speed_limit_m_per_s: f64,
 }

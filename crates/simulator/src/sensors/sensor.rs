@@ -3,6 +3,7 @@
 //! Position channels are described in metres at the screw, the load channel in newtons, whatever unit
 //! they are logged in later. Hysteresis, lag, averaging and delay act where the plant is sampled; all
 //! else acts here.
+#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use std::f64::consts::TAU;
 
@@ -22,11 +23,8 @@ const CUBIC_PEAK: f64 = 0.384_900_179_459_750_5;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PeriodicError {
-    /// Amplitude, in the channel's unit.
     pub amplitude: f64,
-    /// Travel of one period, in the channel's unit.
     pub period: f64,
-    /// Phase at position zero, radians. Default 0.
     pub phase_rad: f64,
 }
 
@@ -54,54 +52,29 @@ pub enum NoiseColour {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Channel {
-    /// White noise, rms.
     pub noise_rms: f64,
-    /// Resolution: readings are multiples of this.
     pub resolution: f64,
-    /// Reading over truth, minus one.
     pub gain_error: f64,
-    /// A constant added.
     pub bias: f64,
-    /// Added in proportion to time, this much by the end of the flight.
     pub drift: f64,
-    /// Positions: peak of an S-shaped error over the stroke, zero at its middle and ends. Load cell: error at `load_n`,
-    /// which grows with the square of the load and turns over with its sign.
     pub nonlinearity: f64,
-    /// The reading shows the truth of so long ago, seconds, −0.5 to 0.5; any part of a sample.
     pub delay_s: f64,
-    /// Share of samples missing (NaN), in bursts of about five.
     pub dropout_share: f64,
-    /// Spikes of one sample, per minute.
     pub spikes_per_minute: f64,
-    /// Height of a spike, either way.
     pub spike: f64,
-    /// How often per minute the channel repeats itself for a while.
     pub freezes_per_minute: f64,
-    /// For how long, seconds.
     pub freeze_s: f64,
-    /// Half the width of the hysteresis loop: the reading lags the truth by this when it has moved far
-    /// in one direction.
     pub hysteresis: f64,
-    /// Travel within which the hysteretic error turns to the other side, up to a factor e. Default 1000.
     #[default(1000.0)]
     pub hysteresis_length: f64,
-    /// Largest size that the channel shows, noise excepted; 0 for any. Default 0.
     pub clip: f64,
-    /// Time constant of a first-order lag, seconds, 0 to 1.
     pub lag_s: f64,
-    /// Each sample is the mean over the sample period that ends at its instant (anti-alias filter).
-    /// Adds half a sample period of delay. Default false.
     pub box_average: bool,
-    /// The channel's own samples per second, held between; 0 or any rate above the log's: the log's.
     pub rate_hz: f64,
-    /// Errors that repeat with the travel.
     pub periodic: Vec<PeriodicError>,
-    /// Coloured noise, rms, added to the white noise.
     pub coloured_rms: f64,
-    /// Corner of the coloured noise, Hz. Default 1.
     #[default(1.0)]
     pub coloured_hz: f64,
-    /// Spectrum of the coloured noise. Default `first_order`.
     pub coloured_form: NoiseColour,
 }
 
@@ -249,9 +222,7 @@ fn held_index(sample: usize, log_rate_hz: f64, rate_hz: f64) -> usize {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Clock {
-    /// White error of each stamp, rms, seconds. Default 0.
     pub jitter_s: f64,
-    /// Stamps are multiples of this, seconds; 0 for full resolution. Default 0.
     pub tick_s: f64,
 }
 
@@ -275,16 +246,12 @@ impl Clock {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {
-    /// The motor's resolver, in metres at the screw.
     #[default(Channel { noise_rms: 1e-6, resolution: 3e-7, ..Channel::default() })]
     pub motor: Channel,
-    /// The screw's position transducer, metres.
     #[default(Channel { noise_rms: 3e-6, resolution: 2.3e-6, ..Channel::default() })]
     pub screw: Channel,
-    /// The load cell, N.
     #[default(Channel { noise_rms: 40.0, resolution: 10.0, ..Channel::default() })]
     pub load: Channel,
-    /// The time stamps.
     pub clock: Clock,
 }
 
