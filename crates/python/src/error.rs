@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use records::Diagnostic;
 
-/// Which exception, by what the command's exit code would be.
+/// Which exception, by what the command's exit code would be: `LogError` and so on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum ExceptionClass {
     /// Some logs failed: 1.
@@ -14,22 +14,12 @@ pub(crate) enum ExceptionClass {
     Run,
 }
 
-impl ExceptionClass {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Log => "LogError",
-            Self::Config => "ConfigError",
-            Self::Run => "RunError",
-        }
-    }
-}
-
 /// An exception of `freeplay_ema._errors` that carries diagnostics.
 pub(crate) fn to_exception(py: Python<'_>, class: ExceptionClass, diagnostics: &[Diagnostic]) -> PyErr {
     let make = || -> PyResult<PyErr> {
         let texts: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
         let facts = serde_json::to_string(diagnostics).unwrap_or_default();
-        let class = py.import("freeplay_ema._errors")?.getattr(class.name())?;
+        let class = py.import("freeplay_ema._errors")?.getattr(format!("{class:?}Error"))?;
         Ok(PyErr::from_value(class.call1((texts.join("\n"), facts))?))
     };
     make().unwrap_or_else(|error| error)

@@ -12,32 +12,25 @@ mod spark_worker;
 mod store_results;
 mod table;
 
-use pyo3::prelude::*;
-
 /// The version written into every record.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-#[pymodule]
-fn _freeplay(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", VERSION)?;
-    module.add_class::<config::Config>()?;
-    module.add_class::<table::Table>()?;
-    module.add_function(wrap_pyfunction!(functions::estimate_logs, module)?)?;
-    module.add_function(wrap_pyfunction!(functions::estimate_arrays, module)?)?;
-    module.add_function(wrap_pyfunction!(functions::trace, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::trend, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::records, module)?)?;
-    module.add_function(wrap_pyfunction!(functions::normalize, module)?)?;
-    module.add_function(wrap_pyfunction!(functions::run, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::followed, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::backtest_forecasts, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::diff, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::explain, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::report, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::work, module)?)?;
-    module.add_function(wrap_pyfunction!(functions::check, module)?)?;
-    module.add_function(wrap_pyfunction!(numpy_input::data_pointer, module)?)?;
-    module.add_function(wrap_pyfunction!(spark_worker::process_task, module)?)?;
-    module.add_function(wrap_pyfunction!(spark_worker::run_distributed, module)?)?;
-    Ok(())
+#[pyo3::pymodule]
+mod _freeplay {
+    #[pymodule_export]
+    use crate::config::Config;
+    #[pymodule_export]
+    use crate::functions::{check, estimate_arrays, estimate_logs, normalize, run, trace};
+    #[pymodule_export]
+    use crate::numpy_input::data_pointer;
+    #[pymodule_export]
+    use crate::spark_worker::{process_task, run_distributed};
+    #[pymodule_export]
+    use crate::store_results::{backtest_forecasts, diff, explain, followed, records, report, trend, work};
+    #[pymodule_export]
+    use crate::table::Table;
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "Python reads this name")]
+    const __version__: &str = crate::VERSION;
 }

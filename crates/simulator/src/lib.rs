@@ -22,7 +22,7 @@ mod seeded_streams;
 mod sensors;
 
 pub use error::Error;
-pub use fleet::fleet_events::{FaultKind, PlantedChange};
+pub use fleet::fleet_events::FaultKind;
 pub use fleet::fleet_plan::{
     ActuatorLog, ChannelUnit, Plan, PlannedActuator, PlannedFlight, SimulatedFlight,
 };

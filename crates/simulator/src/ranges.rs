@@ -110,26 +110,17 @@ mod tests {
     #[test]
     fn every_range_is_that_of_a_key() {
         let rest = r#"
-            [[units]]
-            tail = "A"
-            position = "P"
-            stiffness_factor = 1.0
-            wear = { onset = { onset_hours = 1.0, rate_m_per_hour = 0.0 } }
-            [[parts]]
-            part_number = "R"
-            reference_radius_m = 0.1
-            wear = { power = { amplitude_m = 0.0, life_hours = 1.0, exponent = 1.0 } }
-            [parts.plant]
-            motor_friction = { backdriven_load_share = 0.1 }
-            friction_law = { lu_gre = { travel_m = 1e-6, ratio = 1.0, speed_m_per_s = 1.0, damping_n_s_per_m = 0.0 } }
-            contact = { law = { soft = { share = 0.1, depth_m = 1e-6 } }, lower_law = { hertz = { share = 0.1, reference_m = 1e-6 } } }
-            [[changes]]
-            buffet = { lines = [{}] }
-            [sensors.motor]
-            periodic = [{}]
+            units = [{ tail = "A", position = "P", stiffness_factor = 1.0, wear.onset.onset_hours = 1.0, wear.onset.rate_m_per_hour = 0.0 }]
+            parts = [{ plant.contact.law.hertz.share = 0.1, plant.contact.law.hertz.reference_m = 1e-6 }]
         "#;
+        let specs = [
+            crate::SAMPLE_SPEC,
+            include_str!("../specs/three_aircraft.toml"),
+            include_str!("../specs/rough.toml"),
+            include_str!("../specs/harsh.toml"),
+        ];
         let mut found = BTreeSet::new();
-        for text in [crate::SAMPLE_SPEC, rest] {
+        for text in specs.into_iter().chain([rest]) {
             let spec: Spec = toml::from_str(text).unwrap();
             paths("", &Value::try_from(spec).unwrap(), &mut found);
         }

@@ -1,7 +1,7 @@
 //! The accuracy study: flights of known gap, the methods compared, and how far each is from the truth.
 //!
-//! [`scenarios::classes`] lists classes of flights, each with one assumption of the estimator broken;
-//! `scenarios::Class::fly` draws and flies a flight from a class and an index.
+//! [`scenarios::CLASSES`] lists classes of flights, each with one assumption of the estimator broken;
+//! `scenarios::Class::case` draws a flight from a class and an index.
 //!
 //! `simulator` shares no equation with `estimator`, so neither can flatter the other.
 
@@ -20,15 +20,4 @@ pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
     values
         .iter()
         .fold(template.to_owned(), |text, (name, value)| text.replace(&format!("{{{{{name}}}}}"), value))
-}
-
-/// Writes a file into a folder, which is created.
-///
-/// # Errors
-/// Why it cannot be written, as text.
-pub fn write(folder: &std::path::Path, name: &str, text: &str) -> Result<(), String> {
-    let file = folder.join(name);
-    std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(&file, text))
-        .map_err(|e| format!("{}: {e}", file.display()))
 }

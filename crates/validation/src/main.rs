@@ -13,8 +13,8 @@ use rayon::prelude::*;
 use validation::methods::{MethodResults, estimate_flight};
 use validation::metrics::ErrorStats;
 use validation::paper::{self, Claims};
-use validation::scenarios::{Class, Kind, classes};
-use validation::{accuracy_page, gear_bench, plots, robot_logs, write};
+use validation::scenarios::{CLASSES, Class, Kind};
+use validation::{accuracy_page, gear_bench, plots, robot_logs};
 
 /// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]
@@ -69,7 +69,7 @@ fn run(args: &Args) -> Result<(), String> {
         return write_pictures(folder, paper::pictures(&claims));
     }
     let is_wanted = |class: &&Class| args.only.as_ref().is_none_or(|text| class.name.contains(text));
-    let wanted: Vec<&Class> = classes().iter().filter(is_wanted).collect();
+    let wanted: Vec<&Class> = CLASSES.iter().filter(is_wanted).collect();
     if args.list {
         wanted.iter().for_each(|class| println!("{}", class.name));
         return Ok(());
@@ -89,6 +89,14 @@ fn run(args: &Args) -> Result<(), String> {
             Ok(())
         }
     }
+}
+
+/// Writes a file into a folder, which is created.
+fn write(folder: &Path, name: &str, text: &str) -> Result<(), String> {
+    let file = folder.join(name);
+    std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&file, text))
+        .map_err(|e| format!("{}: {e}", file.display()))
 }
 
 fn write_pictures(

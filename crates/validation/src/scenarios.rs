@@ -60,11 +60,6 @@ pub struct Class {
 /// Changes a case by chance.
 type Draw = fn(&mut Case, &mut ChaCha8Rng);
 
-/// Every class.
-pub fn classes() -> &'static [Class] {
-    CLASSES
-}
-
 const UM: f64 = 1e-6;
 
 /// A flight of 100 µm with nothing but the change.
@@ -91,7 +86,8 @@ const fn drawn(name: &'static str, change: Draw) -> Class {
 
 fn nothing(_: &mut Case, _: &mut ChaCha8Rng) {}
 
-static CLASSES: &[Class] = &[
+/// Every class.
+pub static CLASSES: &[Class] = &[
     single("nominal", nothing),
     single("stiffness assumed 30 % high", |c, _| c.assumed_factor = 1.3),
     single("stiffness assumed 30 % low", |c, _| c.assumed_factor = 0.7),

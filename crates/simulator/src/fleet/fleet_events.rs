@@ -1,5 +1,4 @@
 //! Events of a fleet's life in a [`Spec`](crate::Spec): exchanges, replacements, re-shims, inspections, changes, faulty log files.
-#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;

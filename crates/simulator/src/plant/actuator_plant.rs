@@ -46,7 +46,6 @@ impl Plant {
     }
 
     /// The actuator as it is at a time of a log.
-    #[must_use]
     pub(crate) fn at(&self, time_s: f64, duration_s: f64) -> Self {
         Self {
             contact: self.contact.at(time_s / duration_s),

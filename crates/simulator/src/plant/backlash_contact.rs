@@ -120,7 +120,6 @@ pub(crate) struct MeanForce {
 
 impl Contact {
     /// The coupling at a share of the log, with the stiffness and the gap it has by then.
-    #[must_use]
     pub(crate) fn at(&self, progress: f64) -> Self {
         let progress = progress.clamp(0.0, 1.0);
         let factor = phase_factor(progress, &self.stiffness_phase_factors);

@@ -44,7 +44,6 @@ impl Friction {
     }
 
     /// The same friction, dry and load-dependent parts times a factor.
-    #[must_use]
     pub(crate) fn scaled(self, factor: f64) -> Self {
         let backdriven_load_share = self.backdriven_load_share.map(|share| share * factor);
         let (dry_n, load_share) = (self.dry_n * factor, self.load_share * factor);
@@ -57,7 +56,6 @@ impl Friction {
     }
 
     /// The friction at a time of the log, seconds.
-    #[must_use]
     pub(crate) fn at(self, time_s: f64) -> Self {
         if !self.is_warming() {
             return self;
@@ -114,16 +112,6 @@ impl FrictionLaw {
         }
     }
 
-    /// The dry levels in force during a step that starts at the speed given.
-    fn levels(&self, sliding: Levels, speed_m_per_s: f64) -> Levels {
-        let (ratio, knee_m_per_s, _) = self.parameters();
-        if ratio <= 1.0 {
-            return sliding;
-        }
-        let lift = 1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee_m_per_s).powi(2)).exp();
-        Levels { up_n: sliding.up_n * lift, down_n: sliding.down_n * lift }
-    }
-
     /// One mass under friction during a step.
     ///
     /// `inertia_n_s_per_m` is twice the mass over the step, `bend` the bristles' before it.
@@ -137,10 +125,12 @@ impl FrictionLaw {
         step_s: f64,
     ) -> FrictionBody {
         let sliding = friction.sliding(load_n);
-        let (_, _, bristle) = self.parameters();
+        let (ratio, knee_m_per_s, bristle) = self.parameters();
+        let stribeck = || 1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee_m_per_s).powi(2)).exp();
+        let lift = if ratio > 1.0 { stribeck() } else { 1.0 };
         FrictionBody {
             inertia_n_s_per_m: inertia_n_s_per_m + friction.drag_n_s_per_m(speed_m_per_s),
-            levels: self.levels(sliding, speed_m_per_s),
+            levels: Levels { up_n: sliding.up_n * lift, down_n: sliding.down_n * lift },
             bristle: bristle.map(|(travel_m, damping)| Bristle {
                 bend,
                 rate_s_per_m: step_s / travel_m,
@@ -247,8 +237,8 @@ mod tests {
     fn stribeck_holds_more_than_it_drags() {
         let friction = Friction::new(100.0, 0.1, 0.0);
         let law = FrictionLaw::Stribeck { ratio: 1.5, speed_m_per_s: 1e-3 };
-        assert_eq!(law.levels(friction.sliding(-1000.0), 0.0).up_n, 300.0);
-        assert!((law.levels(friction.sliding(-1000.0), 1.0).down_n - 200.0).abs() < 1e-9);
+        assert_eq!(body(law, &friction, -1000.0, 0.0, 0.0).levels.up_n, 300.0);
+        assert!((body(law, &friction, -1000.0, 1.0, 0.0).levels.down_n - 200.0).abs() < 1e-9);
     }
 
     /// A screw that loses 10 % when it drives and 4 % when it is driven, under 1 kN along +X.

@@ -98,17 +98,43 @@ impl Channel {
     }
 
     /// Turns the truth at the channel's own sample instants into readings at those of the log.
-    pub(crate) fn read_log(&self, values: Vec<f64>, profile: &Profile, seed: u64, name: &str) -> Vec<f64> {
+    pub(crate) fn read_log(
+        &self,
+        mut values: Vec<f64>,
+        profile: &Profile,
+        seed: u64,
+        name: &str,
+    ) -> Vec<f64> {
         let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
         let coloured =
             self.coloured(values.len(), rate_hz, &mut seeded_rng(seed, &["sensor", name, "coloured"]));
         let rng = &mut seeded_rng(seed, &["sensor", name]);
-        let read = self.read(values, &coloured, profile, name, rng);
+        let last = (values.len().max(2) - 1) as f64;
+        // The error of a channel whose nonlinearity is one: of a load over `load_n`, of a position over the stroke.
+        let nonlinearity = |value: f64| match name {
+            "load" => value * value.abs() / (profile.load_n * profile.load_n),
+            _ => {
+                let u = (value / profile.stroke_m).clamp(-1.0, 1.0);
+                (u - u.powi(3)) / CUBIC_PEAK
+            }
+        };
+        for (k, value) in values.iter_mut().enumerate() {
+            let bent = self.nonlinearity * nonlinearity(*value)
+                + self.periodic.iter().map(|error| error.at(*value)).sum::<f64>()
+                + coloured.get(k).copied().unwrap_or(0.0);
+            let white: f64 = StandardNormal.sample(rng);
+            let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
+            let most = if self.clip > 0.0 { self.clip } else { f64::INFINITY };
+            *value = rounded(level.clamp(-most, most) + self.noise_rms * white, self.resolution);
+        }
+        self.freeze(&mut values, rate_hz, rng);
+        self.spike(&mut values, rate_hz, rng);
+        self.drop_out(&mut values, rng);
         if rate_hz < profile.sample_rate_hz {
-            let hold = |k| read[held_index(k, profile.sample_rate_hz, rate_hz)];
+            let hold = |k| values[held_index(k, profile.sample_rate_hz, rate_hz)];
             return (0..profile.samples()).map(hold).collect();
         }
-        read
+        values
     }
 
     /// Coloured noise of unit rms times `coloured_rms`; empty without.
@@ -135,39 +161,6 @@ impl Channel {
             }
         }
         sum
-    }
-
-    fn read(
-        &self,
-        mut values: Vec<f64>,
-        coloured: &[f64],
-        profile: &Profile,
-        name: &str,
-        rng: &mut ChaCha8Rng,
-    ) -> Vec<f64> {
-        let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
-        let last = (values.len().max(2) - 1) as f64;
-        // The error of a channel whose nonlinearity is one: of a load over `load_n`, of a position over the stroke.
-        let nonlinearity = |value: f64| match name {
-            "load" => value * value.abs() / (profile.load_n * profile.load_n),
-            _ => {
-                let u = (value / profile.stroke_m).clamp(-1.0, 1.0);
-                (u - u.powi(3)) / CUBIC_PEAK
-            }
-        };
-        for (k, value) in values.iter_mut().enumerate() {
-            let bent = self.nonlinearity * nonlinearity(*value)
-                + self.periodic.iter().map(|error| error.at(*value)).sum::<f64>()
-                + coloured.get(k).copied().unwrap_or(0.0);
-            let white: f64 = StandardNormal.sample(rng);
-            let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
-            let most = if self.clip > 0.0 { self.clip } else { f64::INFINITY };
-            *value = rounded(level.clamp(-most, most) + self.noise_rms * white, self.resolution);
-        }
-        self.freeze(&mut values, rate_hz, rng);
-        self.spike(&mut values, rate_hz, rng);
-        self.drop_out(&mut values, rng);
-        values
     }
 
     fn freeze(&self, values: &mut [f64], rate_hz: f64, rng: &mut ChaCha8Rng) {
@@ -275,7 +268,7 @@ mod tests {
 
     fn read(channel: &Channel, value: f64, samples: usize) -> Vec<f64> {
         let profile = Profile { stroke_m: 1.0, sample_rate_hz: 100.0, ..Profile::default() };
-        channel.read(vec![value; samples], &[], &profile, "screw", &mut seeded_rng(3, &["sensor"]))
+        channel.read_log(vec![value; samples], &profile, 3, "screw")
     }
 
     /// First-order noise: autocorrelation `e^(−2πft)`; flicker: equal power in each decade.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use validation::methods::{MethodResults, estimate_flight};
-use validation::scenarios::{Class, Kind, classes};
+use validation::scenarios::{CLASSES, Class, Kind};
 
 /// Flights of each class in a test, and in the gate; and the least share of intervals that hold.
 const SIZES: [(u64, f64); 2] = [(1, 0.76), (3, 0.83)];
@@ -14,10 +14,8 @@ const FIRST: u64 = 40_000;
 #[test]
 fn nine_in_ten_intervals_hold_and_no_blind_flight_is_estimated() {
     let (of_class, least) = SIZES[usize::from(crate::gate::is_gate())];
-    let flights: Vec<(&Class, u64)> = classes()
-        .iter()
-        .flat_map(|class| (FIRST..FIRST + of_class).map(move |index| (class, index)))
-        .collect();
+    let flights: Vec<(&Class, u64)> =
+        CLASSES.iter().flat_map(|class| (FIRST..FIRST + of_class).map(move |index| (class, index))).collect();
     assert!(flights.len() >= 68 * of_class as usize, "{} flights", flights.len());
     let results: Vec<(&Class, MethodResults)> =
         flights.par_iter().map(|(class, index)| (*class, estimate_flight(class, *index).unwrap())).collect();
