@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use crate::fill;
 use crate::gear_bench::{GEAR_METHODS, GearBenchLog};
 use crate::methods::METHODS;
 use crate::metrics::{ErrorStats, FALSE_ALARMS};
@@ -12,8 +11,15 @@ use crate::robot_logs::RobotRow;
 const ROBOT_HEAD: &str =
     "log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks";
 
+/// A template with its places `{{NAME}}` filled.
+pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
+    values
+        .iter()
+        .fold(template.to_owned(), |text, (name, value)| text.replace(&format!("{{{{{name}}}}}"), value))
+}
+
 /// Fills the template's places with tables.
-pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
+pub(crate) fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
     let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
     let visible: Vec<&ErrorStats> = visible(stats).collect();
     // The page lists a class whose P95 error is at least one per cent or one micrometre, of whose intervals fewer than 90 % hold
@@ -37,7 +43,7 @@ pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchL
 }
 
 /// The tables of simulated flights, for a reduced run.
-pub fn tables(stats: &[ErrorStats]) -> String {
+pub(crate) fn tables(stats: &[ErrorStats]) -> String {
     let visible: Vec<&ErrorStats> = visible(stats).collect();
     [classes(&visible), methods(&visible), alarms(&visible), refusals(stats)].join("\n")
 }
@@ -66,7 +72,7 @@ fn classes(stats: &[&ErrorStats]) -> String {
 }
 
 /// Every number of the study as a table of comma-separated values: a row for each class and method.
-pub fn csv(stats: &[ErrorStats]) -> String {
+pub(crate) fn csv(stats: &[ErrorStats]) -> String {
     let alarms = FALSE_ALARMS.map(|flag| format!("false_{flag}")).join(",");
     let mut table = format!(
         "scenario,method,unit,flights,estimated,median,p95,worst,coverage,coverage_low,coverage_high,codes,{alarms}\n"

@@ -23,7 +23,7 @@ pub(crate) const GEAR_METHODS: [&str; 5] = [METHODS[0], "its loop width", METHOD
 
 /// The results of every method for one log, degrees.
 #[derive(Debug, Clone, Copy)]
-pub struct GearBenchLog {
+pub(crate) struct GearBenchLog {
     /// Play of this phase as its authors measured it, over three places of the output.
     pub(crate) authors_deg: f64,
     /// Over the ramps to 4 N·m, and over all, those to 40 N·m included: by method of [`GEAR_METHODS`]; NaN where it gives
@@ -41,10 +41,7 @@ const REFERENCE_LOAD_N: f64 = 20.0;
 const LAST_SMALL_RAMP: f64 = 4.0;
 
 /// Reads every log of a folder that its `manifest.csv` lists with a published play.
-///
-/// # Errors
-/// A file that cannot be read or lacks a column, as text.
-pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
+pub(crate) fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let text = |error: ingest::Error| error.diagnostic().to_string();
     let manifest = TableBatch::read(&folder.join("manifest.csv")).map_err(text)?;
     let column = |name: &str| manifest.column(&[name]).map_err(text);

@@ -1,4 +1,8 @@
-//! Runs the accuracy study and writes `docs/accuracy.md`, or reproduces the paper and writes `docs/paper.md`.
+//! The accuracy study, which writes `docs/accuracy.md`: flights of known gap, the methods compared, and how far each is from
+//! the truth. The paper reproduced, which writes `docs/paper.md`.
+//!
+//! [`scenarios::CLASSES`] lists classes of flights, each with one assumption of the estimator broken; `Class::case` draws a
+//! flight from a class and an index. `simulator` shares no equation with `estimator`, so neither can flatter the other.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a study prints")]
 
@@ -10,11 +14,25 @@ use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use validation::methods::{MethodResults, estimate_flight};
-use validation::metrics::ErrorStats;
-use validation::paper::{self, Claims};
-use validation::scenarios::{CLASSES, Class, Kind};
-use validation::{accuracy_page, gear_bench, plots, robot_logs};
+use crate::methods::{MethodResults, estimate_flight};
+use crate::metrics::ErrorStats;
+use crate::paper::Claims;
+use crate::scenarios::{CLASSES, Class, Kind};
+
+mod accuracy_page;
+#[cfg(test)]
+mod coverage;
+mod drawing;
+#[cfg(test)]
+#[path = "../../../tests/gate.rs"]
+mod gate;
+mod gear_bench;
+mod methods;
+mod metrics;
+mod paper;
+mod plots;
+mod robot_logs;
+mod scenarios;
 
 /// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]

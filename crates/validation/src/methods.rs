@@ -13,17 +13,17 @@ use crate::scenarios::Class;
 
 /// The results of every method for one flight, m; NaN where a method gave no number.
 #[derive(Debug, Clone)]
-pub struct MethodResults {
+pub(crate) struct MethodResults {
     /// Index of the flight in its class.
-    pub index: u64,
+    pub(crate) index: u64,
     /// The true gap, extrapolated from the stiff part of the flanks.
-    pub truth_m: f64,
+    pub(crate) truth_m: f64,
     /// Contact regression with its 90 % bounds: gap, lower, upper.
-    pub contact: Option<(f64, f64, f64)>,
+    pub(crate) contact: Option<(f64, f64, f64)>,
     /// The reason of a refusal, or the flags of an estimate.
-    pub codes: Vec<String>,
+    pub(crate) codes: Vec<String>,
     /// By method: see `METHODS`.
-    pub by_method_m: [f64; METHODS.len()],
+    pub(crate) by_method_m: [f64; METHODS.len()],
 }
 
 /// The methods compared, ours first.
@@ -37,10 +37,7 @@ const UNKNOWN_FORCE_N: f64 = 200.0;
 const BANDWIDTH_HZ: f64 = 10.0;
 
 /// Flies a flight of a class and applies every method, as `freeplay estimate` would.
-///
-/// # Errors
-/// The error of the simulator, of reading the channels or of the estimator as text, after the class.
-pub fn estimate_flight(class: &Class, index: u64) -> Result<MethodResults, String> {
+pub(crate) fn estimate_flight(class: &Class, index: u64) -> Result<MethodResults, String> {
     apply_methods(class, index).map_err(|error| format!("{} {index}: {error}", class.name))
 }
 

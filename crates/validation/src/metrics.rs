@@ -22,7 +22,7 @@ const VISIBLE_GAP_M: f64 = 10e-6;
 
 /// The errors of every method over the flights of one class.
 #[derive(Debug, Clone)]
-pub struct ErrorStats {
+pub(crate) struct ErrorStats {
     pub(crate) name: &'static str,
     pub(crate) kind: Kind,
     pub(crate) flights: usize,
@@ -65,7 +65,7 @@ impl Errors {
 
 impl ErrorStats {
     /// Summarises the results of a class.
-    pub fn new(class: &Class, results: &[MethodResults]) -> Self {
+    pub(crate) fn new(class: &Class, results: &[MethodResults]) -> Self {
         let case = class.case(0);
         let size = |a: &MethodResults, estimate_m: f64| {
             let unit_m = if class.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };

@@ -1,5 +1,7 @@
 //! The study's pictures: errors by method, errors by gap, and whether the stated errors are the real ones.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use crate::drawing::{Axis, BLUE, GREEN, GREY, INK, ORANGE, Panel, Series, Shape, picture};
 use crate::methods::METHODS;
 use crate::metrics::ErrorStats;
@@ -10,7 +12,7 @@ const COLOURS: [&str; METHODS.len()] = [ORANGE, BLUE, GREEN, GREY];
 const LEAST: f64 = 0.03;
 
 /// Median (dot) and 95 % quantile (end of the bar) of each method in each scenario with one gap.
-pub fn errors(stats: &[ErrorStats]) -> String {
+pub(crate) fn errors(stats: &[ErrorStats]) -> String {
     let rows: Vec<&ErrorStats> = stats.iter().filter(|t| t.kind == Kind::Single).rev().collect();
     let mut series = Vec::new();
     for (method, (name, colour)) in METHODS.iter().zip(COLOURS).enumerate() {
@@ -30,13 +32,13 @@ pub fn errors(stats: &[ErrorStats]) -> String {
 }
 
 /// Contact regression's error against the true gap, for each flight of the classes `wide`.
-pub fn scatter(stats: &[ErrorStats]) -> String {
+pub(crate) fn scatter(stats: &[ErrorStats]) -> String {
     let panels: Vec<Panel> = wide(stats).map(|row| error_panel(row, 4.0)).collect();
     picture(&panels, panels.len().max(1), [320.0, 340.0])
 }
 
 /// The same, one panel for each class with drawn gaps.
-pub fn classes(stats: &[ErrorStats]) -> String {
+pub(crate) fn classes(stats: &[ErrorStats]) -> String {
     let rows = stats.iter().filter(|t| t.kind == Kind::Drawn);
     picture(&rows.map(|row| error_panel(row, 8.0)).collect::<Vec<_>>(), 4, [300.0, 220.0])
 }
@@ -58,8 +60,9 @@ fn error_panel(row: &ErrorStats, bound_um: f64) -> Panel {
 }
 
 /// Share of intervals that hold against the share they promise, from error over standard error.
-pub fn calibration(stats: &[ErrorStats]) -> String {
-    let normal = (0..=300).map(|k| 0.01 * f64::from(k)).map(|z| (z, within(z))).collect();
+pub(crate) fn calibration(stats: &[ErrorStats]) -> String {
+    // P(|Z| ≤ z) of a standard normal.
+    let normal = (0..=300).map(|k| 0.01 * f64::from(k)).map(|z| (z, libm::erf(z * FRAC_1_SQRT_2))).collect();
     let mut series = vec![Series::new(INK, Shape::Dashed, normal).named("dashed: normal errors")];
     for (row, colour) in wide(stats).zip(COLOURS) {
         let mut sizes: Vec<f64> = row.deviations.iter().map(|z| z.abs()).collect();
@@ -71,19 +74,4 @@ pub fn calibration(stats: &[ErrorStats]) -> String {
     let x = Axis::new("half width of the interval, standard errors", 0.0..3.0);
     let y = Axis::new("share of flights whose truth lies within", 0.0..1.0);
     picture(&[Panel::new(x, y, series)], 1, [560.0, 460.0])
-}
-
-/// P(|Z| ≤ z) of a standard normal.
-fn within(z: f64) -> f64 {
-    libm::erf(z * std::f64::consts::FRAC_1_SQRT_2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn nine_in_ten_normal_errors_lie_within_1_645() {
-        assert!((within(1.644_853_626_951) - 0.9).abs() < 1e-9);
-    }
 }

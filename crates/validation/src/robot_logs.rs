@@ -12,13 +12,10 @@ use crate::methods::{load_lines_m, spread_m};
 
 /// The cells of a log: its name; in degrees gap, standard error; skew, ms; in degrees the paper's statistic, load lines and
 /// P99 − P1 of δX; refusal or flags. A dash where there is none.
-pub type RobotRow = [String; 8];
+pub(crate) type RobotRow = [String; 8];
 
 /// Estimates the robot's axes with the configuration in the same folder.
-///
-/// # Errors
-/// A configuration or a log that cannot be read, as text.
-pub fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
+pub(crate) fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
     let texts = |all: Vec<Diagnostic>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     let config = Config::read(&folder.join("pipeline.toml")).map_err(texts)?;
     let mut rows = Vec::new();

@@ -29,7 +29,7 @@ pub(crate) struct Case {
 
 /// Which flights a class is judged with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// One gap, errors in per cent of it.
     Single,
     /// One gap of zero, errors in µm.
@@ -46,11 +46,11 @@ pub enum Kind {
 
 /// A class of flights.
 #[derive(Debug)]
-pub struct Class {
+pub(crate) struct Class {
     /// Its name, unique.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// How it is judged.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     gap_m: f64,
     /// Draws what the flights of many classes have in common, before `change`.
     base: Draw,
@@ -87,7 +87,7 @@ const fn drawn(name: &'static str, change: Draw) -> Class {
 fn nothing(_: &mut Case, _: &mut ChaCha8Rng) {}
 
 /// Every class.
-pub static CLASSES: &[Class] = &[
+pub(crate) static CLASSES: &[Class] = &[
     single("nominal", nothing),
     single("stiffness assumed 30 % high", |c, _| c.assumed_factor = 1.3),
     single("stiffness assumed 30 % low", |c, _| c.assumed_factor = 0.7),

@@ -236,8 +236,8 @@ impl Spec {
         let tail = change.tail.as_deref().unwrap_or(&self.tails[0]);
         let position = change.position.as_deref().unwrap_or(&self.positions[0].position);
         self.check_place("a change", tail, position)?;
-        let part_numbers = change.part_number.iter();
-        part_numbers.map(|part| known("a change", "part", part, &self.part_numbers()).map(drop)).collect()
+        let mut parts = change.part_number.iter();
+        parts.try_for_each(|part| known("a change", "part", part, &self.part_numbers()).map(drop))
     }
 
     fn check_place(&self, who: &str, tail: &str, position: &str) -> Result<(), Error> {

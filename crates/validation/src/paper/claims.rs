@@ -30,11 +30,11 @@ const CONVERGED: f64 = 0.01;
 
 /// A change of ΔS, % of the gap, over the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
+pub(crate) struct Change {
     /// The factor that was changed.
-    pub factor: f64,
+    pub(crate) factor: f64,
     /// Least, mean and most over the flights.
-    pub percent: [f64; 3],
+    pub(crate) percent: [f64; 3],
 }
 
 impl Change {
@@ -45,60 +45,60 @@ impl Change {
     }
 
     /// The largest amount of any flight, %.
-    pub fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         self.percent[0].abs().max(self.percent[2].abs())
     }
 }
 
 /// Convergence from a wrong start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Convergence {
+pub(crate) struct Convergence {
     /// What is wrong.
-    pub name: String,
+    pub(crate) name: String,
     /// Difference of S from that of the right start, m, sample by sample.
-    pub error_m: Vec<f64>,
+    pub(crate) error_m: Vec<f64>,
     /// Time until the difference stays below 1 % of the gap, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
 }
 
 /// One window of a flight whose gap grows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
+pub(crate) struct Window {
     /// Its middle, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// The true gap there, m.
-    pub true_m: f64,
+    pub(crate) true_m: f64,
     /// ΔS of its samples, m.
-    pub gap_m: f64,
+    pub(crate) gap_m: f64,
 }
 
 /// Everything measured.
 #[derive(Debug, Clone)]
-pub struct Claims {
+pub(crate) struct Claims {
     /// The flight of the figures.
-    pub flight: Flight,
+    pub(crate) flight: Flight,
     /// The filter's state after each of its samples.
-    pub states: Vec<KalmanState>,
+    pub(crate) states: Vec<KalmanState>,
     /// Its ΔS (29–31).
-    pub gap: GapStatistic,
+    pub(crate) gap: GapStatistic,
     /// Error of ΔS with everything known, %.
-    pub known: Change,
+    pub(crate) known: Change,
     /// From wrong states.
-    pub starts: Vec<Convergence>,
+    pub(crate) starts: Vec<Convergence>,
     /// From a wrong backlash with wrong covariances.
-    pub spreads: Vec<Convergence>,
+    pub(crate) spreads: Vec<Convergence>,
     /// Error of ΔS against the noise of both positions.
-    pub noise: Vec<Change>,
+    pub(crate) noise: Vec<Change>,
     /// Error of ΔS against W_d/V_d.
-    pub tuning: Vec<Change>,
+    pub(crate) tuning: Vec<Change>,
     /// Change of ΔS by an assumed damping.
-    pub damping: Vec<Change>,
+    pub(crate) damping: Vec<Change>,
     /// Change of ΔS by an assumed mass.
-    pub mass: Vec<Change>,
+    pub(crate) mass: Vec<Change>,
     /// Change of ΔS by an assumed stiffness.
-    pub stiffness: Vec<Change>,
+    pub(crate) stiffness: Vec<Change>,
     /// A gap that grows within the flight.
-    pub varying: Vec<Window>,
+    pub(crate) varying: Vec<Window>,
 }
 
 /// An error is one of the simulator or of the estimator.
@@ -106,10 +106,7 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 
 impl Claims {
     /// Flies and estimates all flights.
-    ///
-    /// # Errors
-    /// Of the simulator or the estimator.
-    pub fn measure() -> Result<Self> {
+    pub(crate) fn measure() -> Result<Self> {
         let sensors = Sensors::default();
         let flights = fly_all(&sensors)?;
         let nominal = Plant::default();

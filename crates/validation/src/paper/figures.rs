@@ -20,7 +20,7 @@ const LEAST_UM: f64 = 1e-4;
 const THIN: Shape = Shape::Line(1.0);
 
 /// Every figure with the name of its file: one panel, or two side by side.
-pub fn pictures(claims: &Claims) -> Vec<(&'static str, String)> {
+pub(crate) fn pictures(claims: &Claims) -> Vec<(&'static str, String)> {
     let flight = &claims.flight;
     let positions = [("motor", ORANGE, &flight.motor_m[..]), ("screw", BLUE, &flight.screw_m)];
     let measured_m = relative_position_m(flight);

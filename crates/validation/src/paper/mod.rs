@@ -3,10 +3,12 @@
 mod claims;
 mod figures;
 mod page;
+#[cfg(test)]
+mod tests;
 
-pub use claims::Claims;
-pub use figures::pictures;
-pub use page::page;
+pub(crate) use claims::Claims;
+pub(crate) use figures::pictures;
+pub(crate) use page::page;
 
 use estimator::{ActuatorModel, Filter, KalmanState, NoiseModel};
 use simulator::{Contact, Flight, Plant, Profile, Sensors, simulate};
@@ -62,21 +64,3 @@ fn backlash_m(states: &[KalmanState]) -> Vec<f64> {
 
 /// Step of the flights, s.
 const STEP_S: f64 = 0.004;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_states_are_those_of_the_stream() {
-        let sensors = Sensors::default();
-        let (plant, profile) = (Plant::default(), Profile { duration_s: 5.0, ..Profile::default() });
-        let flight = simulate(&plant.with_gap_m(GAP_M), &profile, &sensors, 3).unwrap();
-        let filter = filter(&plant, 1.0, &sensors).unwrap();
-        let mut stream = estimator::Stream::constant_time(&filter);
-        let y_m = relative_position_m(&flight);
-        for (k, state) in states(&filter, &flight, None).unwrap().iter().enumerate() {
-            assert_eq!(stream.push(y_m[k], flight.load_n[k]).unwrap().x, state.x);
-        }
-    }
-}

@@ -1,10 +1,10 @@
 //! The page `docs/paper.md`: the paper's figures and a number for each claim, in the template `paper.md.in`.
 
-use crate::fill;
+use crate::accuracy_page::fill;
 use crate::paper::claims::{Change, Claims, Convergence};
 
 /// The page.
-pub fn page(claims: &Claims) -> String {
+pub(crate) fn page(claims: &Claims) -> String {
     let um = |m: f64| format!("{:.1}", 1e6 * m);
     let [least, _, most] = claims.known.percent;
     let tuning = |factor| mean(&claims.tuning, factor);

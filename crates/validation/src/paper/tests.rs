@@ -1,6 +1,6 @@
 //! The paper's claims, and that its page and figures are those of the code.
 
-use validation::paper::{Claims, page, pictures};
+use crate::paper::{Claims, page, pictures};
 
 /// The whole of docs/pictures that this command writes, bytes.
 const MOST_BYTES: usize = 600_000;

@@ -1,8 +1,8 @@
 //! The stated intervals against flights whose gap is known, over every class of simulated flights.
 
+use crate::methods::{MethodResults, estimate_flight};
+use crate::scenarios::{CLASSES, Class, Kind};
 use rayon::prelude::*;
-use validation::methods::{MethodResults, estimate_flight};
-use validation::scenarios::{CLASSES, Class, Kind};
 
 /// Flights of each class in a test, and in the gate; and the least share of intervals that hold.
 const SIZES: [(u64, f64); 2] = [(1, 0.76), (3, 0.83)];
