@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import freeplay_ema as fp
-import freeplay_ema as fp
 import freeplay_ema.spark
 import pyarrow.parquet as pq
 import pyspark

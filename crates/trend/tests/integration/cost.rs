@@ -20,32 +20,32 @@ fn unit(seed: u64, flights: i64, rho: f64, step_um: f64) -> Series {
     histories::series((0..flights).map(row))
 }
 
-/// Shortest of several times of two works, which take turns, s.
-fn shortest(mut work: impl FnMut(usize)) -> [f64; 2] {
-    let mut times = [f64::INFINITY; 2];
+/// Asserts that two works, the second of which has four times the size of the first, take times in proportion: the exponent is
+/// 1.0 to 1.1 on a machine of its own; a quadratic search has two.
+fn assert_proportional(name: &str, mut work: impl FnMut(usize)) {
+    let mut shortest_s = [f64::INFINITY; 2];
     for round in 0..12 {
         let begin = Instant::now();
         work(round % 2);
-        times[round % 2] = times[round % 2].min(begin.elapsed().as_secs_f64());
+        shortest_s[round % 2] = shortest_s[round % 2].min(begin.elapsed().as_secs_f64());
     }
-    times
+    let [short_s, long_s] = shortest_s;
+    let exponent = (long_s / short_s).log(4.0);
+    println!("{name}: {:.1} ms, {:.1} ms, exponent {exponent:.2}", short_s * 1e3, long_s * 1e3);
+    assert!(exponent <= 1.5, "{name}: {exponent}");
 }
 
-/// Exponents of 1.0 to 1.1 on a machine of its own; a quadratic search has two.
 #[test]
 fn time_grows_in_proportion_to_flights() {
     for (name, rho, step_um) in [("calm", 0.0, 0.0), ("autocorrelated", 0.8, 0.0), ("steps", 0.0, 15.0)] {
         let units = |flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>();
         let units = [1_500, 6_000].map(units);
         let assess = |series| assess(series, i64::MAX / 2, &settings(), None).unwrap();
-        let [short, long] = shortest(|of| units[of].iter().for_each(|series| drop(assess(series))));
-        let exponent = (long / short).log(4.0);
-        println!("{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}", short * 50.0, long * 50.0);
-        assert!(exponent <= 1.5, "{name}: {exponent}");
+        assert_proportional(name, |of| units[of].iter().for_each(|series| drop(assess(series))));
     }
 }
 
-/// One tail with a step of all of its four units every ten days: four times the steps take four times the time.
+/// One tail with a step of all of its four units every ten days.
 #[test]
 fn time_grows_in_proportion_to_the_steps_of_a_tail() {
     let tails = [32_000, 128_000].map(|steps: i64| {
@@ -53,9 +53,6 @@ fn time_grows_in_proportion_to_the_steps_of_a_tail() {
         vec![UnitOnTail { first_us: 0, last_us: i64::MAX, steps }; 4]
     });
     let mut found = [0, 0];
-    let [short, long] = shortest(|of| found[of] = tail_wide_steps(&tails[of]).len());
+    assert_proportional("steps of a tail", |of| found[of] = tail_wide_steps(&tails[of]).len());
     assert_eq!(found, [32_000, 128_000]);
-    let exponent = (long / short).log(4.0);
-    println!("steps of a tail: {:.1} ms, {:.1} ms, exponent {exponent:.2}", short * 1e3, long * 1e3);
-    assert!(exponent <= 1.5, "{exponent}");
 }
