@@ -2,43 +2,29 @@
 //!
 //! `parts NAME SAMPLES`, with a name of [`PARTS`].
 
-#![allow(clippy::print_stderr, reason = "a command-line program")]
-
 mod made_flight;
 
 use std::hint::black_box;
-use std::process::ExitCode;
 
 use estimator::contact::{self, ContactWorkspace, PartPrior};
-use estimator::{Error, GainSchedule, Samples, gap, midrange};
+use estimator::{GainSchedule, Samples, gap, midrange};
 use made_flight::{STEP_S, channels, filter};
 
 /// Names of the parts; `nothing` only makes the flight.
 const PARTS: [&str; 7] = ["nothing", "schedule", "filter", "statistic", "load", "published", "contact"];
 
-fn main() -> ExitCode {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let usage = || format!("parts NAME SAMPLES, with NAME one of {PARTS:?}");
     let mut args = std::env::args().skip(1);
-    let (Some(part), Some(Ok(count))) = (args.next(), args.next().map(|n| n.parse())) else {
-        eprintln!("parts NAME SAMPLES, with NAME one of {PARTS:?}");
-        return ExitCode::from(2);
-    };
-    match run(&part, count) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("{e}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run(part: &str, count: usize) -> Result<(), Error> {
+    let (part, count) = args.next().zip(args.next()).ok_or_else(usage)?;
+    let count: usize = count.parse()?;
     let [motor_m, dx_m, load_n] = channels(count);
     let whole = 0..count;
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: STEP_S, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = PartPrior::of_stiffness(5e7);
     let filter = filter()?;
-    match part {
+    match part.as_str() {
         "schedule" => drop(black_box(GainSchedule::new(&filter))),
         "filter" => drop(black_box(GainSchedule::new(&filter).track(&samples, &mut Vec::new())?)),
         "statistic" => drop(black_box(gap::mid_range(&dx_m)).is_ok()),

@@ -45,12 +45,10 @@ pub(crate) fn wait_until(mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// The top of the repository.
 pub(crate) fn top() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A fleet in a folder of its own.
 pub(crate) struct TestFleet {
     folder: tempfile::TempDir,
 }
@@ -150,12 +148,10 @@ impl TestFleet {
         std::fs::read_to_string(self.path(file)).unwrap()
     }
 
-    /// A file of JSON.
     pub(crate) fn read_json(&self, file: &str) -> Value {
         serde_json::from_str(&self.read(file)).unwrap()
     }
 
-    /// Changes a text file.
     pub(crate) fn edit(&self, file: &str, change: impl FnOnce(&str) -> String) {
         let text = self.read(file);
         let changed = change(&text);
@@ -169,18 +165,15 @@ impl TestFleet {
         without(&all, &["run_id", "processed_utc", "log_path"])
     }
 
-    /// Replaces text in the configuration.
     pub(crate) fn configure(&self, from: &str, to: &str) {
         assert!(self.read("pipeline.toml").contains(from), "{from} is not in the configuration");
         self.edit("pipeline.toml", |text| text.replacen(from, to, 1));
     }
 
-    /// Adds a table to the configuration.
     pub(crate) fn configure_also(&self, table: &str) {
         self.edit("pipeline.toml", |text| format!("{text}\n{table}"));
     }
 
-    /// Writes logs again.
     pub(crate) fn rewrite_logs(&self, how: &LogRewrite) {
         let pattern = |pattern: &Option<String>| pattern.as_ref().map(|pattern| Regex::new(pattern).unwrap());
         let [columns, without, blank] = [&how.columns, &how.without, &how.blank].map(pattern);
@@ -231,12 +224,10 @@ impl TestFleet {
         glob::glob(self.path(pattern).to_str().unwrap()).unwrap().flatten().collect()
     }
 
-    /// The logs of the fleet, by name.
     pub(crate) fn logs(&self) -> Vec<PathBuf> {
         self.glob("sample-data/logs/*/*.parquet")
     }
 
-    /// The logs of a tail, by name.
     pub(crate) fn logs_of(&self, tail: &str) -> Vec<PathBuf> {
         self.glob(&format!("sample-data/logs/{tail}/*.parquet"))
     }

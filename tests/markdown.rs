@@ -7,7 +7,6 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 
 use crate::harness::top;
 
-/// A page of Markdown.
 pub(crate) struct Page {
     /// From the top of the repository.
     pub(crate) name: String,
@@ -19,7 +18,6 @@ pub(crate) struct Page {
     pub(crate) blocks: Vec<Block>,
 }
 
-/// A block of code.
 pub(crate) struct Block {
     /// What stands behind the fence: `sh`, `console`, `toml`.
     pub(crate) language: String,
@@ -31,7 +29,6 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Value of the mark with this name.
     pub(crate) fn mark(&self, name: &str) -> Option<&str> {
         self.marks.iter().find_map(|mark| mark.strip_prefix(name)).map(str::trim)
     }
@@ -82,7 +79,6 @@ impl Page {
     }
 }
 
-/// Text of an HTML comment.
 fn comment(html: &str) -> Option<String> {
     Some(html.trim().strip_prefix("<!--")?.strip_suffix("-->")?.trim().to_owned())
 }

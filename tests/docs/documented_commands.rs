@@ -192,7 +192,6 @@ impl<'p> Try<'p> {
         output
     }
 
-    /// Compares the shown output with the real one.
     fn compare(&mut self, span: &Range<usize>, output: &str) {
         let shown = &self.page.text[span.clone()];
         let output = trimmed(output);

@@ -94,7 +94,6 @@ pub(crate) fn edit_text(choices: &mut Choices<'_>, bytes: &mut Vec<u8>, others: 
     }
 }
 
-/// Replaces one word or number of a line.
 fn replace_word(choices: &mut Choices<'_>, line: &mut Vec<u8>, words: &[&str]) {
     let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"._-+".contains(byte);
     let starts: Vec<usize> =

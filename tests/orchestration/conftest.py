@@ -32,21 +32,22 @@ def reject(log: Path) -> None:
     parquet.write_table(table.replace_schema_metadata(identity), log)
 
 
-@pytest.fixture
-def new_fleet(tmp_path: Path) -> Path:
+def copied(folder: Path) -> Path:
     """Three aircraft with ten flights each, not processed; the last flight of N414FP has no load reversal."""
-    folder = tmp_path / "fleet"
     shutil.copytree(TOP / "tests/data/three-aircraft", folder)
     reject(folder / "sample-data/logs/N414FP" / REJECTED)
     return folder
 
 
+@pytest.fixture
+def new_fleet(tmp_path: Path) -> Path:
+    return copied(tmp_path / "fleet")
+
+
 @pytest.fixture(scope="session")
 def processed(tmp_path_factory: pytest.TempPathFactory, freeplay: str) -> Path:
     """That fleet after a run; tests copy it."""
-    folder = tmp_path_factory.mktemp("processed") / "fleet"
-    shutil.copytree(TOP / "tests/data/three-aircraft", folder)
-    reject(folder / "sample-data/logs/N414FP" / REJECTED)
+    folder = copied(tmp_path_factory.mktemp("processed") / "fleet")
     subprocess.run([freeplay, "run", "--quiet"], cwd=folder, check=True)
     return folder
 

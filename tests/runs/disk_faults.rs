@@ -158,7 +158,6 @@ fn cut(
     state(disk.fleet, runs * 3 * 4, !mid)
 }
 
-/// Files of the store at this moment.
 fn files_of(fleet: &TestFleet) -> usize {
     fleet.glob("disk/results/**/*").len()
 }

@@ -21,7 +21,6 @@ pub(crate) struct Injector {
     library: PathBuf,
 }
 
-/// Where a fault strikes.
 #[derive(Debug, Clone, Copy)]
 struct Fault {
     /// Part of the paths whose calls count.
@@ -50,7 +49,6 @@ fn errno(mode: &str) -> &str {
 }
 
 impl Fault {
-    /// A fault at one call of a kind.
     fn at(under: &'static str, kind: &'static str, mode: &'static str, at: usize) -> Self {
         Self { under, kind, mode, at, last: at, also: None }
     }
@@ -432,7 +430,6 @@ fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     assert!(partly > 0 && finished > 0, "no kill came after a commit, or no run finished");
 }
 
-/// Two faults of one run, at calls and of kinds from a seed.
 #[test]
 fn two_faults_in_one_run_lose_nothing() {
     const MODES: [&str; 4] = ["EIO", "ESTALE", "ENOSPC", "kill"];

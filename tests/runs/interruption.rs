@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::process::Stdio;
 use std::time::Duration;
 
 use crate::harness::{TestFleet, wait_until};
 
-/// Sends an interrupt to a process.
 #[cfg(unix)]
 fn interrupt(child: &std::process::Child) {
     std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
@@ -16,7 +16,7 @@ fn interrupt(child: &std::process::Child) {
 #[cfg(unix)]
 fn begun(fleet: &TestFleet) -> std::process::Child {
     let mut run = fleet.command(&["run", "--jobs", "1", "--no-progress"]);
-    let mut child = run.stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let mut child = run.stdout(Stdio::piped()).spawn().unwrap();
     let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
     wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     child
@@ -49,10 +49,6 @@ pub(crate) fn small() -> TestFleet {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N413FP/*.parquet");
     fleet
-}
-
-fn null() -> std::process::Stdio {
-    std::process::Stdio::null()
 }
 
 /// Opens a store as another program would, and counts its records: four for each flight, each once; or what is wrong.
@@ -92,7 +88,7 @@ fn a_run_that_waits_can_be_interrupted() {
     let store = store::Store::open(fleet.path("results")).unwrap();
     let held = store.lock(&store::Holder::this_process(), None).unwrap();
     let run = ["run", "--wait", "10m", "--metrics", "freeplay.prom"];
-    let child = fleet.command(&run).stdout(null()).stderr(null()).spawn().unwrap();
+    let child = fleet.command(&run).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let opened = format!("/proc/{}/fd/*", child.id());
     let has_lock =
         |file: std::path::PathBuf| std::fs::read_link(file).is_ok_and(|file| file.ends_with("lock"));

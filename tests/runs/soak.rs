@@ -19,7 +19,6 @@ use crate::runs::interruption::whole_flights;
 /// Fleets and days of the test, and of the gate.
 const SIZES: [(u64, usize); 2] = [(2, 4), (8, 8)];
 
-/// Flights that a day brings.
 const FLIGHTS: usize = 2;
 
 /// Rows of a log: enough for an estimate, few enough for a year of days.

@@ -56,7 +56,6 @@ impl<'a> Peers<'a> {
         (ratio >= FASTER).then(|| format!("{ratio:.0} × the median of its part"))
     }
 
-    /// Gaps of some peers.
     pub(crate) fn curves<'s>(&'s self, unit: &'s UnitView) -> impl Iterator<Item = &'s [[f64; 2]]> {
         let part = self.0.get(&unit.row.part_number.as_deref());
         let others = part.into_iter().flat_map(|part| &part.curves);

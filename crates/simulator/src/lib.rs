@@ -5,7 +5,7 @@
 //! estimator: a model cannot verify itself. Every assumption of the estimator can be broken by a key
 //! of a [`Spec`].
 //!
-//! [`Plant`] (what moves) and [`Profile`] (commands and loads) are integrated by [`two_mass`] and read
+//! [`Plant`] (what moves) and [`Profile`] (commands and loads) are integrated by Newton's law and read
 //! through [`Sensors`] into a [`Flight`] by [`simulate`]. A [`Spec`] makes a whole [`Plan`] of tails,
 //! serial numbers and flights.
 //!
@@ -27,7 +27,6 @@ pub use fleet::fleet_plan::{
     ActuatorLog, ChannelUnit, Plan, PlannedActuator, PlannedFlight, SimulatedFlight,
 };
 pub use fleet::fleet_spec::{MotorLogFormat, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec};
-pub use fleet::wear::WearLaw;
 pub use flight::{Flight, check, simulate};
 pub use load::flight_profile::Profile;
 pub use load::turbulence::GustForm;
@@ -35,5 +34,4 @@ pub use load::vibration::{Line, Vibration};
 pub use plant::actuator_plant::Plant;
 pub use plant::backlash_contact::{Contact, ContactLaw};
 pub use plant::friction::{Friction, FrictionLaw};
-pub use plant::two_mass;
 pub use sensors::sensor::{Channel, NoiseColour, PeriodicError, Sensors};

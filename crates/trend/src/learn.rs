@@ -23,7 +23,6 @@ const PSEUDO_UNITS: f64 = 15.0;
 const PSEUDO_LIVES: f64 = 2.0;
 const PSEUDO_CHANGES: f64 = 4.0;
 
-/// Rounds of expectation and maximisation.
 const ROUNDS: usize = 8;
 
 /// Process noises tried, as factors of the assumed one.

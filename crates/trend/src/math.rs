@@ -41,7 +41,6 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
 }
 
-/// Values with weights, in order.
 pub(crate) struct WeightedSamples {
     values: Vec<(f64, f64)>,
     pub(crate) total: f64,

@@ -86,9 +86,7 @@ pub struct FleetPrior {
     /// ln of the life in hours, mean and spread.
     pub(crate) ln_life: f64,
     pub(crate) ln_life_sd: f64,
-    /// Share of each family of laws.
     pub(crate) shares: [f64; FAMILIES],
-    /// Seasonal component of the measurement.
     pub(crate) season: SeasonParams,
     /// Share of units first seen in service that were new then.
     pub(crate) fresh_share: f64,
@@ -238,10 +236,8 @@ impl SeasonParams {
     }
 }
 
-/// Log densities of a prior.
 pub(crate) struct LogPrior<'a> {
     prior: &'a FleetPrior,
-    /// Of each family of laws.
     pub(crate) shares: [f64; FAMILIES],
     life: f64,
     fresh: f64,

@@ -22,7 +22,6 @@ pub(crate) struct Fit {
 
 /// Measured state, history and wear laws of a unit.
 pub(crate) struct UnitFit<'a> {
-    /// The prior of the unit's fleet.
     pub(crate) prior: FleetPrior,
     pub(crate) measured: Measured,
     pub(crate) history: History<'a>,

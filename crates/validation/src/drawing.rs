@@ -16,7 +16,6 @@ const CHAR_PX: f64 = 7.2;
 /// Margins of a panel: above, right, below and left, px.
 const MARGINS: [f64; 4] = [36.0, 14.0, 34.0, 46.0];
 
-/// An axis with its name and range.
 pub(crate) struct Axis {
     pub(crate) name: String,
     pub(crate) range: Range<f64>,
@@ -82,7 +81,6 @@ impl Series {
     }
 }
 
-/// Series on two axes.
 pub(crate) struct Panel {
     pub(crate) title: String,
     pub(crate) x: Axis,

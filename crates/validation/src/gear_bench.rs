@@ -117,7 +117,6 @@ fn filter(step_s: f64) -> Result<Filter, estimator::Error> {
     Filter::new(&ActuatorModel::linear(STIFFNESS_NM_PER_RAD, 5.0, 0.01)?, step_s, &NoiseModel::Sensors(noise))
 }
 
-/// Every column of a file as numbers.
 fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, Box<dyn std::error::Error>> {
     let batches = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?
         .build()?

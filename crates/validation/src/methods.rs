@@ -14,7 +14,6 @@ use crate::scenarios::Class;
 /// The results of every method for one flight, m; NaN where a method gave no number.
 #[derive(Debug, Clone)]
 pub(crate) struct MethodResults {
-    /// Index of the flight in its class.
     pub(crate) index: u64,
     /// The true gap, extrapolated from the stiff part of the flanks.
     pub(crate) truth_m: f64,
@@ -22,7 +21,6 @@ pub(crate) struct MethodResults {
     pub(crate) contact: Option<(f64, f64, f64)>,
     /// The reason of a refusal, or the flags of an estimate.
     pub(crate) codes: Vec<String>,
-    /// By method: see `METHODS`.
     pub(crate) by_method_m: [f64; METHODS.len()],
 }
 

@@ -64,7 +64,6 @@ impl Errors {
 }
 
 impl ErrorStats {
-    /// Summarises the results of a class.
     pub(crate) fn new(class: &Class, results: &[MethodResults]) -> Self {
         let case = class.case(0);
         let size = |a: &MethodResults, estimate_m: f64| {
@@ -101,7 +100,6 @@ impl ErrorStats {
         }
     }
 
-    /// The unit of the errors.
     pub(crate) fn unit(&self) -> &'static str {
         if self.kind == Kind::Single { "%" } else { "µm" }
     }

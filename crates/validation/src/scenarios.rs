@@ -44,12 +44,9 @@ pub(crate) enum Kind {
     Blind(&'static str),
 }
 
-/// A class of flights.
 #[derive(Debug)]
 pub(crate) struct Class {
-    /// Its name, unique.
     pub(crate) name: &'static str,
-    /// How it is judged.
     pub(crate) kind: Kind,
     gap_m: f64,
     /// Draws what the flights of many classes have in common, before `change`.
@@ -86,7 +83,6 @@ const fn drawn(name: &'static str, change: Draw) -> Class {
 
 fn nothing(_: &mut Case, _: &mut ChaCha8Rng) {}
 
-/// Every class.
 pub(crate) static CLASSES: &[Class] = &[
     single("nominal", nothing),
     single("stiffness assumed 30 % high", |c, _| c.assumed_factor = 1.3),
@@ -297,7 +293,6 @@ fn log_uniform(rng: &mut ChaCha8Rng, range: Range<f64>) -> f64 {
     range.start * (range.end / range.start).powf(rng.random())
 }
 
-/// One sign or the other.
 fn either(rng: &mut ChaCha8Rng) -> f64 {
     if rng.random() { 1.0 } else { -1.0 }
 }

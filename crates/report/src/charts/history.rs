@@ -33,7 +33,6 @@ pub(crate) fn shows_crossing(unit: &UnitView) -> bool {
     is_ahead && unit.row.not_before_utc.is_some_and(|from| Some(from) <= forecast_end(unit))
 }
 
-/// The forecast as far as it is drawn.
 pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<TimedInterval> {
     let end = forecast_end(unit);
     unit.forecast.iter().filter(|f| end.is_none_or(|end| f.at_utc <= end)).copied().collect()

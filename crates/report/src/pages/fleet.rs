@@ -98,7 +98,6 @@ pub fn fleet_pages(report: &Report, peers: &Peers<'_>) -> Result<Vec<Page>, Erro
     Ok(pages)
 }
 
-/// Date of the report.
 fn heading(report: &Report) -> String {
     or_no_data(report.as_of_utc, |at| at.strftime("%a %-d %b %Y %H:%M UTC").to_string())
 }
@@ -206,7 +205,6 @@ fn fast<'a>(report: &'a Report, peers: &Peers<'_>) -> Vec<(&'a UnitView, f64, St
     found
 }
 
-/// Inspections one by one, with their units.
 fn checks(report: &Report) -> Vec<(&UnitView, &ReportInspectionRow)> {
     let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
     checks.take(ROWS).collect()

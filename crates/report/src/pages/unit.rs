@@ -34,7 +34,6 @@ struct View<'a> {
     quantity_changes: Vec<Change<'a>>,
     charts: Vec<Chart>,
     levels: Vec<Level>,
-    /// The forecast as far as it is drawn.
     drawn_forecast: Vec<TimedInterval>,
 }
 
@@ -77,7 +76,6 @@ pub fn unit_page(report: &Report, peers: &Peers<'_>, unit: &UnitView) -> Result<
     Ok(Page::html(unit_path(unit), &view.render()?))
 }
 
-/// What to do, and why.
 fn verdict(unit: &UnitView) -> String {
     let row = &unit.row;
     match row.action_text() {

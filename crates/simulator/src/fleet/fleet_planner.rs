@@ -16,7 +16,6 @@ use crate::seeded_streams::{derive_seed, seeded_rng};
 const HOUR_US: f64 = 3.6e9;
 const DAY_US: f64 = 24.0 * HOUR_US;
 
-/// A calendar in the making.
 struct Planner<'a> {
     spec: &'a Spec,
     start_us: i64,

@@ -159,7 +159,6 @@ impl Spec {
         Ok(day.duration_since(Date::constant(1970, 1, 1)).as_micros() as i64)
     }
 
-    /// Index of the part of a position.
     pub(crate) fn part_of(&self, place: &Position) -> Result<usize, Error> {
         let who = format!("position \"{}\"", place.position);
         known(&who, "part", &place.part_number, &self.part_numbers())

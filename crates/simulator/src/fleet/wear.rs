@@ -1,5 +1,4 @@
 //! How a gap grows with a unit's hours: a mean law, and the unevenness of real wear.
-#![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Gamma};
@@ -9,7 +8,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum WearLaw {
-    /// No growth.
     #[default]
     Steady,
     /// `rate · h`.

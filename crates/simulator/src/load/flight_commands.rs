@@ -11,7 +11,6 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::load::flight_profile::Profile;
 use crate::seeded_streams::seeded_rng;
 
-/// The grid of the commands, seconds.
 const GRID_S: f64 = 0.005;
 /// Quiet time before the log begins, in which motor and screw find their places, seconds.
 pub(crate) const LEAD_IN_S: f64 = 2.0;
@@ -39,7 +38,6 @@ const PHASES: [Phase; 6] = [
     Phase { share: 0.12, pressure: (0.6, 0.15), deployed: 0.35 },
 ];
 
-/// Commands and loads at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CommandSample {
     /// Commanded motor position, at the screw, metres.

@@ -45,7 +45,6 @@ impl Plant {
         self.contact.is_varying() || self.motor_friction.is_warming() || self.screw_friction.is_warming()
     }
 
-    /// The actuator as it is at a time of a log.
     pub(crate) fn at(&self, time_s: f64, duration_s: f64) -> Self {
         Self {
             contact: self.contact.at(time_s / duration_s),

@@ -172,6 +172,7 @@ impl Contact {
     }
 
     /// Elastic energy at a relative position δX, J.
+    #[cfg(test)]
     pub(crate) fn energy_j(&self, delta_m: f64) -> f64 {
         let from_m = delta_m - self.offset_m;
         let energy_j = |(law, stiffness_n_per_m): (ContactLaw, f64), depth_m: f64| {
@@ -253,7 +254,6 @@ mod tests {
         }
     }
 
-    /// Force is the derivative of the potential, stiffness that of the force.
     #[test]
     fn every_law_has_the_force_and_slope_of_its_potential() {
         let laws = [

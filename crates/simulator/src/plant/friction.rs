@@ -183,7 +183,6 @@ impl FrictionBody {
         (free_n / self.inertia_n_s_per_m, 1.0 / self.inertia_n_s_per_m)
     }
 
-    /// The level against motion to a side.
     fn level_n(&self, is_down: bool) -> f64 {
         if is_down { self.levels.down_n } else { self.levels.up_n }
     }

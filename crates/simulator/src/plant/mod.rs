@@ -4,4 +4,6 @@ pub(crate) mod actuator_plant;
 pub(crate) mod backlash_contact;
 pub(crate) mod friction;
 pub(crate) mod motor_controller;
-pub mod two_mass;
+#[cfg(test)]
+mod physics;
+pub(crate) mod two_mass;

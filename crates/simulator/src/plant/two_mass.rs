@@ -22,52 +22,36 @@ const TURNS: usize = 80;
 
 /// Where both masses are, and how fast.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct State {
+pub(crate) struct State {
     /// X₁, metres.
-    pub motor_m: f64,
+    pub(crate) motor_m: f64,
     /// dX₁/dt, m/s.
-    pub motor_m_per_s: f64,
+    pub(crate) motor_m_per_s: f64,
     /// X₂, metres.
-    pub screw_m: f64,
+    pub(crate) screw_m: f64,
     /// dX₂/dt, m/s.
-    pub screw_m_per_s: f64,
+    pub(crate) screw_m_per_s: f64,
     /// Bend of the motor's friction bristles, −1 to 1; 0 unless the law has bristles.
-    pub motor_bend: f64,
+    pub(crate) motor_bend: f64,
     /// Bend of the screw's friction bristles, −1 to 1.
-    pub screw_bend: f64,
+    pub(crate) screw_bend: f64,
 }
 
 /// The forces from outside, constant over a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Forces {
+pub(crate) struct Forces {
     /// Force of the motor's field, at the screw, N.
-    pub drive_n: f64,
+    pub(crate) drive_n: f64,
     /// The aerodynamic load on the screw, N, positive along +X.
-    pub load_n: f64,
+    pub(crate) load_n: f64,
     /// Motion of the motor on top of X₁ at the start of the step, metres: a vibration nothing resists.
-    pub shake_m: f64,
+    pub(crate) shake_m: f64,
     /// Its mean speed over the step, m/s.
-    pub shake_m_per_s: f64,
-}
-
-impl Forces {
-    /// Drive and load without vibration of the motor.
-    pub const fn new(drive_n: f64, load_n: f64) -> Self {
-        Self { drive_n, load_n, shake_m: 0.0, shake_m_per_s: 0.0 }
-    }
-}
-
-impl State {
-    /// Kinetic and elastic energy, J.
-    pub fn energy_j(&self, plant: &Plant) -> f64 {
-        let kinetic = 0.5 * plant.motor_mass_kg * self.motor_m_per_s.powi(2)
-            + 0.5 * plant.screw_mass_kg * self.screw_m_per_s.powi(2);
-        kinetic + plant.contact.energy_j(self.screw_m - self.motor_m)
-    }
+    pub(crate) shake_m_per_s: f64,
 }
 
 /// The state one step later.
-pub fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64) -> State {
+pub(crate) fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64) -> State {
     let body = |friction, mass_kg: f64, speed, bend, force_n: f64| {
         let rate = 2.0 * mass_kg / step_s;
         let body = plant.friction_law.body(friction, forces.load_n, speed, bend, rate, step_s);

@@ -1,7 +1,6 @@
-//! The simulator through its public door: closed forms, conservation laws and books that must balance.
+//! The simulator through its public door: flights as specified, and books that must balance.
 #![allow(clippy::unwrap_used, reason = "helpers of tests, too, may fail loudly")]
 #![allow(clippy::float_cmp, reason = "what is compared with == is exact by construction")]
 
 mod fleet;
 mod flight;
-mod physics;

@@ -13,7 +13,6 @@ pub(crate) struct Segment<'a> {
     pub(crate) known_age: Option<f64>,
 }
 
-/// Bins of a long segment.
 pub(crate) const BINS: usize = 48;
 
 /// The weighted mean of neighbouring estimates.

@@ -32,7 +32,6 @@ const RATE_NEIGHBOURS: usize = 5;
 
 /// Bounds of standard errors, and their value where none is stated.
 pub(crate) struct Assumed {
-    /// Least and largest error.
     pub(crate) least: f64,
     pub(crate) largest: f64,
     /// The error where none is stated.

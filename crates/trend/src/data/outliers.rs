@@ -16,7 +16,6 @@ const AGREEMENT_SDS: f64 = 2.4;
 /// Differences of successive gaps that the stated errors count for.
 const STATED_COUNT: f64 = 4.0;
 
-/// One estimate that takes part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WeightedGap {
     pub(crate) flight: usize,

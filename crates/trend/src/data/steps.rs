@@ -40,7 +40,6 @@ const RATE_SPREAD: f64 = 5e-4;
 /// spurts, which must not pass for steps.
 pub(crate) const WEAR_NOISE: f64 = 0.002;
 
-/// A step of the measured gap.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepChange {
     /// The first estimate after it.

@@ -28,7 +28,6 @@ pub(crate) struct SeasonalFit {
     pub(crate) covariance_m2: [f64; 3],
 }
 
-/// Cosine and sine of the season.
 pub(crate) fn waves(departure_us: f64) -> [f64; 2] {
     let (sin, cos) = (TAU * departure_us / YEAR_US).sin_cos();
     [cos, sin]

@@ -4,7 +4,6 @@ use crate::measured::level::Level;
 use crate::measured::record::{HYSTERESIS, RECALLED, Record};
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
-/// The gap is at or above its limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Exceedance {
     /// One record alone, or flagged ones: the next sound one confirms or clears it.

@@ -11,7 +11,6 @@ use nalgebra::{SMatrix, SVector};
 use super::{MIN_FLIGHTS, QuantityValue};
 use crate::data::noise::{Assumed, Noise, inflation};
 
-/// Most steps of one unit.
 const MAX_STEPS: usize = 4;
 /// Regressors: one, the drift, the steps. Where one is not selected, its column is zero.
 const COLUMNS: usize = FIRST_STEP + MAX_STEPS;
@@ -181,13 +180,11 @@ impl<'a> Model<'a> {
         sums
     }
 
-    /// Columns of the selected regressors.
     fn columns(&self) -> impl Iterator<Item = usize> + Clone {
         let drift = self.has_drift.then_some(DRIFT);
         std::iter::once(0).chain(drift).chain(FIRST_STEP..FIRST_STEP + self.steps.len())
     }
 
-    /// Regressors of the value at an index.
     fn row(&self, index: usize) -> Row {
         let mut row = Row::zeros();
         row[0] = 1.0;

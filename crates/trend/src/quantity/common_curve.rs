@@ -11,7 +11,6 @@ use crate::math::{SD_OVER_MAD, median};
 const WEEK_US: i64 = 7 * 86_400_000_000;
 /// Fewest tails from which a week's deviation is taken.
 const MIN_TAILS: usize = 3;
-/// Sweeps of the polish.
 const SWEEPS: usize = 10;
 /// A median of a normal sample scatters this much more than its mean: √(π/2).
 const MEDIAN_SE: f64 = 1.253_314_137_315_5;
@@ -32,7 +31,6 @@ struct Cell {
     deviation: f64,
 }
 
-/// Deviation of a week, and the variance of its error.
 struct Deviation {
     week: i64,
     value: f64,

@@ -13,7 +13,6 @@ const SIGNIFICANT: f64 = 4.0;
 const MIN_DIFFERENCES: usize = 30;
 /// Huber's bound, in standard deviations: 95 % efficient for normal errors (Huber 1981).
 const HUBER: f64 = 1.345;
-/// Number of reweightings.
 const ITERATIONS: usize = 8;
 
 /// Slopes of a quantity.

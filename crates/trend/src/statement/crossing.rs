@@ -8,7 +8,6 @@ use crate::statement::types::Crossing;
 use crate::wear::Component;
 use crate::wear::bank::WearLaw;
 
-/// The distribution of the hours left.
 pub(crate) struct RulDistribution {
     pub(crate) hours: WeightedSamples,
     horizon_hours: f64,

@@ -120,7 +120,6 @@ impl<'a> History<'a> {
         self.offset_m2 = 0.0;
     }
 
-    /// Moves every estimate from one on.
     fn shift(&mut self, from: usize, by_m: f64) {
         for estimate in &mut self.estimates[from..] {
             estimate.gap_m += by_m;

@@ -87,7 +87,6 @@ impl Reason {
     }
 }
 
-/// A count with its noun.
 fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
@@ -195,7 +194,6 @@ const LIKELY_GROWTH: f64 = 0.8;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EarliestCrossing {
     pub(crate) p05_hours: f64,
-    /// Probability of visible growth.
     pub(crate) growth_probability: f64,
     /// Hours that have passed since the last flight, at the unit's own rate.
     pub(crate) elapsed_hours: f64,
@@ -274,7 +272,6 @@ pub(crate) fn alert_state(
     }
 }
 
-/// State and reason of an exceedance.
 fn exceeded(measured: &Measured, gap_m: f64, limit_m: f64) -> Option<(State, Reason)> {
     Some(match measured.exceedance? {
         Exceedance::Confirmed { records } => (State::Act, Reason::AboveLimit { gap_m, limit_m, records }),

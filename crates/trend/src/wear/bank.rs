@@ -67,7 +67,6 @@ pub(crate) const FAMILIES: usize = FIRST_POWER + EXPONENTS.len();
 const FIRST_STAGES: usize = 4;
 const FIRST_POWER: usize = FIRST_STAGES + STAGES.len();
 
-/// Values in a geometric row.
 struct Grid {
     first_hours: f64,
     ratio: f64,

@@ -10,7 +10,6 @@ struct Class {
     power: (f64, f64),
     logs: (usize, usize),
     calm: (usize, usize),
-    /// Largest median error.
     error: f64,
 }
 

@@ -8,7 +8,6 @@ pub(crate) const DAY_US: i64 = 86_400_000_000;
 pub(crate) const LIMIT_M: f64 = 150e-6;
 pub(crate) const LIMIT_UM: f64 = 150.0;
 
-/// Hours of a flight.
 pub(crate) const HOURS: f64 = 2.0;
 
 /// A flight of a unit that departs once in a period and has an hour meter; its gap and the stated error, µm.
@@ -29,7 +28,6 @@ pub(crate) fn series(rows: impl IntoIterator<Item = Observation>) -> Series {
     Series::new(rows).unwrap()
 }
 
-/// A history that is being drawn.
 pub(crate) struct Drawn {
     random: Random,
     pub(crate) rows: Vec<Observation>,
@@ -62,7 +60,6 @@ impl Drawn {
         low + (self.random.uniform() * (high - low + 1) as f64) as usize
     }
 
-    /// One log of a gap, µm.
     pub(crate) fn log(&mut self, um: f64) {
         let measured_um = um + self.error_um * self.random.normal();
         self.flown(Some(measured_um));
@@ -85,7 +82,6 @@ impl Drawn {
         self.logs(count, |_| um);
     }
 
-    /// Logs above the limit.
     pub(crate) fn jump(&mut self, (least, most): (usize, usize)) {
         let um = self.between(155.0, 300.0).max(LIMIT_UM + 8.0 * self.error_um);
         let count = self.count(least, most);
@@ -99,7 +95,6 @@ impl Drawn {
         self.logs(count, |t| from_um + (to_um - from_um) * t.powf(power));
     }
 
-    /// Flags the last records.
     pub(crate) fn doubt(&mut self, count: usize) {
         let from = self.rows.len() - count;
         self.rows[from..].iter_mut().for_each(|row| row.is_doubtful = true);
@@ -144,7 +139,6 @@ impl Drawn {
     }
 }
 
-/// The prior of a fleet of histories.
 pub(crate) fn prior<'a>(fleet: impl IntoIterator<Item = &'a Drawn>) -> FleetPrior {
     let series: Vec<Series> = fleet.into_iter().map(Drawn::series).collect();
     FleetPrior::learn(&series, i64::MAX, LIMIT_M, None, &SerialExecutor)

@@ -28,7 +28,6 @@ pub(crate) fn kinds(is_urgent: bool) -> Vec<Kind> {
     lines.filter(|line| !line.starts_with('#')).map(kind).collect()
 }
 
-/// One word of a history with its numbers.
 fn happen(d: &mut Drawn, step: &str) {
     let mut words = step.split(' ');
     let word = words.next().unwrap();

@@ -31,7 +31,6 @@ const CONVERGED: f64 = 0.01;
 /// A change of ΔS, % of the gap, over the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Change {
-    /// The factor that was changed.
     pub(crate) factor: f64,
     /// Least, mean and most over the flights.
     pub(crate) percent: [f64; 3],
@@ -50,10 +49,8 @@ impl Change {
     }
 }
 
-/// Convergence from a wrong start.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Convergence {
-    /// What is wrong.
     pub(crate) name: String,
     /// Difference of S from that of the right start, m, sample by sample.
     pub(crate) error_m: Vec<f64>,
@@ -66,13 +63,11 @@ pub(crate) struct Convergence {
 pub(crate) struct Window {
     /// Its middle, s.
     pub(crate) time_s: f64,
-    /// The true gap there, m.
     pub(crate) true_m: f64,
     /// ΔS of its samples, m.
     pub(crate) gap_m: f64,
 }
 
-/// Everything measured.
 #[derive(Debug, Clone)]
 pub(crate) struct Claims {
     /// The flight of the figures.
@@ -91,11 +86,9 @@ pub(crate) struct Claims {
     pub(crate) noise: Vec<Change>,
     /// Error of ΔS against W_d/V_d.
     pub(crate) tuning: Vec<Change>,
-    /// Change of ΔS by an assumed damping.
+    /// Changes of ΔS by an assumed damping, mass and stiffness.
     pub(crate) damping: Vec<Change>,
-    /// Change of ΔS by an assumed mass.
     pub(crate) mass: Vec<Change>,
-    /// Change of ΔS by an assumed stiffness.
     pub(crate) stiffness: Vec<Change>,
     /// A gap that grows within the flight.
     pub(crate) varying: Vec<Window>,
@@ -105,7 +98,6 @@ pub(crate) struct Claims {
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 impl Claims {
-    /// Flies and estimates all flights.
     pub(crate) fn measure() -> Result<Self> {
         let sensors = Sensors::default();
         let flights = fly_all(&sensors)?;

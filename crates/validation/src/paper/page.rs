@@ -3,7 +3,6 @@
 use crate::accuracy_page::fill;
 use crate::paper::claims::{Change, Claims, Convergence};
 
-/// The page.
 pub(crate) fn page(claims: &Claims) -> String {
     let um = |m: f64| format!("{:.1}", 1e6 * m);
     let [least, _, most] = claims.known.percent;
