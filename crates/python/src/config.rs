@@ -8,8 +8,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use records::Installations;
 
-use crate::VERSION;
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
+
+/// The version written into every record.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// A checked configuration. Keys of later files override those of earlier ones, as with `--config A --config B`.
 #[pyclass(frozen, module = "freeplay_ema")]

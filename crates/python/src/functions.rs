@@ -17,9 +17,8 @@ use pyo3::prelude::*;
 use records::row_schema::to_nullable_batch;
 use records::{Diagnostic, Installations, PartNumber};
 
-use crate::VERSION;
 use crate::arrow_capsule::arrow_error;
-use crate::config::Config;
+use crate::config::{Config, VERSION};
 use crate::error::{ExceptionClass, config_error, to_exception, to_run_exception};
 use crate::numpy_input::numbers;
 use crate::table::Table;

@@ -12,9 +12,6 @@ mod spark_worker;
 mod store_results;
 mod table;
 
-/// The version written into every record.
-const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 #[pyo3::pymodule]
 mod _freeplay {
     #[pymodule_export]
@@ -32,5 +29,5 @@ mod _freeplay {
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "Python reads this name")]
-    const __version__: &str = crate::VERSION;
+    const __version__: &str = crate::config::VERSION;
 }

@@ -6,8 +6,7 @@ use pipeline::run::distributed::{self, Task};
 use pyo3::prelude::*;
 use records::Diagnostic;
 
-use crate::VERSION;
-use crate::config::Config;
+use crate::config::{Config, VERSION};
 use crate::error::{ExceptionClass, to_exception};
 use crate::functions::run_summary;
 

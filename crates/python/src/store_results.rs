@@ -18,9 +18,8 @@ use pipeline::report::{compose, data, publish};
 use pyo3::prelude::*;
 use store::Query;
 
-use crate::VERSION;
 use crate::arrow_capsule;
-use crate::config::Config;
+use crate::config::{Config, VERSION};
 use crate::error::{config_error, to_run_exception};
 use crate::table::Table;
 
