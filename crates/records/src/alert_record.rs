@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use strum::{EnumString, IntoStaticStr};
 
-use crate::row_schema::{self, text_cell};
+use crate::row_schema::word_cell;
 use crate::stored_row;
 
 /// What became of an alert.
@@ -26,18 +26,13 @@ pub enum AlertStatus {
 }
 
 impl AlertStatus {
-    /// Value of the `status` column.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
-
     /// Whether the message has not been received, or perhaps not.
     pub fn is_unsent(self) -> bool {
         matches!(self, Self::Pending | Self::Sending | Self::Unconfirmed)
     }
 }
 
-text_cell!(AlertStatus, row_schema::word);
+word_cell!(AlertStatus);
 
 stored_row! {
     /// One change of state, or its message in one channel.

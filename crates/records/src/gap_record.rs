@@ -6,7 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use strum::{EnumString, IntoStaticStr};
 
 use crate::ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
-use crate::row_schema::{self, Cells as _, text_cell};
+use crate::row_schema::{self, Cells as _, word_cell};
 use crate::stored_row;
 
 stored_row! {
@@ -40,14 +40,7 @@ pub enum Status {
     Withdrawn,
 }
 
-impl Status {
-    /// Value of the `status` column.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
-}
-
-text_cell!(Status, row_schema::word);
+word_cell!(Status);
 
 stored_row! {
     /// Everything needed to reproduce the estimate bitwise.

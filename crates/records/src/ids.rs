@@ -7,18 +7,10 @@ use serde::{Deserialize, Serialize};
 /// Maximum length of an identifier, bytes: every record, file name and message contains it.
 const ID_BYTES: usize = 256;
 
-/// A text that is no identifier; `what` is its kind, e.g. `tail number`.
+/// A text that is no identifier: it is blank or too long.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum IdError {
-    /// It is empty or blank.
-    #[error("a {what} must not be empty")]
-    #[allow(missing_docs, reason = "the text of the error says what it is")]
-    Empty { what: &'static str },
-    /// It is longer than 256 bytes.
-    #[error("a {what} of {bytes} bytes is longer than {ID_BYTES}")]
-    #[allow(missing_docs, reason = "the text of the error says what they are")]
-    TooLong { what: &'static str, bytes: usize },
-}
+#[error("a {0}")]
+pub struct IdError(String);
 
 macro_rules! identifier {
     ($(#[$doc:meta])* $name:ident, $what:literal) => {
@@ -35,9 +27,12 @@ macro_rules! identifier {
             pub fn new(text: impl AsRef<str>) -> Result<Self, IdError> {
                 let text = text.as_ref().trim();
                 match text.len() {
-                    0 => Err(IdError::Empty { what: $what }),
+                    0 => Err(IdError(concat!($what, " must not be empty").to_owned())),
                     1..=ID_BYTES => Ok(Self(text.into())),
-                    bytes => Err(IdError::TooLong { what: $what, bytes }),
+                    bytes => Err(IdError(format!(
+                        concat!($what, " of {} bytes is longer than {}"),
+                        bytes, ID_BYTES
+                    ))),
                 }
             }
 

@@ -66,24 +66,10 @@ impl Installation {
     }
 }
 
-/// A contradiction in the installations table.
+/// A contradiction in the installations table. Its text counts rows from 1, without the header.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "each field is named for what it holds; rows count from 1, header excluded")]
-pub enum Error {
-    /// An installation ends before it begins.
-    #[error("row {row}: {serial} is removed at {removed} before it is installed at {installed}")]
-    Reversed { row: usize, serial: SerialNumber, installed: Timestamp, removed: Timestamp },
-    /// Two units in one position at once.
-    #[error(
-        "rows {row} and {other}: {tail} {position} holds two units at {at}; give the earlier one its `removed_utc`"
-    )]
-    PositionTaken { row: usize, other: usize, tail: TailNumber, position: Position, at: Timestamp },
-    /// One unit in two positions at once.
-    #[error(
-        "rows {row} and {other}: {part} / {serial} is installed in two places at {at}; set `removed_utc` of the earlier installation"
-    )]
-    UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
-}
+#[error("{0}")]
+pub struct Error(String);
 
 /// The validated installations table: rows by tail, position and date, and their numbers by unit; found by bisection.
 #[derive(Debug, Clone, Default)]
@@ -99,23 +85,31 @@ impl Installations {
     /// # Errors
     /// Every contradiction, in row order: see [`Error`].
     pub fn new(mut rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
-        let reversed = |(row, of): (usize, &Installation)| {
-            let removed = of.removed_utc.filter(|removed| *removed < of.installed_utc)?;
-            let (serial, installed) = (of.serial_number.clone(), of.installed_utc);
-            Some(Error::Reversed { row, serial, installed, removed })
+        let reversed = |(row, Installation { serial_number, installed_utc, removed_utc, .. }): (
+            usize,
+            &_,
+        )| {
+            let removed = removed_utc.filter(|removed| removed < installed_utc)?;
+            Some(Error(format!(
+                "row {row}: {serial_number} is removed at {removed} before it is installed at {installed_utc}"
+            )))
         };
         let mut errors: Vec<Error> = (1..).zip(&rows).filter_map(reversed).collect();
         errors.extend(clashes(&rows, place).into_iter().map(|(row, other)| {
-            let Installation { tail_number: tail, position, installed_utc: at, .. } = rows[other - 1].clone();
-            Error::PositionTaken { row, other, tail, position, at }
+            let Installation { tail_number, position, installed_utc, .. } = &rows[other - 1];
+            Error(format!(
+                "rows {row} and {other}: {tail_number} {position} holds two units at {installed_utc}; give the earlier \
+                 one its `removed_utc`"
+            ))
         }));
-        errors.extend(clashes(&rows, |r| (&r.part_number, &r.serial_number)).into_iter().map(
-            |(row, other)| {
-                let Installation { part_number: part, serial_number: serial, installed_utc: at, .. } =
-                    rows[other - 1].clone();
-                Error::UnitTwice { row, other, part, serial, at }
-            },
-        ));
+        let as_booked = clashes(&rows, |row| (&row.part_number, &row.serial_number));
+        errors.extend(as_booked.into_iter().map(|(row, other)| {
+            let Installation { part_number, serial_number, installed_utc, .. } = &rows[other - 1];
+            Error(format!(
+                "rows {row} and {other}: {part_number} / {serial_number} is installed in two places at {installed_utc}; \
+                 set `removed_utc` of the earlier installation"
+            ))
+        }));
         if !errors.is_empty() {
             return Err(errors);
         }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr};
 
 use crate::gap_record::RecordKey;
-use crate::row_schema::{self, text_cell};
+use crate::row_schema::word_cell;
 use crate::stored_row;
 
 /// How a log ended.
@@ -32,14 +32,9 @@ impl LogOutcome {
     pub fn is_success(self) -> bool {
         matches!(self, Self::Done | Self::Known)
     }
-
-    /// Value of the `outcome` column.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
 }
 
-text_cell!(LogOutcome, row_schema::word);
+word_cell!(LogOutcome);
 
 stored_row! {
     /// Status of one log: enough to know, without opening it, whether it must be processed again.

@@ -277,8 +277,8 @@ impl<'a> CellReader<'a> {
         RowError::Value { column: self.columns[self.next - 1].name, row: self.row, problem: problem.into() }
     }
 
-    fn required<T>(&self, value: Option<T>) -> Result<T, RowError> {
-        value.ok_or_else(|| self.problem("is empty, where a value is wanted"))
+    fn required<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Result<T, RowError> {
+        read(self).ok_or_else(|| self.problem("is empty, where a value is wanted"))
     }
 
     fn text(&mut self) -> Option<&'a str> {
@@ -290,8 +290,7 @@ impl<'a> CellReader<'a> {
         &mut self,
         parse: impl FnOnce(&'a str) -> Result<T, E>,
     ) -> Result<T, RowError> {
-        let text = self.text();
-        parse(self.required(text)?).map_err(|problem| self.problem(problem.to_string()))
+        parse(self.required(Self::text)?).map_err(|problem| self.problem(problem.to_string()))
     }
 
     /// The elements of a list; `None` for an empty cell.
@@ -348,14 +347,9 @@ macro_rules! read_cell {
     };
 }
 
-/// Parses a word of an enum.
-pub(crate) fn word<T: std::str::FromStr>(text: &str) -> Result<T, String> {
-    text.parse().map_err(|_| format!("`{text}` is none of its words"))
-}
-
 /// Implements [`Cells`] and [`FromCells`] for a text type by `as_str` and a function that parses it.
 macro_rules! text_cell {
-    ($type:ty, $parse:path) => {
+    ($type:ty, $parse:expr) => {
         impl $crate::row_schema::Cells for $type {
             fn columns(name: &'static str, doc: &'static str) -> Vec<$crate::row_schema::Column> {
                 <&'static str as $crate::row_schema::Cells>::columns(name, doc)
@@ -377,6 +371,23 @@ macro_rules! text_cell {
     };
 }
 pub(crate) use text_cell;
+
+/// Makes an enum a type of cell, whose words are those of its derived `IntoStaticStr` and `EnumString`.
+macro_rules! word_cell {
+    ($type:ty) => {
+        impl $type {
+            /// Its word in the column.
+            pub fn as_str(self) -> &'static str {
+                self.into()
+            }
+        }
+
+        $crate::row_schema::text_cell!($type, |word| {
+            word.parse().map_err(|_| format!("`{word}` is none of its words"))
+        });
+    };
+}
+pub(crate) use word_cell;
 
 cell!(&'static str, DataType::Utf8, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<StringArray>());
 cell!(Option<&'static str>, DataType::Utf8, nullable: true, |cells| cells.iter().map(|c| **c).collect::<StringArray>());
@@ -404,19 +415,13 @@ read_cell!(String, |cells| cells.parse(|text| Ok::<_, String>(text.to_owned())))
 read_cell!(Option<String>, |cells| Ok(cells.text().map(str::to_owned)));
 read_cell!(Vec<String>, |cells| Ok(cells.texts()));
 read_cell!(Vec<f64>, |cells| Ok(cells.numbers()));
-read_cell!(f64, |cells| {
-    let number = cells.primitive::<Float64Type>();
-    cells.required(number)
-});
+read_cell!(f64, |cells| cells.required(CellReader::primitive::<Float64Type>));
 read_cell!(Option<f64>, |cells| Ok(cells.primitive::<Float64Type>().filter(|value| value.is_finite())));
-read_cell!(i64, |cells| {
-    let count = cells.primitive::<Int64Type>();
-    cells.required(count)
-});
+read_cell!(i64, |cells| cells.required(CellReader::primitive::<Int64Type>));
 read_cell!(Option<i64>, |cells| Ok(cells.primitive::<Int64Type>()));
 read_cell!(Timestamp, |cells| {
     let time = cells.time()?;
-    cells.required(time)
+    cells.required(|_| time)
 });
 read_cell!(Option<Timestamp>, |cells| cells.time());
 

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use serde::Serialize;
 use strum::{EnumString, IntoStaticStr};
 
-use crate::row_schema::{self, text_cell};
+use crate::row_schema::word_cell;
 use crate::{row, stored_row};
 
 /// Kind of a work event.
@@ -35,18 +35,13 @@ pub enum WorkEventKind {
 }
 
 impl WorkEventKind {
-    /// Value of the `event` column.
-    pub fn as_str(self) -> &'static str {
-        self.into()
-    }
-
     /// Whether the event closes its request.
     pub fn closes(self) -> bool {
         matches!(self, Self::Removed | Self::Maintained | Self::Closed)
     }
 }
 
-text_cell!(WorkEventKind, row_schema::word);
+word_cell!(WorkEventKind);
 
 stored_row! {
     /// One step in the life of a work request.
@@ -131,11 +126,6 @@ row! {
 }
 
 impl WorkRequest {
-    /// Part number, if known, and serial number.
-    pub fn unit(&self) -> (Option<String>, String) {
-        (self.part_number.clone(), self.serial_number.clone())
-    }
-
     /// Until when flights made the finding: a repair after it answers the request, also one that was done before a run saw them.
     pub fn found_until(&self) -> Timestamp {
         self.latest_flight_utc.map_or(self.opened_utc, |at| at.min(self.opened_utc))

@@ -31,11 +31,6 @@ impl Quantity {
         self.into()
     }
 
-    /// The quantity with a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        name.parse().ok()
-    }
-
     /// Name for readers.
     pub fn label(self) -> &'static str {
         match self {
@@ -171,13 +166,6 @@ row! {
         pub state: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,
-    }
-}
-
-impl QuantityRow {
-    /// Part number, if known, and serial number.
-    pub fn unit(&self) -> (Option<String>, String) {
-        (self.part_number.clone(), self.serial_number.clone())
     }
 }
 

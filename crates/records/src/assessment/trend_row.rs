@@ -163,9 +163,4 @@ impl TrendRow {
     pub fn is_by_largest(&self) -> bool {
         self.limit_applies_to == Some("largest")
     }
-
-    /// Part number, if known, and serial number.
-    pub fn unit(&self) -> (Option<String>, String) {
-        (self.part_number.clone(), self.serial_number.clone())
-    }
 }

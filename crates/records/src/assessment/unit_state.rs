@@ -50,11 +50,6 @@ impl UnitState {
         }
     }
 
-    /// Part number where known, and serial number.
-    pub fn unit(&self) -> (Option<String>, String) {
-        (self.part_number.clone(), self.serial_number.clone())
-    }
-
     /// Kind and first departure of each change point.
     pub fn events(&self) -> impl Iterator<Item = (&str, Timestamp)> {
         self.change_points.iter().filter_map(|text| {

@@ -37,8 +37,7 @@ pub(crate) fn unit_charts(unit: &UnitView) -> Vec<Chart> {
     let events = || unit.events.iter().map(|event| event.departure_utc);
     let chart = |view: &QuantityView| {
         let row = &view.row;
-        let quantity =
-            Quantity::from_name(row.quantity).filter(|_| row.state.is_some() || !row.steps.is_empty())?;
+        let quantity = row.quantity.parse().ok().filter(|_| row.state.is_some() || !row.steps.is_empty())?;
         let departures = unit.flights.iter().map(|flight| flight.departure_utc);
         let points = departures.zip(&view.values).filter(|(_, value)| value.is_finite());
         let points: Vec<(Timestamp, f64)> = points.map(|(at, value)| (at, f64::from(*value))).collect();
@@ -54,7 +53,7 @@ pub(crate) fn unit_charts(unit: &UnitView) -> Vec<Chart> {
 }
 
 pub(crate) fn level(view: &QuantityView) -> Option<Level> {
-    let (row, quantity) = (&view.row, Quantity::from_name(view.row.quantity)?);
+    let (row, quantity) = (&view.row, view.row.quantity.parse::<Quantity>().ok()?);
     let (unit, factor) = quantity.display_unit();
     let shown = |value: Option<f64>| {
         value.map_or_else(|| NO_DATA.to_owned(), |v| format!("{} {unit}", significant(v * factor)))

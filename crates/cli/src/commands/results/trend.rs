@@ -82,7 +82,7 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
     if rows.is_empty() {
         return "no unit was selected\n".to_owned();
     }
-    let quantity = |row: &QuantityRow| Quantity::from_name(row.quantity);
+    let quantity = |row: &QuantityRow| row.quantity.parse::<Quantity>().ok();
     let unit = |row: &QuantityRow| quantity(row).map_or(("", 1.0), Quantity::display_unit);
     let value = |row: &QuantityRow, value: Option<f64>, sign: bool| {
         let value = value.map(|value| value * unit(row).1);
