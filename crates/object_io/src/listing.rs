@@ -48,9 +48,6 @@ pub fn list(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> R
 }
 
 /// Metadata of one object.
-///
-/// # Errors
-/// [`Error::Missing`] when the object does not exist, else the error of the request.
 pub fn head(path: &Path) -> Result<ListEntry, Error> {
     let address = Address::parse_required(path)?;
     let meta = block_on(address.request(async |client, location| client.head(location).await))??;

@@ -89,9 +89,6 @@ pub trait Cells: Sized {
 /// A type of field that is also read.
 pub trait FromCells: Cells {
     /// Reads the next cell, or the next cells of a nested row.
-    ///
-    /// # Errors
-    /// [`RowError::Value`] when a cell is empty where a value is required, or out of range.
     fn read(cells: &mut CellReader<'_>) -> Result<Self, RowError>;
 }
 
@@ -202,17 +199,11 @@ pub fn schema<R: Row>() -> SchemaRef {
 
 /// Rows as columns. Times are cut to whole microseconds; a number that is not finite is missing, where it may be, and every
 /// other keeps its bits.
-///
-/// # Errors
-/// [`RowError::Arrow`] when there are more rows than a batch can hold.
 pub fn to_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
     Ok(RecordBatch::try_new(schema::<R>(), sorted_arrays(rows))?)
 }
 
 /// As [`to_batch`], with every column nullable: the schema of tables for users.
-///
-/// # Errors
-/// As [`to_batch`].
 pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
     let schema = schema::<R>();
     let fields = schema.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));

@@ -146,9 +146,6 @@ impl Writer {
     }
 
     /// The stored records of some keys; withdrawn ones are left out.
-    ///
-    /// # Errors
-    /// As [`Store::records`].
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
         let wanted: MergeDecisions<'_> =
             keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
@@ -191,9 +188,6 @@ impl Writer {
 
     /// Rewrites those data files whose rows a function changes, in one commit, and returns the number of changed rows.
     /// The function sees some columns of the stored records, in this order, and returns them with as many rows.
-    ///
-    /// # Errors
-    /// As [`Writer::commit`], and what the function fails with.
     pub fn rewrite(
         &mut self,
         columns: &[&str],
