@@ -58,7 +58,6 @@ stored_row! {
         pub change_number: i64,
         /// State before and after the change; empty when there is none.
         pub from_state: Option<String>,
-        /// State before and after the change; empty when there is none.
         pub to_state: Option<String>,
         /// First flight of a change of a tail or part.
         pub since_utc: Option<Timestamp>,

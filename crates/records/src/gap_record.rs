@@ -79,7 +79,6 @@ stored_row! {
         pub gap_se_m: Option<f64>,
         /// 5 % and 95 % bound of `gap_m`, m; null for the mid-range estimate.
         pub gap_p05_m: Option<f64>,
-        /// 5 % and 95 % bound of `gap_m`, m; null for the mid-range estimate.
         pub gap_p95_m: Option<f64>,
         /// ΔS by equations 29–31, m; also present for rejected flights.
         pub gap_midrange_m: Option<f64>,
@@ -101,11 +100,9 @@ stored_row! {
         pub samples: i64,
         /// Samples in the upper and lower set of equations 30 and 31.
         pub samples_upper: i64,
-        /// Samples in the upper and lower set of equations 30 and 31.
         pub samples_lower: i64,
         /// 5 % and 95 % quantile of the load, N.
         pub load_p05_n: Option<f64>,
-        /// 5 % and 95 % quantile of the load, N.
         pub load_p95_n: Option<f64>,
         /// Mean temperature, °C.
         pub temperature_c: Option<f64>,

@@ -100,7 +100,8 @@ pub trait Row: Cells {
     }
 }
 
-/// Declares a row type whose fields are the columns of a table: see [`row_schema`](mod@crate::row_schema).
+/// Declares a row type whose fields are the columns of a table: see [`row_schema`](mod@crate::row_schema). A field without
+/// a doc comment has that of the field before.
 ///
 /// A function after the struct (`order = path`) gives the sort key of each column.
 #[macro_export]
@@ -119,7 +120,7 @@ macro_rules! row {
         $(#[$attribute])*
         $vis struct $name {
             $(
-                $(#[doc = $doc])*
+                #[doc = concat!($($doc),*)]
                 $(#[serde($($serde)*)])?
                 $field_vis $field: $type,
             )*
@@ -128,11 +129,10 @@ macro_rules! row {
         impl $crate::row_schema::Cells for $name {
             fn columns(_: &'static str, _: &'static str) -> Vec<$crate::row_schema::Column> {
                 let mut columns = Vec::new();
+                let mut doc = "";
                 $(
-                    columns.extend(<$type as $crate::row_schema::Cells>::columns(
-                        stringify!($field),
-                        concat!($($doc),*).trim_ascii(),
-                    ));
+                    doc = Some(concat!($($doc),*).trim_ascii()).filter(|own| !own.is_empty()).unwrap_or(doc);
+                    columns.extend(<$type as $crate::row_schema::Cells>::columns(stringify!($field), doc));
                 )*
                 columns
             }

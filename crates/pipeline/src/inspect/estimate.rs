@@ -20,7 +20,6 @@ records::row! {
     /// An estimate without a store: the columns of a record except those of a run. Columns of an unidentified log are
     /// null.
     #[derive(Debug, Clone, Default)]
-    #[expect(missing_docs, reason = "each field is the column of a record")]
     pub struct EstimateRow {
         pub tail_number: Option<String>,
         pub position: Option<String>,

@@ -11,7 +11,6 @@ use crate::error::Error;
 records::row! {
     /// An actuator-flight whose results differ between the stores.
     #[derive(Debug)]
-    #[expect(missing_docs, reason = "each field is a column named for what it holds")]
     pub struct DiffRow {
         pub tail_number: String,
         pub flight_id: String,

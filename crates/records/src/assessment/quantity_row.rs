@@ -131,7 +131,6 @@ row! {
         pub serial_number: String,
         /// Tail and position of the unit's last flight.
         pub tail_number: Option<String>,
-        /// Tail and position of the unit's last flight.
         pub position: Option<String>,
         /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
@@ -195,7 +194,6 @@ row! {
         pub since_utc: Timestamp,
         /// Value before and after; of several units, the median.
         pub from: f64,
-        /// Value before and after; of several units, the median.
         pub to: f64,
         /// Standard error of the change; of several units, that of the first.
         pub change_se: f64,

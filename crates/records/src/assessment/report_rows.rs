@@ -39,7 +39,6 @@ row! {
         pub gap_m: Option<f64>,
         /// 5 % and 95 % bound of the gap, m.
         pub gap_p05_m: Option<f64>,
-        /// 5 % and 95 % bound of the gap, m.
         pub gap_p95_m: Option<f64>,
         /// Gap by the published statistic (equations 29–31), m.
         pub gap_midrange_m: Option<f64>,
@@ -47,7 +46,6 @@ row! {
         pub load_reversals: Option<i64>,
         /// 5 % and 95 % quantile of the load, N.
         pub load_p05_n: Option<f64>,
-        /// 5 % and 95 % quantile of the load, N.
         pub load_p95_n: Option<f64>,
         /// Rejection reason or quality flags.
         pub remarks: Box<str>,
@@ -76,7 +74,6 @@ row! {
         pub gap_m: f64,
         /// 5 % and 95 % bound, m.
         pub gap_p05_m: f64,
-        /// 5 % and 95 % bound, m.
         pub gap_p95_m: f64,
     }
 }
@@ -172,7 +169,6 @@ row! {
         /// 5 % and 95 % bound, m.
         #[serde(rename = "foreseen_low_m")]
         pub predicted_p05_m: f64,
-        /// 5 % and 95 % bound, m.
         #[serde(rename = "foreseen_high_m")]
         pub predicted_p95_m: f64,
         /// Gap found on the date of the report, m.
@@ -197,7 +193,6 @@ row! {
         pub expected: f64,
         /// 5 % and 95 % bound of `expected`.
         pub low: f64,
-        /// 5 % and 95 % bound of `expected`.
         pub high: f64,
     }
 }

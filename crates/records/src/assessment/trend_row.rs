@@ -38,7 +38,6 @@ row! {
         pub serial_number: String,
         /// Tail and position by the installations table, else of the last flight.
         pub tail_number: Option<String>,
-        /// Tail and position by the installations table, else of the last flight.
         pub position: Option<String>,
         /// Date of the assessment; later data are ignored.
         pub as_of_utc: Timestamp,
@@ -70,7 +69,6 @@ row! {
         pub rate_m_per_hour: Option<f64>,
         /// 5 % and 95 % bound of the growth rate, m per flight hour.
         pub rate_p05_m_per_hour: Option<f64>,
-        /// 5 % and 95 % bound of the growth rate, m per flight hour.
         pub rate_p95_m_per_hour: Option<f64>,
         /// `wearing`, `steady` or `unknown`, by `growth_probability`.
         pub trend: &'static str,
@@ -91,23 +89,15 @@ row! {
         /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
         /// the limit.
         pub crossing_hours_p05: Option<f64>,
-        /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
-        /// the limit.
         pub crossing_hours_p50: Option<f64>,
-        /// Flight hours to `limit_m`: earliest (5 %), median, latest (95 %). Null beyond the horizon, 0 at or above
-        /// the limit.
         pub crossing_hours_p95: Option<f64>,
         /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p05: Option<f64>,
-        /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p50: Option<f64>,
-        /// Flights to `limit_m`: earliest (5 %), median, latest (95 %).
         pub crossing_flights_p95: Option<f64>,
         /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub not_before_utc: Option<Timestamp>,
-        /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub likely_utc: Option<Timestamp>,
-        /// Date on which `limit_m` is reached: earliest (5 %), median, latest (95 %). It may have passed.
         pub not_after_utc: Option<Timestamp>,
         /// Source of the crossing: `measured` (at the limit), `fleet` or `single_unit` (wear laws with or without the
         /// fleet prior), `line` (the last records).

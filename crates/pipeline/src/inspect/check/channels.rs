@@ -19,7 +19,6 @@ pub const RATIO: &str = "screw/motor ratio";
 records::row! {
     /// One channel of one actuator of one log.
     #[derive(Debug, Clone, Default)]
-    #[expect(missing_docs, reason = "each field is a column named for what it holds")]
     pub struct ChannelCheck {
         pub log: String,
         pub tail_number: String,
