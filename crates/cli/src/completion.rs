@@ -49,7 +49,7 @@ fn is_plain(name: &str) -> bool {
 /// Different values of a column of the records; none where no store can be read.
 fn names(column: &str) -> Option<BTreeSet<String>> {
     let file = std::env::var_os("FREEPLAY_CONFIG").map_or_else(|| PathBuf::from(CONFIG), PathBuf::from);
-    let config = Config::read(&file).ok()?;
+    let config = Config::read_layers(&[file]).ok()?;
     Store::open(config.store()).ok()?.distinct(column).ok()
 }
 

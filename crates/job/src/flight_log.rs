@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ingest::log::flight_rows;
-use ingest::log::identity::IdentityFields;
 use ingest::mapping::Output;
 use ingest::mapping::column_pattern::nearest;
 use ingest::{
@@ -44,7 +43,8 @@ pub struct Actuator {
 /// Which flight a log is and what it holds, before any channel is read.
 #[derive(Debug)]
 pub struct FlightLog<'c> {
-    log: Log,
+    /// Its opened files.
+    pub log: Log,
     /// Its name in records and diagnostics.
     pub display_name: String,
     config: &'c Config,
@@ -167,16 +167,6 @@ impl<'c> FlightLog<'c> {
     pub fn channels(&self, at: &Actuator, part: &Part) -> Result<ActuatorChannels, Diagnostic> {
         let read = self.log.read_actuator(&at.columns, &at.mapping.channels, part.geometry);
         read.map_err(|e| e.diagnostic().in_file(&self.display_name))
-    }
-
-    /// Rows the footers declare.
-    pub fn rows(&self) -> usize {
-        self.log.rows()
-    }
-
-    /// Names and types of all columns.
-    pub fn column_types(&self) -> Vec<(String, String)> {
-        self.log.column_types()
     }
 }
 
@@ -309,33 +299,20 @@ pub fn flights_in(
     })
 }
 
-/// Which flight a log is, and which actuator where it holds but one, without reading its channels.
+/// Which flight a log or a file of a group is of, and of which actuator where it holds but one, without reading its
+/// channels.
 pub fn identify(
     files: &LogFiles,
+    group: Option<&str>,
     display_name: &str,
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
         let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
-        let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
+        let base = config.base_mapping();
+        let mapping = group.map_or_else(|| Arc::clone(base), |group| Arc::new(base.of_group(Some(group))));
+        let log = Log::open(files, &mapping).map_err(in_log)?;
         let id = identity_of(&log, files, config).map_err(in_log)?;
-        check_tail(&id, display_name, config)?;
-        Ok((id.flight, id.position))
-    })
-}
-
-/// Which flight a file of a group belongs to.
-pub fn identify_companion(
-    path: &Path,
-    group: &str,
-    display_name: &str,
-    config: &Config,
-) -> Result<(Flight, Option<Position>), Diagnostic> {
-    catch_panic(display_name, || {
-        let fallback = |fields: &IdentityFields, departure| config.flights.facts(path, fields, departure);
-        let of_group = Arc::new(config.base_mapping().of_group(Some(group)));
-        let id = Log::open(&LogFiles::one(path), &of_group).and_then(|log| log.identity(fallback));
-        let id = id.map_err(|e| e.diagnostic().in_file(display_name))?;
         check_tail(&id, display_name, config)?;
         Ok((id.flight, id.position))
     })

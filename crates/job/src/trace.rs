@@ -28,9 +28,7 @@ const COLUMNS: [&str; 11] = [
 pub struct Trace {
     log: Vec<String>,
     position: Vec<String>,
-    /// Time since the first kept sample, s; motor position, m; δX, m; load, N; S, m; innovation, m; its
-    /// variance, m²; 1 or −1 where the regression saw the upper or lower flank pressed, else 0; the estimated δX,
-    /// m, and δẊ, m/s; and the speed of the motor at the screw axis, m/s.
+    /// In the order of [`COLUMNS`]; `flank` is 1 or −1 where the regression saw the upper or lower flank pressed, else 0.
     numbers: [Vec<f64>; COLUMNS.len()],
 }
 

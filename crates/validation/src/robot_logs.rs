@@ -17,7 +17,7 @@ pub(crate) type RobotRow = [String; 8];
 /// Estimates the robot's axes with the configuration in the same folder.
 pub(crate) fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
     let texts = |all: Vec<Diagnostic>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
-    let config = Config::read(&folder.join("pipeline.toml")).map_err(texts)?;
+    let config = Config::read_layers(&[folder.join("pipeline.toml")]).map_err(texts)?;
     let mut rows = Vec::new();
     for axis in ["KR300-AX1", "KR300-AX2", "KR300-AX3"] {
         let name = format!("{axis}_trajC");

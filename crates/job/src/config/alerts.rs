@@ -9,7 +9,7 @@ use serde_with::skip_serializing_none;
 use smart_default::SmartDefault;
 
 use super::keys::with_nearest;
-use super::layers::Faults;
+use super::layers::{Faults, fits};
 
 /// States of quantities other than the gap: of a unit, of a tail, of a part.
 pub const QUANTITY_STATES: [&str; 11] = [
@@ -125,7 +125,5 @@ impl AlertChannel {
 
 /// Whether a name fits one of the patterns, or there is none.
 fn is_among(patterns: &[String], name: Option<&str>) -> bool {
-    let fits =
-        |pattern: &String, name| glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(name));
     patterns.is_empty() || name.is_some_and(|name| patterns.iter().any(|pattern| fits(pattern, name)))
 }

@@ -18,7 +18,7 @@ use smart_default::SmartDefault;
 
 use super::alerts::AlertChannel;
 use super::keys::with_nearest;
-use super::layers::Faults;
+use super::layers::{Faults, fits};
 use crate::config::part::{PartSettings, QuantityLimits, WearAxis};
 
 /// The whole file.
@@ -117,7 +117,6 @@ impl LogSettings {
 
     /// The pattern of `tails` that a log fits without being of one of its tails.
     pub fn forbidden_by(&self, log_path: &str, tail: &TailNumber) -> Option<&str> {
-        let fits = |pattern: &String, text| Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(text));
         let forbids = |(pattern, tails): &(&String, &Vec<String>)| {
             fits(pattern, log_path) && !tails.iter().any(|allowed| fits(allowed, tail.as_str()))
         };
@@ -316,11 +315,6 @@ impl Document {
             // Where a group's files lie moves no number.
             groups: self.group.iter().map(|(name, group)| (name.clone(), bare(group))).collect(),
         }
-    }
-
-    /// Whether the output of a part is fixed, so that its logs need no screw position.
-    pub(super) fn has_locked_part(&self) -> bool {
-        self.part.values().any(|part| part.output.is_locked())
     }
 
     /// Reports each value that can be read but makes no sense, faults of channels excepted. `implausible` holds those of

@@ -125,6 +125,11 @@ impl<'s> Faults<'s> {
     }
 }
 
+/// Whether a text fits a pattern of `*` and `?`.
+pub(super) fn fits(pattern: &str, text: &str) -> bool {
+    glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(text))
+}
+
 fn merge<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
     for (key, value) in over {
         match (below.get_mut(&key).map(Spanned::get_mut), value.get_ref()) {

@@ -48,11 +48,6 @@ pub struct Config {
 }
 
 impl Config {
-    /// Reads and checks the file, and the flights table that it names.
-    pub fn read(file: &Path) -> Result<Self, Vec<Diagnostic>> {
-        Self::read_layers(&[file.to_owned()])
-    }
-
     /// Removal limit of a part, m: its own, or that of `[trend]`.
     pub fn limit_m(&self, part: Option<&PartNumber>) -> Option<f64> {
         let own = part.and_then(|part| self.parts.get(part)?.settings.limit_m);

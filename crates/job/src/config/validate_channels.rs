@@ -35,8 +35,9 @@ pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Fault
         });
     }
     channels.when.iter().for_each(|condition| check_condition(condition, document, faults));
+    let is_locked = channels.output.is_locked() || document.part.values().any(|part| part.output.is_locked());
     match (&channels.screw_position, &channels.relative_position) {
-        (None, None) if document.has_locked_part() || channels.output.is_locked() => {}
+        (None, None) if is_locked => {}
         (None, None) => {
             let what = "neither `screw_position` nor `relative_position` is mapped";
             let hint =

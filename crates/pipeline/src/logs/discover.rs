@@ -8,7 +8,7 @@ use ingest::log::flight_rows::split_path;
 use ingest::{IdentityMapping, LogFiles};
 use jiff::Timestamp;
 use job::Config;
-use job::flight_log::{MAX_BETWEEN_PIECES, flights_in, identify, identify_companion};
+use job::flight_log::{MAX_BETWEEN_PIECES, flights_in, identify};
 use object_io::{Address, ListEntry};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
@@ -132,7 +132,7 @@ fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLog> {
     /// Of more logs the tails are not read: each takes a read of its footer.
     const IDENTIFIED: usize = 10_000;
     let all = logs.len();
-    let tail = |(name, files): &NamedLog| Some(identify(files, name, config).ok()?.0.tail_number);
+    let tail = |(name, files): &NamedLog| Some(identify(files, None, name, config).ok()?.0.tail_number);
     let tails: Vec<_> = logs.par_iter().map(|log| if all > IDENTIFIED { None } else { tail(log) }).collect();
     let is_even = |k: usize| (k + 1) * most / all > k * most / all;
     let mut seen: BTreeSet<_> = (0..all).filter(|k| is_even(*k)).filter_map(|k| tails[k].clone()).collect();
@@ -202,7 +202,7 @@ fn group_files(
 ) {
     let mut known: Vec<IdentifiedFile> = main
         .into_par_iter()
-        .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
+        .map(|(log_path, path)| (identify(&LogFiles::one(&path), None, &log_path, config), log_path, path))
         .collect();
     if config.document.logs.has_pieces() {
         join_pieces(&mut known);
@@ -235,7 +235,7 @@ fn group_files(
     let identified: Vec<_> = companions
         .into_par_iter()
         .map(|(group, (log_path, path))| {
-            (identify_companion(&path, group, &log_path, config), group, log_path, path)
+            (identify(&LogFiles::one(&path), Some(group), &log_path, config), group, log_path, path)
         })
         .collect();
     for (who, group, log_path, path) in identified {

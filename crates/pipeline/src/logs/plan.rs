@@ -309,8 +309,9 @@ impl Planner<'_> {
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
         let why = why.ok_or(Skipped::Known)?;
         // A log that cannot be identified is always processed, or its error would never be reported.
-        let flight =
-            || before.and_then(flight_of).or_else(|| Some(identify(files, log_path, self.config).ok()?.0));
+        let flight = || {
+            before.and_then(flight_of).or_else(|| Some(identify(files, None, log_path, self.config).ok()?.0))
+        };
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
         if !asked {

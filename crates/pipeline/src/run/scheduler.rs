@@ -364,7 +364,7 @@ impl WorkerContext<'_> {
             processed_utc: Timestamp::now(),
         };
         let actuators: Vec<_> = opened.actuators().collect();
-        let bytes = MemoryBudget::actuator_bytes(opened.rows());
+        let bytes = MemoryBudget::actuator_bytes(opened.log.rows());
         let process_log = |at: &&Actuator| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();

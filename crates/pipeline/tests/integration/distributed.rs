@@ -26,7 +26,7 @@ fn fleet() -> (TempDir, Config) {
     for log in &logs[..6] {
         std::fs::copy(log, dir.path().join("sample-data/logs").join(log.file_name().unwrap())).unwrap();
     }
-    let config = Config::read(&dir.path().join("pipeline.toml")).unwrap();
+    let config = Config::read_layers(&[dir.path().join("pipeline.toml")]).unwrap();
     (dir, config)
 }
 
