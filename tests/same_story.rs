@@ -8,7 +8,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, TimestampMicrosecondType};
 use jiff::{SignedDuration, Timestamp};
 use serde_json::Value;
-use store::{Holder, Store};
+use store::Store;
 
 use crate::harness::TestFleet;
 
@@ -38,7 +38,7 @@ fn fleets() -> Vec<TestFleet> {
     let drawn = (1..=3).map(|seed: u64| {
         let fleet = processed.copied();
         let store = Store::open(fleet.path("results")).unwrap();
-        let mut writer = store.lock(&Holder::this_process(), None).unwrap();
+        let mut writer = store.lock(None).unwrap();
         let columns = ["gap_m", "departure_utc", "serial_number"];
         let draw = |batch: &arrow::array::RecordBatch| {
             let texts = cast(batch.column(2), &DataType::Utf8)?;

@@ -86,7 +86,7 @@ fn a_run_that_waits_can_be_interrupted() {
     let fleet = small();
     fleet.run_ok(&["run", "--limit", "1"]);
     let store = store::Store::open(fleet.path("results")).unwrap();
-    let held = store.lock(&store::Holder::this_process(), None).unwrap();
+    let held = store.lock(None).unwrap();
     let run = ["run", "--wait", "10m", "--metrics", "freeplay.prom"];
     let child = fleet.command(&run).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let opened = format!("/proc/{}/fd/*", child.id());

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use records::{GapEstimate, GapRecord, Status};
-use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store};
+use store::{LogOutcome, LogRecord, LogResult, RunRecord, Store};
 
 #[path = "../tests/integration/fleet.rs"]
 #[allow(
@@ -162,7 +162,7 @@ fn result(tail_at: usize, flight: usize, flights: usize) -> Outcomes<LogResult> 
 }
 
 fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
-    let mut writer = Store::create_or_open(store)?.lock(&Holder::this_process(), None)?;
+    let mut writer = Store::create_or_open(store)?.lock(None)?;
     let mut night = Vec::new();
     for flight in 0..flights {
         for tail_at in 0..tails {

@@ -1,6 +1,7 @@
 //! Store handle: the location, the tables and the digest check of data files.
 
 use std::collections::HashSet;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,36 +17,31 @@ use crate::error::Error;
 
 const LOCK: &str = "lock";
 
-type JoinFunction = dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync;
-
 /// Join of bookkeeping to records.
-#[derive(Clone)]
-pub(crate) struct Join(pub(crate) Arc<JoinFunction>);
-
-impl std::fmt::Debug for Join {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Join")
-    }
-}
+pub(crate) type Join = Arc<dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync>;
 
 /// Result store, open for reading.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Store {
     pub(crate) location: Location,
     display_path: PathBuf,
     pub(crate) gaps: Table,
     pub(crate) logs: Table,
     pub(crate) runs: Table,
-    /// Alerts; the table exists from its first row on.
+    // These exist from their first row on.
     pub(crate) alerts: Table,
-    /// Events of work requests; the table exists from its first row on.
     pub(crate) work: Table,
-    /// States of units after the last run; the table exists from its first row on.
     pub(crate) states: Table,
     /// Bookkeeping that is joined to records when they are read.
     pub(crate) join: Option<Join>,
     /// Data files whose digests this process has verified.
     verified: Arc<Mutex<HashSet<PathBuf>>>,
+}
+
+impl fmt::Debug for Store {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Store").field(&self.display_path).finish()
+    }
 }
 
 impl Store {

@@ -21,13 +21,13 @@
 //! `docs/store.md` explains the layout and the guarantees.
 //!
 //! ```
-//! use store::{Holder, LogResult, Query, Store};
+//! use store::{LogResult, Query, Store};
 //!
 //! let dir = tempfile::tempdir()?;
 //! let store = Store::create_or_open(dir.path().join("results"))?;
 //! // One writer at a time, which holds the lock until it is dropped.
-//! let mut writer = store.lock(&Holder::this_process(), None)?;
-//! assert!(store.lock(&Holder::this_process(), None).is_err());
+//! let mut writer = store.lock(None)?;
+//! assert!(store.lock(None).is_err());
 //! let results: Vec<LogResult> = Vec::new();
 //! writer.commit(&results)?;
 //!
@@ -53,5 +53,4 @@ pub use read::column_scan::ColumnScan;
 pub use read::query::Query;
 pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};
 pub use write::compact::Compaction;
-pub use write::lock::Holder;
 pub use write::writer::{HeldRecord, LogResult, Writer};

@@ -9,7 +9,7 @@ use pipeline::findings::work_list::{self, WorkSelection};
 use pipeline::findings::work_requests::{self, Decision};
 use pipeline::fleet::histories::UnitKey;
 use records::{TrendRow, WorkEventKind, WorkRequest};
-use store::{Holder, Store};
+use store::Store;
 
 use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 use crate::commands::context::{KnownNames, load_config};
@@ -55,7 +55,7 @@ fn decide(
         let what = "the name or the reason is empty";
         return Err(Failure::usage("empty_name", what, "give `--by NAME` and `--reason TEXT`"));
     }
-    let mut writer = store.lock(&Holder::this_process(), Some(WAIT))?;
+    let mut writer = store.lock(Some(WAIT))?;
     // Read under the lock: a run may have closed the request in the meantime.
     let mut events = store.work_events()?;
     let now = Timestamp::now();

@@ -15,7 +15,7 @@ use job::flight_log::{Actuator, FlightLog, catch_panic, config_digest};
 use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, PartNumber};
-use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
+use store::{LogOutcome, LogRecord, LogResult, Store};
 
 use crate::assess::trends;
 use crate::error::Error;
@@ -129,7 +129,7 @@ pub(crate) fn execute_run(
     let maintenance = maintenance_log::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?;
-    let mut writer = store.lock(&Holder::this_process(), context.wait)?;
+    let mut writer = store.lock(context.wait)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let started_utc = Timestamp::now();

@@ -12,7 +12,7 @@ use records::{
     Alias, GapEstimate, GapRecord, Installation, Installations, Position, RunRecord, SerialNumber, Status,
     TailNumber,
 };
-use store::{Holder, LogResult, Query, Store, Writer};
+use store::{LogResult, Query, Store, Writer};
 
 use crate::fleet;
 use crate::gate::is_gate;
@@ -103,7 +103,7 @@ fn run_row(number: i64, tables_digest: Option<String>) -> RunRecord {
 }
 
 fn writer(folder: &Path) -> Writer {
-    Store::create_or_open(folder).unwrap().lock(&Holder::this_process(), None).unwrap()
+    Store::create_or_open(folder).unwrap().lock(None).unwrap()
 }
 
 /// A run: some logs, then the tables, then its end; a killed one stops after `steps`.

@@ -9,7 +9,7 @@ use ingest::Flights;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use records::{GapEstimate, GapRecord, Installation, PartNumber, Position, SerialNumber, Status, TailNumber};
-use store::{Holder, LogResult, Store};
+use store::{LogResult, Store};
 
 pub(crate) use self::made_up::{record, result};
 
@@ -70,7 +70,7 @@ pub(crate) fn estimated(gap_um: f64) -> GapEstimate {
 /// A store with the results of some logs, below a folder.
 pub(crate) fn store(folder: &Path, results: &[LogResult]) -> Store {
     let store = Store::create_or_open(folder.join("results")).unwrap();
-    store.lock(&Holder::this_process(), None).unwrap().commit(results).unwrap();
+    store.lock(None).unwrap().commit(results).unwrap();
     store
 }
 

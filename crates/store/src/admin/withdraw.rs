@@ -3,7 +3,6 @@
 //! A withdrawn record keeps all its columns except its status, so nothing is lost, and other programs that select by status
 //! leave it out too.
 
-use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -41,10 +40,9 @@ impl Writer {
     ) -> Result<Withdrawal, Error> {
         let of_log = log_path.map(|path| Condition::texts("log_path", path, path));
         let conditions: Vec<Condition> = query.conditions().into_iter().chain(of_log).collect();
-        let flights = RefCell::new(BTreeSet::new());
-        let change = |batch: &RecordBatch| with_status(batch, &conditions, undo, &mut flights.borrow_mut());
-        let records = self.rewrite(&COLUMNS, &change)?;
-        Ok(Withdrawal { records, flights: flights.into_inner() })
+        let mut flights = BTreeSet::new();
+        let records = self.rewrite(&COLUMNS, |batch| with_status(batch, &conditions, undo, &mut flights))?;
+        Ok(Withdrawal { records, flights })
     }
 }
 

@@ -4,7 +4,6 @@
 //! A run reads the content of each table some ten times, with commits in between. Replaying the log every time took
 //! a third of the fixed cost of a run; one listing of the folder shows whether the log changed.
 
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -93,11 +92,5 @@ impl SnapshotCache {
         let is_newest = has(snapshot.version) && !has(snapshot.version + 1);
         let kept = is_newest.then(|| (snapshot.clone(), log));
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = kept;
-    }
-}
-
-impl fmt::Debug for SnapshotCache {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("SnapshotCache")
     }
 }

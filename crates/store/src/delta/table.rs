@@ -42,7 +42,7 @@ const CHECKPOINT: &str = "20";
 /// snapshot would both land and double their rows. Two transactions of one name never both land.
 const REWRITE: &str = "freeplay.rewrite";
 
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(crate) struct Table {
     pub(crate) name: &'static str,
     pub(crate) schema: SchemaRef,

@@ -18,7 +18,7 @@ use records::{GapRecord, Status};
 
 use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
-use crate::handle::{Join, Store};
+use crate::handle::Store;
 use crate::read::query::Query;
 use crate::read::scan::{self, Condition};
 
@@ -72,7 +72,7 @@ impl Store {
         mut self,
         join: impl Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync + 'static,
     ) -> Self {
-        self.join = Some(Join(Arc::new(join)));
+        self.join = Some(Arc::new(join));
         self
     }
 }
@@ -117,7 +117,7 @@ impl ColumnScan {
     fn read_file(&self, file: &Path) -> Result<Vec<RecordBatch>, Error> {
         let rows = self.store.read_file(file, &self.read, &self.stored)?;
         let Some(join) = &self.store.join else { return Ok(rows) };
-        rows.iter().map(|batch| Ok(self.finish(&(join.0)(batch)?)?)).collect()
+        rows.iter().map(|batch| Ok(self.finish(&join(batch)?)?)).collect()
     }
 
     /// The matching rows and the wanted columns of a batch after the join.

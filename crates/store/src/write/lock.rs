@@ -1,6 +1,5 @@
 //! The lock: one process writes at a time. It belongs to the process and dies with it.
 
-use std::fmt;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::Path;
@@ -14,32 +13,22 @@ use crate::error::Error;
 /// Interval at which a waiting process tries again.
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
-/// Who holds a store, in words another process can show.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Holder {
-    /// Its process number.
-    pub pid: u32,
-    /// Its machine: the folder may be shared.
-    pub host: String,
-    /// Since when.
-    pub started_utc: Timestamp,
+/// Who holds a store: the content of the lock file, which another process shows. Machines may share a folder.
+#[derive(Serialize, Deserialize)]
+struct Holder {
+    pid: u32,
+    host: String,
+    started_utc: Timestamp,
 }
 
 impl Holder {
     /// This process on this machine, from now on.
-    pub fn this_process() -> Self {
+    fn this_process() -> Self {
         let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
         let name =
             name.or_else(|| std::env::var("COMPUTERNAME").ok()).or_else(|| std::env::var("HOSTNAME").ok());
         let host = name.map_or_else(|| "this machine".to_owned(), |name| name.trim().to_owned());
         Self { pid: std::process::id(), host, started_utc: Timestamp::now() }
-    }
-}
-
-impl fmt::Display for Holder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let since = self.started_utc.strftime("%Y-%m-%d %H:%M:%S UTC");
-        write!(f, "held by pid {} on {} since {since}", self.pid, self.host)
     }
 }
 
@@ -51,7 +40,7 @@ pub(crate) struct Lock {
 
 impl Lock {
     /// Takes the lock, waiting for as long as is allowed.
-    pub(crate) fn take(path: &Path, holder: &Holder, wait: Option<Duration>) -> Result<Self, Error> {
+    pub(crate) fn take(path: &Path, wait: Option<Duration>) -> Result<Self, Error> {
         // `is_held` takes the lock for an instant: this must not fail another run.
         let deadline = Instant::now() + wait.unwrap_or_default().max(LOOK_AGAIN);
         let mut options = OpenOptions::new();
@@ -71,7 +60,7 @@ impl Lock {
                 Err(TryLockError::WouldBlock) => return Err(Error::Held { holder: named(&mut file) }),
             }
         }
-        name(&mut file, holder).map_err(Error::io(path, "written"))?;
+        name(&mut file).map_err(Error::io(path, "written"))?;
         Ok(Self { _file: file })
     }
 
@@ -90,10 +79,10 @@ impl Lock {
     }
 }
 
-fn name(file: &mut File, holder: &Holder) -> std::io::Result<()> {
+fn name(file: &mut File) -> std::io::Result<()> {
     file.set_len(0)?;
     file.rewind()?;
-    file.write_all(serde_json::to_string(holder)?.as_bytes())
+    file.write_all(serde_json::to_string(&Holder::this_process())?.as_bytes())
 }
 
 /// What the holder wrote about itself; it may be writing just now.
@@ -101,5 +90,10 @@ fn named(file: &mut File) -> String {
     let mut text = String::new();
     let read = file.rewind().and_then(|()| file.read_to_string(&mut text));
     let holder: Option<Holder> = read.ok().and_then(|_| serde_json::from_str(&text).ok());
-    holder.map_or_else(|| "held by another process".to_owned(), |holder| holder.to_string())
+    holder.map_or_else(
+        || "held by another process".to_owned(),
+        |Holder { pid, host, started_utc }| {
+            format!("held by pid {pid} on {host} since {}", started_utc.strftime("%Y-%m-%d %H:%M:%S UTC"))
+        },
+    )
 }

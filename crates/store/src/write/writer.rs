@@ -22,7 +22,7 @@ use crate::handle::Store;
 use crate::read::column_scan::not_withdrawn;
 use crate::read::scan::Condition;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
-use crate::write::lock::{Holder, Lock};
+use crate::write::lock::Lock;
 
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,8 +110,8 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Held`] names the holder; [`Error::Io`] when the folder cannot be written.
-    pub fn lock(&self, holder: &Holder, wait: Option<Duration>) -> Result<Writer, Error> {
-        let lock = self.lock_file().map(|file| Lock::take(&file, holder, wait)).transpose()?;
+    pub fn lock(&self, wait: Option<Duration>) -> Result<Writer, Error> {
+        let lock = self.lock_file().map(|file| Lock::take(&file, wait)).transpose()?;
         if check_marker(&self.location, MARKER)? < FORMAT {
             write_marker(&self.location)?;
         }
@@ -191,7 +191,7 @@ impl Writer {
     pub fn rewrite(
         &mut self,
         columns: &[&str],
-        change: &dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError>,
+        mut change: impl FnMut(&RecordBatch) -> Result<RecordBatch, ArrowError>,
     ) -> Result<usize, Error> {
         let schema = GapRecord::schema();
         let places = columns.iter().map(|name| schema.index_of(name)).collect::<Result<Vec<_>, _>>()?;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use records::{GapEstimate, GapRecord, Status};
-use store::{Holder, LogRecord, LogResult, RunRecord, Store, Writer};
+use store::{LogRecord, LogResult, RunRecord, Store, Writer};
 
 use crate::made_up;
 
@@ -62,7 +62,7 @@ pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRec
 }
 
 pub(crate) fn writer(dir: &Path) -> Writer {
-    Store::create_or_open(dir).unwrap().lock(&Holder::this_process(), None).unwrap()
+    Store::create_or_open(dir).unwrap().lock(None).unwrap()
 }
 
 /// The writer of a new store in a folder of its own, which is deleted with the first value.

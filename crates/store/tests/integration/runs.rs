@@ -3,7 +3,7 @@
 use std::slice;
 
 use records::Status;
-use store::{Holder, LogOutcome, LogRecord, Query, RunRecord, Store, Writer};
+use store::{LogOutcome, LogRecord, Query, RunRecord, Store, Writer};
 
 use crate::fixtures::{account, fresh, record, result, run, writer};
 
@@ -129,7 +129,7 @@ fn who_asks_whether_a_store_is_held_holds_nobody_up() {
     std::thread::scope(|scope| {
         let asking = scope.spawn(|| (0..2_000).for_each(|_| assert!(store.is_held().is_ok())));
         while !asking.is_finished() {
-            drop(store.lock(&Holder::this_process(), None).unwrap());
+            drop(store.lock(None).unwrap());
         }
     });
 }

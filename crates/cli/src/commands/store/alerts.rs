@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use job::Config;
 use pipeline::findings::finding::GAP;
 use records::{AlertRecord, AlertStatus};
-use store::{Holder, Store};
+use store::Store;
 
 use crate::args::RowFormatArgs;
 use crate::exit::{Code, Failure};
@@ -49,7 +49,7 @@ pub(crate) fn drop_unsent(
         let known: Vec<&str> = channels.keys().map(String::as_str).collect();
         return Err(Failure::usage("no_such_alert", what, &format!("channels are {}", known.join(", "))));
     }
-    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let mut writer = store.lock(None)?;
     let rows = store.alerts()?;
     let is_known = |id: &str| rows.iter().any(|row| row.alert_id == id && Some(row.channel.as_str()) == to);
     let unsent = rows.iter().filter(|row| row.channel == channel && row.status.is_unsent());
@@ -76,7 +76,7 @@ pub(crate) fn drop_unsent(
 
 /// Makes an unconfirmed alert due again.
 pub(crate) fn resend(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
-    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let mut writer = store.lock(None)?;
     let mut rows = store.alerts()?;
     rows.retain(|row| row.alert_id == id && row.status == AlertStatus::Unconfirmed);
     if rows.is_empty() {

@@ -11,7 +11,7 @@ use job::Config;
 use records::Diagnostic;
 use records::row_schema::to_batch;
 use serde_json::json;
-use store::{Holder, Info, Query, RunRecord, Store, Withdrawal};
+use store::{Info, Query, RunRecord, Store, Withdrawal};
 
 use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand};
 use crate::exit::{Code, Failure};
@@ -166,7 +166,7 @@ fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_j
 
 fn verify(store: &Store, accepts_foreign: bool, output: &Output) -> Result<Code, Failure> {
     if accepts_foreign {
-        let accepted = store.lock(&Holder::this_process(), None)?.accept_foreign()?;
+        let accepted = store.lock(None)?.accept_foreign()?;
         output.write_result(&format!("accepted {} of other programs\n", count(accepted, "commit")))?;
     }
     let findings = store.verify();
@@ -196,7 +196,7 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
         let hint = "give `--flight`, `--log`, `--tail`, `--position`, `--since` or `--until`";
         return Err(Failure::usage("nothing_selected", "no record is selected", hint));
     }
-    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let mut writer = store.lock(None)?;
     let Withdrawal { records: changed, flights } = writer.withdraw(&query, args.log.as_deref(), args.undo)?;
     // A flight number may fly every day, on several tails.
     let tails: BTreeSet<&String> = flights.iter().map(|(tail, _)| tail).collect();
@@ -214,7 +214,7 @@ fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Fai
 }
 
 fn compact(store: &Store, output: &Output) -> Result<Code, Failure> {
-    let done = store.lock(&Holder::this_process(), None)?.compact()?;
+    let done = store.lock(None)?.compact()?;
     let deleted = count(done.deleted, "superseded file");
     output.write_result(&format!(
         "merged {} into {}; {deleted} deleted\n",

@@ -5,7 +5,7 @@
 //! other programs read.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, Float64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
@@ -144,13 +144,10 @@ impl Bookkeeping {
         if renamed.is_empty() && self.is_written(writer.store())? {
             return Ok(Vec::new());
         }
-        let moved = Mutex::new(MovedByPlace::new());
-        let change = |batch: &RecordBatch| {
-            let mut moved = moved.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut moved = MovedByPlace::new();
+        writer.rewrite(&COLUMNS, |batch| {
             with_new_paths(self.join(batch, |names, at| add_moved(&mut moved, names, at))?, renamed)
-        };
-        writer.rewrite(&COLUMNS, &change)?;
-        let moved = moved.into_inner().unwrap_or_else(PoisonError::into_inner);
+        })?;
         Ok(moved.into_values().collect())
     }
 
