@@ -1,24 +1,8 @@
 //! Result store: gap records, log records and run records in Delta tables.
 //!
-//! A store is a folder that other engines can open:
-//!
-//! ```text
-//! results/
-//!   store.json   format version of the store
-//!   lock         the current writer, while there is one
-//!   gaps/        one row per actuator and flight
-//!   logs/        one row per log and run that finished with it
-//!   runs/        one row at the start of a run and one at its end
-//!   alerts/      changes of state, and what became of their messages; from the first alert on
-//!   work/        events of work requests; from the first request on
-//!   states/      state of each unit after the last run, for the next run to tell what changed
-//! ```
-//!
-//! A prefix of a bucket holds the same, except for the lock: see `docs/store.md`.
-//!
-//! One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
+//! A store is a folder, or a prefix of a bucket, that other engines can open: `docs/store.md` explains its layout and the
+//! guarantees. One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
 //! one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
-//! `docs/store.md` explains the layout and the guarantees.
 //!
 //! ```
 //! use store::{LogResult, Query, Store};

@@ -24,7 +24,10 @@ pub(crate) struct Location {
     /// The folder itself, or the folder of the copies.
     dir: PathBuf,
     bucket: Option<BucketLocation>,
-    runtime: Arc<RuntimeHandle>,
+    /// Handle of the runtime of Delta's asynchronous library; for a bucket, of the threads that serve its connections.
+    handle: Handle,
+    /// A folder's own runtime, so that a forked process that opens a store has one too.
+    _runtime: Option<Arc<Runtime>>,
 }
 
 #[derive(Debug, Clone)]
@@ -35,31 +38,22 @@ struct BucketLocation {
     _copies: Arc<tempfile::TempDir>,
 }
 
-/// Runtime of Delta's asynchronous library: an own thread for a folder, so that a forked process that opens a store has
-/// one too; for a bucket, the threads that serve its connections.
-#[derive(Debug)]
-enum RuntimeHandle {
-    Own(Runtime),
-    Shared(Handle),
-}
-
 impl Location {
     /// A folder that exists, or an address.
     pub(crate) fn at(path: &Path) -> Result<Self, Error> {
         let Some(address) = Address::parse(path)? else { return Self::folder(path) };
         let copies = tempfile::tempdir().map_err(Error::io(std::env::temp_dir(), "written"))?;
-        let runtime = Arc::new(RuntimeHandle::Shared(object_io::handle()?));
         let (dir, client) = (copies.path().to_owned(), address.client()?);
         let bucket = Some(BucketLocation { address, client, _copies: Arc::new(copies) });
-        Ok(Self { dir, bucket, runtime })
+        Ok(Self { dir, bucket, handle: object_io::handle()?, _runtime: None })
     }
 
     /// A folder that exists.
     fn folder(path: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
         let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
-        let runtime = Arc::new(RuntimeHandle::Own(own.map_err(Error::io(&dir, "opened"))?));
-        Ok(Self { dir, bucket: None, runtime })
+        let runtime = own.map_err(Error::io(&dir, "opened"))?;
+        Ok(Self { dir, bucket: None, handle: runtime.handle().clone(), _runtime: Some(Arc::new(runtime)) })
     }
 
     pub(crate) fn join(&self, name: &str) -> Self {
@@ -67,8 +61,7 @@ impl Location {
             address: bucket.address.with_key(&joined(bucket.address.key(), name)),
             ..bucket.clone()
         };
-        let bucket = self.bucket.as_ref().map(deeper);
-        Self { dir: self.dir.join(name), bucket, runtime: Arc::clone(&self.runtime) }
+        Self { dir: self.dir.join(name), bucket: self.bucket.as_ref().map(deeper), ..self.clone() }
     }
 
     /// The folder, or where copies lie.
@@ -89,10 +82,7 @@ impl Location {
     }
 
     pub(crate) fn block_on<F: Future>(&self, work: F) -> F::Output {
-        match self.runtime.as_ref() {
-            RuntimeHandle::Own(runtime) => runtime.block_on(work),
-            RuntimeHandle::Shared(handle) => handle.block_on(work),
-        }
+        self.handle.block_on(work)
     }
 
     /// Delta's view of this folder.

@@ -190,9 +190,6 @@ impl Table {
     }
 
     /// Plans a change on the newest snapshot and commits it; after a concurrent commit, plans it again.
-    ///
-    /// # Errors
-    /// What planning fails with, or [`Error::Table`] when the change cannot be committed.
     pub(crate) fn change(
         &self,
         mut plan: impl FnMut(&Snapshot) -> Result<Change<'_>, Error>,

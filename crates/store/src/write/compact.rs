@@ -16,8 +16,7 @@ use crate::write::writer::Writer;
 
 /// Rows of a full file: with fewer, a query opens more files; with more, replacing one flight copies more rows.
 const FILE_ROWS: usize = 100_000;
-/// Number of files that are written in one pass, which reads the old files that may hold their rows: a run's file holds
-/// rows of every tail, a compacted file those of few.
+/// Number of files that are written in one pass, which reads the old files that may hold their rows.
 const FILES_AT_ONCE: usize = 5;
 
 /// Age at which superseded files are deleted, so that a reader that still uses them may finish: Delta's default.
@@ -55,10 +54,8 @@ impl Store {
 impl Writer {
     /// Merges the files of every table and deletes superseded ones older than seven days.
     ///
-    /// Rows do not change. Memory holds the rows of five files, or of five tails where these have more.
-    ///
-    /// # Errors
-    /// As [`Writer::commit`]; the tables are unchanged then.
+    /// Rows do not change. Memory holds the rows of five files, or of five tails where these have more. An error leaves the
+    /// tables as they were.
     pub fn compact(&mut self) -> Result<Compaction, Error> {
         let store = self.store();
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
@@ -155,10 +152,8 @@ mod tests {
     #[test]
     fn a_value_is_never_cut_and_a_file_never_overfull_with_several() {
         let counts = [("a", 4), ("b", 6), ("c", 1), ("d", 30), ("e", 2)];
-        let counts = counts.into_iter().map(|(name, rows)| (name.to_owned(), rows)).collect();
-        let found: Vec<(String, String, usize)> =
-            slices(&counts, 10).into_iter().map(|s| (s.first, s.last, s.rows)).collect();
-        let expected = [("a", "b", 10), ("c", "c", 1), ("d", "d", 30), ("e", "e", 2)];
-        assert_eq!(found, expected.map(|(first, last, rows)| (first.to_owned(), last.to_owned(), rows)));
+        let found = slices(&counts.map(|(name, rows)| (name.to_owned(), rows)).into(), 10);
+        let found: Vec<_> = found.iter().map(|s| (s.first.as_str(), s.last.as_str(), s.rows)).collect();
+        assert_eq!(found, [("a", "b", 10), ("c", "c", 1), ("d", "d", 30), ("e", "e", 2)]);
     }
 }

@@ -98,7 +98,7 @@ enum Decision<'a> {
     /// This record takes its place.
     Replaced(&'a GapRecord),
     /// The stored record goes if its log has this digest: its samples are stored under another key now.
-    Moved(Option<&'a str>),
+    Moved(&'a str),
 }
 
 type MergeDecisions<'a> = BTreeMap<RecordKey, Decision<'a>>;
@@ -107,9 +107,6 @@ impl Store {
     /// Locks the store for writing; waits at most `wait` for another writer.
     ///
     /// A bucket has no lock: a commit that another one preceded is rejected there, and planned again.
-    ///
-    /// # Errors
-    /// [`Error::Held`] names the holder; [`Error::Io`] when the folder cannot be written.
     pub fn lock(&self, wait: Option<Duration>) -> Result<Writer, Error> {
         let lock = self.lock_file().map(|file| Lock::take(&file, wait)).transpose()?;
         if check_marker(&self.location, MARKER)? < FORMAT {
@@ -130,11 +127,8 @@ impl Writer {
     ///
     /// The records of all of them appear in one commit, and their accounts in the next. A process that
     /// dies in between has stored whole flights without accounts: its logs are run again, and supersede
-    /// their own records. Superseding copies those files only that hold a superseded record.
-    ///
-    /// # Errors
-    /// [`Error::Io`] and [`Error::Table`] when the disk refuses, [`Error::Damaged`] when a file to be
-    /// copied is not the one that was committed. What was stored before is intact.
+    /// their own records. Superseding copies those files only that hold a superseded record. An error leaves what was
+    /// stored before as it was.
     pub fn commit(&mut self, results: &[LogResult]) -> Result<(), Error> {
         let decisions = decisions(results);
         if !decisions.is_empty() {
@@ -147,9 +141,7 @@ impl Writer {
 
     /// The stored records of some keys; withdrawn ones are left out.
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
-        let wanted: MergeDecisions<'_> =
-            keys.iter().map(|key| (key.clone(), Decision::Moved(None))).collect();
-        self.held_where(&[not_withdrawn()], |stats| may_hold_any(stats, &wanted), |key| keys.contains(key))
+        self.held_where(&[not_withdrawn()], |stats| may_hold_any(stats, keys), |key| keys.contains(key))
     }
 
     /// The stored records of flights that departed from a time to another, µs since 1970 UTC; withdrawn ones are left out.
@@ -230,9 +222,8 @@ impl Writer {
     ) -> Result<Change<'a>, Error> {
         let mut change = Change::default();
         let (location, version) = (&self.store.gaps.location, snapshot.version + 1);
-        for file in
-            snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(&file.stats, decisions))
-        {
+        let keys = decisions.keys().cloned().collect();
+        for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(&file.stats, &keys)) {
             if let Some(rest) = self.without(file, decisions)? {
                 change.remove.push(file);
                 if rest.num_rows() > 0 {
@@ -297,7 +288,7 @@ fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
         for (key, digest) in &result.moved_from {
             let is_of_other = |record: &GapRecord| record.provenance.log_digest != *digest;
             if !matches!(decisions.get(key), Some(Decision::Replaced(record)) if is_of_other(record)) {
-                decisions.insert(key.clone(), Decision::Moved(Some(digest)));
+                decisions.insert(key.clone(), Decision::Moved(digest));
             }
         }
         let replaced = |record| (RecordKey::of(record), Decision::Replaced(record));
@@ -307,11 +298,11 @@ fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
 }
 
 /// Whether the file may hold one of the records, by its bounds.
-fn may_hold_any(stats: &Stats, decisions: &MergeDecisions<'_>) -> bool {
+fn may_hold_any(stats: &Stats, keys: &BTreeSet<RecordKey>) -> bool {
     let (earliest_us, latest_us) = stats.times_us("departure_utc");
     let from = |departure_us| RecordKey { departure_us, tail_number: String::new(), position: String::new() };
-    let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));
-    in_time.map(|(key, _)| key).any(|key| stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
+    let mut in_time = keys.range(from(earliest_us)..from(latest_us.saturating_add(1)));
+    in_time.any(|key| stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
 }
 
 /// Mask of the rows that no merge decision takes away.
@@ -320,7 +311,7 @@ fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<Boolea
     let is_kept = |(row, key): (usize, RecordKey)| match decisions.get(&key) {
         None => true,
         Some(Decision::Replaced(_)) => false,
-        Some(Decision::Moved(digest)) => *digest != Some(digests.value(row)),
+        Some(Decision::Moved(digest)) => *digest != digests.value(row),
     };
     Ok(keys_of(batch)?.into_iter().enumerate().map(|row| Some(is_kept(row))).collect())
 }
