@@ -107,10 +107,7 @@ impl<'c> FlightLog<'c> {
         })
     }
 
-    /// Estimates one actuator of the log.
-    ///
-    /// # Errors
-    /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
+    /// Estimates one actuator of the log. Its error says nothing of the others of the log.
     pub fn record(&self, at: &Actuator, stamp: &ProvenanceStamp) -> Result<GapRecord, Diagnostic> {
         let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
         let (installation, part) = self.unit(at).map_err(in_file)?;
@@ -415,10 +412,7 @@ pub fn pieces_undeclared(
     )
 }
 
-/// Runs work on one log; a panic becomes a diagnostic with its message and location.
-///
-/// # Errors
-/// The error of the work, or code `panic`.
+/// Runs work on one log; a panic becomes a diagnostic of code `panic`, with its message and location.
 pub fn catch_panic<T>(
     display_name: &str,
     work: impl FnOnce() -> Result<T, Diagnostic>,

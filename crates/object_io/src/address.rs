@@ -37,10 +37,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// Parses an address; `None` when the path is not one.
-    ///
-    /// # Errors
-    /// [`Error::Address`] when it names no bucket, or its scheme is misspelled or unknown.
+    /// Parses an address; `None` when the path is not one. A misspelled scheme is an error, as is a missing bucket.
     pub fn parse(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
         let scheme = Scheme::VARIANTS

@@ -13,10 +13,7 @@ pub enum Posted {
     Unknown(String),
 }
 
-/// Checks an address of HTTP.
-///
-/// # Errors
-/// If it is not one; the message omits the address, which may hold a secret.
+/// Checks an address of HTTP. The message of an error omits the address, which may hold a secret.
 pub fn check_url(text: &str) -> Result<(), String> {
     parse(text).map(drop)
 }

@@ -1,6 +1,6 @@
 //! Object listing, page by page, and metadata of one object.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use futures::StreamExt;
 use object_store::{ObjectMeta, ObjectStore, ObjectStoreExt};
@@ -34,9 +34,7 @@ impl ListEntry {
 }
 
 /// Passes the first `most` objects below a folder to `take`, by name; one page (1000 objects) is held in memory at a time.
-///
-/// # Errors
-/// The error of the failed request; entries passed before it are valid.
+/// Entries that were passed before a request failed are valid.
 pub fn list(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
     block_on(folder.request(async |client, location| {
         let mut found = client.list(Some(location)).take(most);
@@ -48,8 +46,7 @@ pub fn list(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> R
 }
 
 /// Metadata of one object.
-pub fn head(path: &Path) -> Result<ListEntry, Error> {
-    let address = Address::parse_required(path)?;
+pub fn head(address: &Address) -> Result<ListEntry, Error> {
     let meta = block_on(address.request(async |client, location| client.head(location).await))??;
-    Ok(ListEntry::of(&address, meta))
+    Ok(ListEntry::of(address, meta))
 }

@@ -115,10 +115,8 @@ fn serialize_masked<S: Serializer>(text: &str, to: S) -> Result<S::Ok, S::Error>
 
 #[expect(clippy::ref_option, reason = "serde passes the field")]
 fn serialize_masked_option<S: Serializer>(text: &Option<String>, to: S) -> Result<S::Ok, S::Error> {
-    match text {
-        Some(text) => to.serialize_some(&mask_credentials(&limit_length(text, MAX_FIELD_CHARS))),
-        None => to.serialize_none(),
-    }
+    let limited = text.as_deref().map(|text| limit_length(text, MAX_FIELD_CHARS));
+    limited.as_deref().map(mask_credentials).serialize(to)
 }
 
 /// A field as people see it: on its line, without credentials, invisible characters, or more text than they can take in.

@@ -20,10 +20,7 @@ macro_rules! identifier {
         pub struct $name(Box<str>);
 
         impl $name {
-            /// Creates the identifier from text; surrounding white space is removed.
-            ///
-            /// # Errors
-            /// [`IdError`] when the text is blank or longer than 256 bytes.
+            /// Creates the identifier from text without the white space around it; it has 1 to 256 bytes.
             pub fn new(text: impl AsRef<str>) -> Result<Self, IdError> {
                 let text = text.as_ref().trim();
                 match text.len() {

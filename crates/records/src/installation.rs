@@ -80,10 +80,7 @@ pub struct Installations {
 }
 
 impl Installations {
-    /// Builds the table from rows in any order, and validates them against each other.
-    ///
-    /// # Errors
-    /// Every contradiction, in row order: see [`Error`].
+    /// Builds the table from rows in any order; an error has every contradiction between them, in row order.
     pub fn new(mut rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
         let reversed = |(row, Installation { serial_number, installed_utc, removed_utc, .. }): (
             usize,

@@ -222,10 +222,6 @@ fn sorted_arrays<R: Row>(rows: &[R]) -> Arrays {
 }
 
 /// Columns as rows; other columns are ignored.
-///
-/// # Errors
-/// [`RowError::Column`] when a column is missing or has another type; [`RowError::Value`] when a cell is out of range,
-/// or empty where a value is required.
 pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, RowError> {
     let columns = R::columns("", "");
     let arrays = columns.iter().map(|column| typed(batch, column)).collect::<Result<Vec<_>, _>>()?;

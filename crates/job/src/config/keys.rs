@@ -10,10 +10,8 @@ use toml::de::{DeTable, DeValue};
 use super::layers::Source;
 use super::limits::implausible;
 
-/// Every number of the source that no actuator, sensor, recorder or machine can have, at its key.
-///
-/// # Errors
-/// Every unknown key, if there is one.
+/// Every number of the source that no actuator, sensor, recorder or machine can have, at its key; as an error, every
+/// unknown key.
 pub(super) fn check(source: &Source<'_>, schema: &Value) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
     let mut walk = Walk { source, schema, unknown: Vec::new(), implausible: Vec::new() };
     walk.table(source.table(), schema, "");

@@ -175,7 +175,7 @@ impl Config {
 
     /// The mapping without overrides.
     pub(crate) fn base_mapping(&self) -> &Arc<Mapping> {
-        self.overrides.base()
+        &self.overrides.base
     }
 
     /// The mapping of an aircraft's logs; with a part, of the channels of its actuators.

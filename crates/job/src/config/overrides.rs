@@ -14,7 +14,8 @@ use super::validate_channels;
 /// The checked overrides of a configuration, and the mappings that were derived from them.
 #[derive(Debug, Default)]
 pub(super) struct Overrides {
-    base: Arc<Mapping>,
+    /// The mapping without overrides.
+    pub(super) base: Arc<Mapping>,
     overrides: Vec<ValidatedOverride>,
     /// By the numbers of the overrides that apply.
     mappings: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
@@ -114,10 +115,6 @@ impl Overrides {
             }
         }
         mapping
-    }
-
-    pub(super) fn base(&self) -> &Arc<Mapping> {
-        &self.base
     }
 }
 

@@ -81,27 +81,23 @@ fn range(key: &str) -> String {
 
 /// The object in a value, and what its table is called; alternatives of a channel are channels again.
 fn inner<'v>(key: &str, value: &'v Value, path: &str) -> Option<(String, &'v Value)> {
-    let value = choices(value)
-        .find(|v| v.get("properties").is_some() || v.get("items").is_some() || map(v).is_some())?;
-    let dotted =
+    let name =
         if path.is_empty() { key.to_owned() } else { format!("{}.{key}", path.trim_matches(['[', ']'])) };
-    if let Some(of) = map(value).filter(|of| of.get("properties").is_some()) {
-        return Some((format!("[{dotted}.NAME]"), of));
-    }
-    if let Some(item) = value.get("items").filter(|item| item.get("properties").is_some()) {
-        return Some((format!("[[{dotted}]]"), item));
-    }
-    value.get("properties").is_some().then(|| (format!("[{dotted}]"), value))
+    let is_object = |value: &&Value| value.get("properties").is_some();
+    choices(value, "anyOf").find_map(|value| {
+        let of_map = value.get("additionalProperties").filter(is_object);
+        let of_list = || value.get("items").filter(is_object);
+        of_map
+            .map(|object| (format!("[{name}.NAME]"), object))
+            .or_else(|| of_list().map(|object| (format!("[[{name}]]"), object)))
+            .or_else(|| is_object(&value).then(|| (format!("[{name}]"), value)))
+    })
 }
 
-fn map(value: &Value) -> Option<&Value> {
-    value.get("additionalProperties").filter(|v| v.is_object())
-}
-
-/// A schema, or those of which one must fit.
-fn choices(value: &Value) -> impl Iterator<Item = &Value> {
-    let any = value.get("anyOf").and_then(Value::as_array);
-    any.into_iter().flatten().chain(any.is_none().then_some(value))
+/// The schemas of a list of which one must fit, or the schema itself.
+fn choices<'v>(value: &'v Value, list: &str) -> impl Iterator<Item = &'v Value> {
+    let listed = value.get(list).and_then(Value::as_array);
+    listed.into_iter().flatten().chain(listed.is_none().then_some(value))
 }
 
 /// The type in words.
@@ -113,24 +109,20 @@ fn kind(value: &Value) -> String {
         if let Some(items) = v.get("items") {
             return Some(format!("list of {}", kind(items)));
         }
-        let names: Vec<&str> = match v.get("type")? {
-            Value::String(name) => vec![name.as_str()],
-            Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
-            _ => return None,
+        let name = match v.get("type")? {
+            Value::Array(names) => names.iter().filter_map(Value::as_str).find(|name| *name != "null"),
+            name => name.as_str().filter(|name| *name != "null"),
         };
-        let name = names.into_iter().find(|name| *name != "null")?;
-        Some(
-            match name {
-                "object" => "table",
-                "boolean" => "true or false",
-                "string" => "text",
-                "integer" => "whole number",
-                other => other,
-            }
-            .to_owned(),
-        )
+        let name = match name? {
+            "object" => "table",
+            "boolean" => "true or false",
+            "string" => "text",
+            "integer" => "whole number",
+            other => other,
+        };
+        Some(name.to_owned())
     };
-    let kinds: Vec<String> = choices(value).filter_map(one).collect();
+    let kinds: Vec<String> = choices(value, "anyOf").filter_map(one).collect();
     if kinds.is_empty() { "table".to_owned() } else { kinds.join(" or ") }
 }
 
@@ -141,10 +133,7 @@ fn words(value: &Value) -> Option<String> {
         let words = many.chain(value.get("const")).filter_map(Value::as_str);
         words.map(|word| format!("`{word}`")).collect()
     };
-    let words: Vec<String> = match value.get("oneOf").and_then(Value::as_array) {
-        Some(all) => all.iter().flat_map(listed).collect(),
-        None => listed(value),
-    };
+    let words: Vec<String> = choices(value, "oneOf").flat_map(listed).collect();
     (!words.is_empty()).then(|| words.join(", "))
 }
 

@@ -3,7 +3,7 @@
 //! `object_store` reads the environment only. Profiles that use a role, single sign-on or a credential process
 //! are rejected by name, never treated as absent.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use configparser::ini::Ini;
 use object_store::aws::AmazonS3ConfigKey as Key;
@@ -20,53 +20,45 @@ const SUPPORTED: [(&str, Key); 5] = [
 const UNSUPPORTED: [&str; 5] =
     ["role_arn", "sso_session", "sso_start_url", "credential_process", "source_profile"];
 
-/// Selected profile and paths of the profile files, from the environment.
-#[derive(Debug, Default)]
-pub(crate) struct AwsProfileSource {
-    profile: Option<String>,
-    credentials: Option<PathBuf>,
-    config: Option<PathBuf>,
+/// Settings of the profile that the environment selects, by the same variables as the AWS tools.
+pub(crate) fn from_env() -> Result<Vec<(Key, String)>, String> {
+    let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+    let home = variable("HOME").or_else(|| variable("USERPROFILE")).map(PathBuf::from);
+    let file = |name, usual| {
+        variable(name).map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(".aws").join(usual)))
+    };
+    let profile = std::env::var("AWS_PROFILE").ok().filter(|name| !name.is_empty());
+    let credentials = file("AWS_SHARED_CREDENTIALS_FILE", "credentials");
+    read(profile.as_deref(), credentials.as_deref(), file("AWS_CONFIG_FILE", "config").as_deref())
 }
 
-impl AwsProfileSource {
-    /// Reads the same variables as the AWS tools.
-    pub(crate) fn from_env() -> Self {
-        let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
-        let home = variable("HOME").or_else(|| variable("USERPROFILE")).map(PathBuf::from);
-        let file = |name, usual| {
-            variable(name).map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(".aws").join(usual)))
-        };
-        Self {
-            profile: std::env::var("AWS_PROFILE").ok().filter(|name| !name.is_empty()),
-            credentials: file("AWS_SHARED_CREDENTIALS_FILE", "credentials"),
-            config: file("AWS_CONFIG_FILE", "config"),
-        }
+/// Supported settings of a profile; empty when none is selected and there is no default.
+fn read(
+    profile: Option<&str>,
+    credentials: Option<&Path>,
+    config: Option<&Path>,
+) -> Result<Vec<(Key, String)>, String> {
+    let name = profile.unwrap_or("default");
+    let section = if name == "default" { name.to_owned() } else { format!("profile {name}") };
+    let sources = [(config, section.as_str()), (credentials, name)];
+    let (mut found, mut is_there, mut other) = (Vec::new(), false, None);
+    for (file, section) in sources {
+        let Some(ini) = file.map(load).transpose()?.flatten() else { continue };
+        is_there |= ini.sections().iter().any(|known| known == section);
+        found.extend(SUPPORTED.iter().filter_map(|(name, key)| Some((*key, ini.get(section, name)?))));
+        other = other.or_else(|| UNSUPPORTED.into_iter().find(|key| ini.get(section, key).is_some()));
     }
-
-    /// Supported settings of the profile; empty when no profile is selected and there is no default.
-    pub(crate) fn read(&self) -> Result<Vec<(Key, String)>, String> {
-        let name = self.profile.as_deref().unwrap_or("default");
-        let section = if name == "default" { name.to_owned() } else { format!("profile {name}") };
-        let sources = [(&self.config, section.as_str()), (&self.credentials, name)];
-        let (mut found, mut is_there, mut other) = (Vec::new(), false, None);
-        for (file, section) in sources {
-            let Some(ini) = file.as_ref().map(load).transpose()?.flatten() else { continue };
-            is_there |= ini.sections().iter().any(|known| known == section);
-            found.extend(SUPPORTED.iter().filter_map(|(name, key)| Some((*key, ini.get(section, name)?))));
-            other = other.or_else(|| UNSUPPORTED.into_iter().find(|key| ini.get(section, key).is_some()));
-        }
-        match other {
-            _ if !is_there && self.profile.is_some() => Err(format!("there is no profile `{name}`")),
-            Some(key) if !found.iter().any(|(key, _)| *key == Key::AccessKeyId) => Err(format!(
-                "profile `{name}` has `{key}`, which is not read: \
-                 `aws configure export-credentials --profile {name} --format env` makes variables of it"
-            )),
-            _ => Ok(found),
-        }
+    match other {
+        _ if !is_there && profile.is_some() => Err(format!("there is no profile `{name}`")),
+        Some(key) if !found.iter().any(|(key, _)| *key == Key::AccessKeyId) => Err(format!(
+            "profile `{name}` has `{key}`, which is not read: \
+             `aws configure export-credentials --profile {name} --format env` makes variables of it"
+        )),
+        _ => Ok(found),
     }
 }
 
-fn load(file: &PathBuf) -> Result<Option<Ini>, String> {
+fn load(file: &Path) -> Result<Option<Ini>, String> {
     let text = match std::fs::read_to_string(file) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -88,16 +80,14 @@ mod tests {
                           endpoint_url = https://store.example.com\ns3 =\n  max_concurrent_requests = 4\n\
                           [profile sso]\nsso_session = hangar\nregion = eu-west-1\n";
 
-    fn read(profile: Option<&str>) -> Result<Vec<(Key, String)>, String> {
+    fn read_profile(profile: Option<&str>) -> Result<Vec<(Key, String)>, String> {
         let dir = tempfile::tempdir().unwrap();
         let file = |name: &str, text: &str| {
             let path = dir.path().join(name);
             std::fs::write(&path, text).unwrap();
-            Some(path)
+            path
         };
-        let profile = profile.map(str::to_owned);
-        let (credentials, config) = (file("credentials", CREDENTIALS), file("config", CONFIG));
-        AwsProfileSource { profile, credentials, config }.read()
+        read(profile, Some(&file("credentials", CREDENTIALS)), Some(&file("config", CONFIG)))
     }
 
     fn value(found: &[(Key, String)], wanted: Key) -> Option<&str> {
@@ -106,21 +96,20 @@ mod tests {
 
     #[test]
     fn keys_region_and_endpoint_are_read_from_both_files() {
-        let found = read(Some("Night")).unwrap();
+        let found = read_profile(Some("Night")).unwrap();
         assert_eq!(value(&found, Key::AccessKeyId), Some("AKINIGHT"));
         assert_eq!(value(&found, Key::Token), Some("t2"));
         assert_eq!(value(&found, Key::Region), Some("eu-west-1"));
         assert_eq!(value(&found, Key::Endpoint), Some("https://store.example.com"));
-        let usual = read(None).unwrap();
+        let usual = read_profile(None).unwrap();
         assert_eq!(value(&usual, Key::AccessKeyId), Some("AKIDEFAULT"));
         assert_eq!(value(&usual, Key::Region), Some("eu-central-1"));
     }
 
     #[test]
     fn an_unsupported_profile_is_rejected_by_name() {
-        assert!(read(Some("sso")).unwrap_err().contains("`sso_session`, which is not read"));
-        assert!(read(Some("gone")).unwrap_err().contains("no profile `gone`"));
-        let none = AwsProfileSource { profile: None, credentials: Some("/nowhere/c".into()), config: None };
-        assert!(none.read().unwrap().is_empty());
+        assert!(read_profile(Some("sso")).unwrap_err().contains("`sso_session`, which is not read"));
+        assert!(read_profile(Some("gone")).unwrap_err().contains("no profile `gone`"));
+        assert!(read(None, Some(Path::new("/nowhere/c")), None).unwrap().is_empty());
     }
 }

@@ -8,7 +8,7 @@ use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::{ClientOptions, RetryConfig};
 
 use crate::address::{Address, Client, Scheme};
-use crate::cloud::aws_profile::AwsProfileSource;
+use crate::cloud::aws_profile;
 use crate::cloud::retry::RetryingStore;
 use crate::error::Error;
 use crate::settings::settings;
@@ -29,7 +29,7 @@ fn s3(bucket: &str) -> Result<Client, String> {
     let given = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
     // Keys are taken from one source only: a token does not belong to the key of another source.
     let has_key = given(&builder, AmazonS3ConfigKey::AccessKeyId);
-    for (key, value) in AwsProfileSource::from_env().read()? {
+    for (key, value) in aws_profile::from_env()? {
         let is_key = !matches!(key, AmazonS3ConfigKey::Region | AmazonS3ConfigKey::Endpoint);
         let is_given = if is_key { has_key } else { given(&builder, key) };
         if !is_given {

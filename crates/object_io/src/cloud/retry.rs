@@ -6,7 +6,6 @@
 
 use std::fmt;
 use std::future::Future;
-use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -95,7 +94,11 @@ impl RetryingStore {
         }
         let (meta, range, attributes) =
             (answer.meta.clone(), answer.range.clone(), answer.attributes.clone());
-        let bytes = check_length(answer.bytes().await?, &range)?;
+        let (bytes, length) = (answer.bytes().await?, range.end - range.start);
+        if bytes.len() as u64 != length {
+            let source = format!("{} bytes were received instead of {length}", bytes.len()).into();
+            return Err(Error::Generic { store: "object", source });
+        }
         let payload = GetResultPayload::Stream(stream::once(async { Ok(bytes) }).boxed());
         Ok(GetResult { payload, meta, range, attributes })
     }
@@ -106,18 +109,6 @@ impl RetryingStore {
         Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))
     }
 
-    /// The keys after `last`.
-    fn list_after(
-        &self,
-        prefix: Option<&Path>,
-        last: Option<&Path>,
-    ) -> BoxStream<'static, Result<ObjectMeta>> {
-        match last {
-            Some(last) => self.inner.list_with_offset(prefix, last),
-            None => self.inner.list(prefix),
-        }
-    }
-
     /// The keys after `last`, from a listing that resumes after the last received key where a request fails.
     fn resumable_list(
         &self,
@@ -125,10 +116,14 @@ impl RetryingStore {
         last: Option<&Path>,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
         let (store, prefix) = (self.clone(), prefix.cloned());
-        let first = (store.list_after(prefix.as_ref(), last), last.cloned(), store.backoff());
+        let list_after = move |store: &Self, last: Option<&Path>| match last {
+            Some(last) => store.inner.list_with_offset(prefix.as_ref(), last),
+            None => store.inner.list(prefix.as_ref()),
+        };
+        let first = (list_after(&store, last), last.cloned(), store.backoff());
         let next =
             move |(mut open, mut last, mut backoff): (BoxStream<'static, Result<ObjectMeta>>, _, Backoff)| {
-                let (store, prefix) = (store.clone(), prefix.clone());
+                let (store, list_after) = (store.clone(), list_after.clone());
                 async move {
                     loop {
                         match open.next().await.transpose() {
@@ -139,20 +134,12 @@ impl RetryingStore {
                             }
                             Err(error) => backoff.wait_after(error).await?,
                         }
-                        open = store.list_after(prefix.as_ref(), last.as_ref());
+                        open = list_after(&store, last.as_ref());
                     }
                 }
             };
         stream::try_unfold(first, next).boxed()
     }
-}
-
-fn check_length(bytes: Bytes, range: &Range<u64>) -> Result<Bytes> {
-    if bytes.len() as u64 == range.end - range.start {
-        return Ok(bytes);
-    }
-    let source = format!("{} bytes were received instead of {}", bytes.len(), range.end - range.start);
-    Err(Error::Generic { store: "object", source: source.into() })
 }
 
 impl fmt::Display for RetryingStore {

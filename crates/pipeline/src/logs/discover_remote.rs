@@ -1,7 +1,5 @@
 //! Log discovery in object stores: keys that match a pattern, with the metadata of the listing.
 
-use std::path::Path;
-
 use object_io::{Address, ListEntry};
 
 use crate::error::Error;
@@ -23,7 +21,7 @@ pub(crate) fn matching(
 ) -> Result<Vec<ListEntry>, Error> {
     let Some(first) = address.key().find(['*', '?', '[']) else {
         note_tables_above(address, address.key(), tables)?;
-        return match object_io::head(Path::new(&address.to_string())) {
+        return match object_io::head(address) {
             Err(object_io::Error::Missing { .. }) => Ok(Vec::new()),
             entry => Ok(vec![entry?]),
         };
