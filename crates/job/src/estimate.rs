@@ -45,7 +45,11 @@ pub fn estimate(
                     Err(other) => return Err(failed(other)),
                 };
             let of_method = match settings.method {
-                Method::Contact => contact_estimate(channels, &prior, &mut workspaces.contact),
+                Method::Contact => {
+                    let outcome = contact::estimate(&samples(channels), &prior, &mut workspaces.contact);
+                    let refused = |why: Rejection| GapEstimate::refused(why.code());
+                    outcome.map(|outcome| outcome.map_or_else(refused, |found| from_contact(&found)))
+                }
                 Method::Midrange => {
                     midrange_estimate(channels, &prior, published.as_ref(), &mut workspaces.contact)
                 }
@@ -179,15 +183,6 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     let still = needed().any(Quality::is_constant) || rigid;
     let zero = needed().any(Quality::is_zero);
     if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
-}
-
-fn contact_estimate(
-    channels: &ActuatorChannels,
-    prior: &PartPrior,
-    workspace: &mut ContactWorkspace,
-) -> Result<GapEstimate, estimator::Error> {
-    let outcome = contact::estimate(&samples(channels), prior, workspace)?;
-    Ok(outcome.map_or_else(|why| GapEstimate::refused(why.code()), |found| from_contact(&found)))
 }
 
 /// The gap by the published statistic, for a flight whose channels show one.

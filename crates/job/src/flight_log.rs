@@ -23,15 +23,6 @@ use crate::{estimate, panic};
 /// Time zones and clocks that drift explain no more than this.
 const MAX_AHEAD: SignedDuration = SignedDuration::from_hours(24);
 
-/// Provenance that a run writes into its records.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each field is named for what it holds")]
-pub struct ProvenanceStamp {
-    pub run_id: String,
-    pub program_version: String,
-    pub processed_utc: Timestamp,
-}
-
 /// An actuator of a log, and how its channels are read.
 #[derive(Debug)]
 pub struct Actuator {
@@ -107,8 +98,9 @@ impl<'c> FlightLog<'c> {
         })
     }
 
-    /// Estimates one actuator of the log. Its error says nothing of the others of the log.
-    pub fn record(&self, at: &Actuator, stamp: &ProvenanceStamp) -> Result<GapRecord, Diagnostic> {
+    /// Estimates one actuator of the log; `of_run` is the provenance of the records of a run, but for the log. Its error
+    /// says nothing of the others of the log.
+    pub fn record(&self, at: &Actuator, of_run: &Provenance) -> Result<GapRecord, Diagnostic> {
         let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
         let (installation, part) = self.unit(at).map_err(in_file)?;
         let (estimate, channels) = self.estimate(at, part).map_err(in_file)?;
@@ -124,9 +116,7 @@ impl<'c> FlightLog<'c> {
                 log_path: self.display_name.clone(),
                 log_digest: self.digest.clone(),
                 config_digest: self.config_digest(installation),
-                program_version: stamp.program_version.clone(),
-                run_id: stamp.run_id.clone(),
-                processed_utc: stamp.processed_utc,
+                ..of_run.clone()
             },
         })
     }

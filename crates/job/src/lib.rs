@@ -13,7 +13,7 @@ pub mod trace;
 
 pub use config::Config;
 pub use config::part::Part;
-pub use flight_log::{FlightLog, ProvenanceStamp};
+pub use flight_log::FlightLog;
 
 /// Version of the estimation method: changes with every change that can move a number; part of every configuration
 /// digest.

@@ -7,45 +7,39 @@ use strum::EnumMessage;
 /// Error of an object store; each variant names the address.
 #[derive(Debug, thiserror::Error, strum::IntoStaticStr, strum::EnumMessage)]
 #[strum(serialize_all = "snake_case", prefix = "object_")]
-#[expect(missing_docs, reason = "each field is named for what it holds")]
+#[expect(
+    missing_docs,
+    reason = "each variant says by its message what is wrong, and names its fields for what they hold"
+)]
 pub enum Error {
-    /// The address is invalid.
     #[error("`{text}` is no address of an object: {detail}")]
     #[strum(message = "write it as s3://bucket/key, gs://bucket/key or az://container/key")]
     Address { text: String, detail: String },
-    /// Credentials or an endpoint are missing or cannot be read.
     #[error("{place} cannot be asked: {detail}")]
     #[strum(message = "docs/objects.md lists the variables and profiles that are read")]
     Settings { place: String, detail: String },
-    /// The program has no clients of object stores.
     #[error("{address} cannot be asked: this program was built without the feature `cloud`")]
     #[strum(message = "build it with its default features: `cargo build --release -p cli`")]
     NotBuilt { address: String },
-    /// The object or bucket does not exist.
     #[error("{address} does not exist")]
     #[strum(message = "are bucket, key and region right? `aws s3 ls` shows what is there")]
     Missing { address: String },
-    /// Authentication failed or access is denied.
     #[error("{address} may not be read or written by these credentials: {detail}")]
     #[strum(
         message = "are the credentials of the right account, not expired, and allowed to list and read here?"
     )]
     Denied { address: String, detail: String },
-    /// The object was replaced while it was read.
     #[error("{address} was replaced while it was read")]
     #[strum(message = "the object may still be uploading; the next run reads it again")]
     Changed { address: String },
-    /// The object already exists.
     #[error("{address} already exists")]
     #[strum(message = "does another run write into this store?")]
     Exists { address: String },
-    /// No complete response within the retry time.
     #[error("{address} cannot be reached, tried for {tried_s:.0} s: {detail}")]
     #[strum(
         message = "is the network up, and the endpoint right? The next run tries again; `[objects]` sets how long"
     )]
     Unreachable { address: String, tried_s: f64, detail: String },
-    /// The temporary file of the fetched ranges cannot be written.
     #[error("what is fetched of {address} cannot be kept in {}: {source}", folder.display())]
     #[strum(message = "make room there, or name another folder in TMPDIR")]
     Spool { address: String, folder: PathBuf, source: std::io::Error },

@@ -11,12 +11,10 @@ use crate::error::Error;
 
 /// Entry of a listing: address, size, modification time and entity tag of an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct ListEntry {
-    /// Its address.
     pub path: PathBuf,
-    /// Bytes.
     pub size_bytes: u64,
-    /// Nanoseconds since 1970 UTC.
     pub modified_utc_ns: i64,
     /// Entity tag (ETag) of the content; empty if the store has none.
     pub e_tag: String,

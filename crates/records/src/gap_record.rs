@@ -44,7 +44,7 @@ word_cell!(Status);
 
 stored_row! {
     /// Everything needed to reproduce the estimate bitwise.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
     pub struct Provenance {
         /// Path of the log; relative to the configuration file if the log is stored below it.
         pub log_path: String,

@@ -10,22 +10,16 @@ use crate::ids::{PartNumber, Position, SerialNumber, TailNumber};
 
 /// Installation of one unit in one position during `[installed_utc, removed_utc)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Installation {
-    /// The aircraft.
     pub tail_number: TailNumber,
-    /// Position on the aircraft.
     pub position: Position,
-    /// Part number of the unit.
     pub part_number: PartNumber,
-    /// The unit.
     pub serial_number: SerialNumber,
-    /// First instant of the installation.
     pub installed_utc: Timestamp,
     /// First instant after the installation; `None` while the unit is still installed.
     pub removed_utc: Option<Timestamp>,
-    /// Age of the unit at installation, hours, if recorded.
     pub unit_hours_at_install: Option<f64>,
-    /// Total hours of the tail at installation, if recorded.
     pub tail_hours_at_install: Option<f64>,
     /// Part and serial number of the unit today, where it was modified or re-identified since this installation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -34,14 +28,13 @@ pub struct Installation {
 
 /// A unit's former part and serial number, and those that it has today.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Alias {
     /// Former part number; `None` for any.
     pub former_part_number: Option<PartNumber>,
-    /// Former serial number.
     pub former_serial_number: SerialNumber,
     /// Part number today; `None` where it is unchanged.
     pub part_number: Option<PartNumber>,
-    /// Serial number today.
     pub serial_number: SerialNumber,
 }
 
@@ -59,10 +52,6 @@ impl Installation {
     /// Whether the unit was installed at that instant.
     pub fn covers(&self, at: Timestamp) -> bool {
         self.installed_utc <= at && self.removed_utc.is_none_or(|removed| at < removed)
-    }
-
-    fn overlaps(&self, later: &Self) -> bool {
-        self.removed_utc.is_none_or(|removed| later.installed_utc < removed)
     }
 }
 
@@ -260,7 +249,8 @@ fn clashes<'a, K: Ord + 'a>(
     });
     let is_clash = |pair: &&[usize]| {
         let [earlier, later] = [&rows[pair[0]], &rows[pair[1]]];
-        key(earlier) == key(later) && earlier.overlaps(later)
+        let overlap = earlier.removed_utc.is_none_or(|removed| later.installed_utc < removed);
+        key(earlier) == key(later) && overlap
     };
     let mut found: Vec<_> =
         order.windows(2).filter(is_clash).map(|pair| (pair[0] + 1, pair[1] + 1)).collect();

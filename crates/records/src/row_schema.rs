@@ -42,15 +42,15 @@ use crate::ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 
 /// Why rows cannot be converted to columns, or columns to rows.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "each field is named for what it holds")]
+#[expect(
+    missing_docs,
+    reason = "each variant says by its message what is wrong, and names its fields for what they hold"
+)]
 pub enum RowError {
-    /// A column is missing or has another type.
     #[error("column `{column}` {problem}")]
     Column { column: &'static str, problem: String },
-    /// A cell is empty or out of range.
     #[error("column `{column}`, row {row}: {problem}")]
     Value { column: &'static str, row: usize, problem: String },
-    /// The columns do not form a batch.
     #[error("rows cannot be converted to columns: {0}")]
     Arrow(#[from] ArrowError),
 }
@@ -200,17 +200,6 @@ pub fn schema<R: Row>() -> SchemaRef {
 /// Rows as columns. Times are cut to whole microseconds; a number that is not finite is missing, where it may be, and every
 /// other keeps its bits.
 pub fn to_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
-    Ok(RecordBatch::try_new(schema::<R>(), sorted_arrays(rows))?)
-}
-
-/// As [`to_batch`], with every column nullable: the schema of tables for users.
-pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
-    let schema = schema::<R>();
-    let fields = schema.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
-    Ok(RecordBatch::try_new(Arc::new(Schema::new(fields.collect::<Vec<_>>())), sorted_arrays(rows))?)
-}
-
-fn sorted_arrays<R: Row>(rows: &[R]) -> Arrays {
     let declared = R::columns("", "");
     let mut arrays: Vec<(usize, ArrayRef)> = declared
         .iter()
@@ -218,9 +207,16 @@ fn sorted_arrays<R: Row>(rows: &[R]) -> Arrays {
         .zip(R::arrays(&rows.iter().collect::<Vec<_>>()))
         .collect();
     arrays.sort_by_key(|(order, _)| *order);
-    arrays.into_iter().map(|(_, array)| array).collect()
+    Ok(RecordBatch::try_new(schema::<R>(), arrays.into_iter().map(|(_, array)| array).collect())?)
 }
 
+/// As [`to_batch`], with every column nullable: the schema of tables for users.
+pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
+    let batch = to_batch(rows)?;
+    let fields = batch.schema_ref().fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    Ok(batch.with_schema(schema)?)
+}
 /// Columns as rows; other columns are ignored.
 pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, RowError> {
     let columns = R::columns("", "");

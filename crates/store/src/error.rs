@@ -9,54 +9,44 @@ use records::row_schema::RowError;
 
 /// Why the store could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "each field is named for what it holds")]
+#[expect(
+    missing_docs,
+    reason = "each variant says by its message what is wrong, and names its fields for what they hold"
+)]
 pub enum Error {
-    /// The folder is not there, or nothing was ever written into it.
     #[error("no store at {}", dir.display())]
     Missing { dir: PathBuf },
-    /// The folder holds something else.
     #[error("{} is not a Freeplay store: it holds `{found}` and no `store.json`", dir.display())]
     Foreign { dir: PathBuf, found: String },
     /// Delta Lake takes a percent sign and two hexadecimal digits in a path for another character.
     #[error("{} cannot hold a store: Delta Lake takes `{found}` in its path for another character", dir.display())]
     Name { dir: PathBuf, found: String },
-    /// The folder was written by another release.
     #[error("{} has format {found}; this release supports format {known}", file.display())]
     Format { file: PathBuf, found: String, known: u32 },
-    /// The format marker of the folder cannot be read.
     #[error("{} is truncated: it holds `{found}`", file.display())]
     Torn { file: PathBuf, found: String },
-    /// Another process writes.
     #[error("the store is {holder}")]
     Held { holder: String },
-    /// The system refused to read or write.
     #[error("{} cannot be {verb}: {source}", path.display())]
     Io { path: PathBuf, verb: &'static str, source: std::io::Error },
-    /// The Delta table could not be read or committed to.
     #[error("table `{table}` cannot be {verb}: {}", first_line(source))]
     Table { table: &'static str, verb: &'static str, source: Box<DeltaTableError> },
     /// A Delta table of another program cannot be read.
     #[error("{}", first_line(source))]
     LogTable { source: Box<DeltaTableError> },
-    /// A data file is not the one that was committed.
     #[error("a data file is corrupt: its digest is {}…, but {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
     /// A file of the Delta log is not the one that was written.
     #[error("the log of a table is damaged: {problem}")]
     LogDamaged { path: PathBuf, problem: String },
-    /// The bucket does not return or accept a file.
     #[error(transparent)]
     Object(#[from] object_io::Error),
-    /// A column is missing or has another type, or a value is not valid in its column.
     #[error(transparent)]
     Row(#[from] RowError),
-    /// Rows could not be ordered or grouped.
     #[error("rows cannot be sorted: {0}")]
     Frame(#[from] polars::error::PolarsError),
-    /// Rows could not be brought into columns, or columns into a format.
     #[error("rows cannot be brought into columns: {0}")]
     Arrow(#[from] arrow::error::ArrowError),
-    /// A Parquet file could not be written or read.
     #[error("Parquet: {0}")]
     Parquet(#[from] parquet::errors::ParquetError),
 }

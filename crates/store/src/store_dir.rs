@@ -75,13 +75,7 @@ impl Store {
     }
 }
 
-/// A percent sign and two hexadecimal digits, which delta-rs decodes twice.
-fn percent_code(path: &str) -> Option<&str> {
-    let codes = path.match_indices('%').filter_map(|(at, _)| path.get(at..at + 3));
-    codes.into_iter().find(|code| code.bytes().skip(1).all(|digit| digit.is_ascii_hexdigit()))
-}
-
-/// Rejects names that delta-rs cannot handle.
+/// Rejects names that delta-rs cannot handle: it decodes a percent sign and two hexadecimal digits twice.
 fn check_name(dir: &Path) -> Result<&Path, Error> {
     let path = if object_io::is_address(dir) {
         // Before any message prints the address: it may contain credentials.
@@ -90,7 +84,9 @@ fn check_name(dir: &Path) -> Result<&Path, Error> {
     } else {
         std::path::absolute(dir).map_err(Error::io(dir, "opened"))?
     };
-    match percent_code(&path.to_string_lossy()) {
+    let path = path.to_string_lossy();
+    let mut codes = path.match_indices('%').filter_map(|(at, _)| path.get(at..at + 3));
+    match codes.find(|code| code.bytes().skip(1).all(|digit| digit.is_ascii_hexdigit())) {
         Some(found) => Err(Error::Name { found: found.to_owned(), dir: dir.to_owned() }),
         None => Ok(dir),
     }

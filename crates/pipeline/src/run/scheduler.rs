@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use jiff::Timestamp;
+use job::Config;
 use job::flight_log::{Actuator, FlightLog, catch_panic, config_digest};
-use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
-use records::{Diagnostic, GapRecord, Installations, PartNumber};
+use records::{Diagnostic, GapRecord, Installations, PartNumber, Provenance};
 use store::{LogOutcome, LogRecord, LogResult, Store};
 
 use crate::assess::trends;
@@ -358,17 +358,18 @@ impl WorkerContext<'_> {
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
     fn records(&self, opened: &FlightLog<'_>) -> (Vec<GapRecord>, Vec<Diagnostic>) {
-        let stamp = ProvenanceStamp {
+        let of_run = Provenance {
             run_id: self.inputs.run_id.clone(),
             program_version: self.inputs.program_version.clone(),
             processed_utc: Timestamp::now(),
+            ..Provenance::default()
         };
         let actuators: Vec<_> = opened.actuators().collect();
         let bytes = MemoryBudget::actuator_bytes(opened.log.rows());
         let process_log = |at: &&Actuator| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();
-            opened.record(at, &stamp)
+            opened.record(at, &of_run)
         };
         let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
         for done in actuators.par_iter().with_max_len(1).map(process_log).collect::<Vec<_>>() {

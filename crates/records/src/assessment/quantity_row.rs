@@ -33,29 +33,27 @@ impl Quantity {
 
     /// Name for readers.
     pub fn label(self) -> &'static str {
-        match self {
-            Self::GapM => "gap",
-            Self::LostMotionM => "lost motion",
-            Self::StiffnessNPerM => "stiffness",
-            Self::FrictionN => "friction",
-            Self::FrictionDryN => "dry friction",
-            Self::FrictionLoadShare => "load-dependent friction",
-            Self::SkewS => "channel delay",
-            Self::LoadZeroN => "load zero",
-            Self::LoadDelayS => "load delay",
-            Self::Nis => "mean NIS",
-        }
+        self.displayed().0
     }
 
     /// Unit in which readers see it, and the factor to that unit.
     pub fn display_unit(self) -> (&'static str, f64) {
+        let (_, unit, factor) = self.displayed();
+        (unit, factor)
+    }
+
+    fn displayed(self) -> (&'static str, &'static str, f64) {
         match self {
-            Self::GapM | Self::LostMotionM => ("µm", 1e6),
-            Self::StiffnessNPerM => ("N/µm", 1e-6),
-            Self::FrictionN | Self::FrictionDryN | Self::LoadZeroN => ("N", 1.0),
-            Self::FrictionLoadShare => ("%", 100.0),
-            Self::SkewS | Self::LoadDelayS => ("ms", 1e3),
-            Self::Nis => ("", 1.0),
+            Self::GapM => ("gap", "µm", 1e6),
+            Self::LostMotionM => ("lost motion", "µm", 1e6),
+            Self::StiffnessNPerM => ("stiffness", "N/µm", 1e-6),
+            Self::FrictionN => ("friction", "N", 1.0),
+            Self::FrictionDryN => ("dry friction", "N", 1.0),
+            Self::FrictionLoadShare => ("load-dependent friction", "%", 100.0),
+            Self::SkewS => ("channel delay", "ms", 1e3),
+            Self::LoadZeroN => ("load zero", "N", 1.0),
+            Self::LoadDelayS => ("load delay", "ms", 1e3),
+            Self::Nis => ("mean NIS", "", 1.0),
         }
     }
 }

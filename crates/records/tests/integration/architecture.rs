@@ -4,7 +4,6 @@
 //! covered without a compiler; modules of tests are not checked.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -121,8 +120,9 @@ impl Modules {
         let src = root().join("crates").join(name).join("src");
         let mut modules: BTreeMap<ModulePath, Vec<Import>> = BTreeMap::new();
         for file in sources(&src) {
+            let relative = file.strip_prefix(&src).unwrap().with_extension("");
             let mut path: ModulePath =
-                file.strip_prefix(&src).unwrap().with_extension("").iter().map(utf8).collect();
+                relative.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
             // `lib.rs` and `main.rs` are both the crate root.
             path.pop_if(|name| ["lib", "main", "mod"].contains(&name.as_str()));
             modules.entry(path).or_default().extend(imports(&std::fs::read_to_string(&file).unwrap()));
@@ -169,10 +169,6 @@ impl Modules {
             None => Some(module),
         }
     }
-}
-
-fn utf8(part: &OsStr) -> String {
-    part.to_str().unwrap().to_owned()
 }
 
 /// The paths of `use` declarations, and those that begin with `crate` or `super` elsewhere, in code as rustfmt writes

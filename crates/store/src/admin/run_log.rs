@@ -29,7 +29,15 @@ impl Store {
             logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
         let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
         for record in &records {
-            let log = logs.entry(record.provenance.log_path.clone()).or_insert_with(|| log_of_record(record));
+            let provenance = &record.provenance;
+            // Of a log without an account, only records are stored.
+            let log = logs.entry(provenance.log_path.clone()).or_insert_with(|| LogRecord {
+                log_path: provenance.log_path.clone(),
+                outcome: LogOutcome::NotReached,
+                run_id: provenance.run_id.clone(),
+                processed_utc: provenance.processed_utc,
+                ..LogRecord::default()
+            });
             if matches!(log.outcome, LogOutcome::NotReached | LogOutcome::Unaccounted) {
                 count(log, record);
             }
@@ -104,17 +112,6 @@ impl Writer {
             writer::account(&self.store().runs, slice::from_ref(run))?;
         }
         Ok(killed)
-    }
-}
-
-/// A log of which only records are stored.
-fn log_of_record(record: &GapRecord) -> LogRecord {
-    LogRecord {
-        log_path: record.provenance.log_path.clone(),
-        outcome: LogOutcome::NotReached,
-        run_id: record.provenance.run_id.clone(),
-        processed_utc: record.provenance.processed_utc,
-        ..LogRecord::default()
     }
 }
 

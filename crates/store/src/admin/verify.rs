@@ -2,7 +2,7 @@
 //! records.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use arrow::compute::concat_batches;
@@ -118,7 +118,14 @@ fn duplicate(key: &RecordKey) -> Diagnostic {
 fn wrong_in(table: &Table) -> Vec<Diagnostic> {
     let mut findings = match table.damaged_log_files() {
         Ok((damaged, foreign)) => {
-            let foreign = foreign.iter().map(|file| foreign_commit(table, file));
+            let foreign = foreign.iter().map(|file| {
+                let what = "a commit was written by another program and carries no digest";
+                let hint = "compare the records with the logs; if the commit was meant, `freeplay store verify \
+                            --accept-foreign` accepts it";
+                Diagnostic::new("store_file_foreign", what)
+                    .in_file(table.location.display_path(file).display())
+                    .hint(hint)
+            });
             damaged.iter().map(Error::diagnostic).chain(foreign).collect()
         }
         Err(error) => vec![error.diagnostic()],
@@ -132,14 +139,6 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
         Err(error) => findings.push(error.diagnostic()),
     }
     findings
-}
-
-fn foreign_commit(table: &Table, file: &Path) -> Diagnostic {
-    Diagnostic::new("store_file_foreign", "a commit was written by another program and carries no digest")
-        .in_file(table.location.display_path(file).display())
-        .hint(
-            "compare the records with the logs; if the commit was meant, `freeplay store verify --accept-foreign` accepts it",
-        )
 }
 
 /// The first fault of a data file.
@@ -169,19 +168,13 @@ fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
             "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
         ));
     }
-    match missed_by_statistics(table, file)
-        .map_err(|e| e.diagnostic().in_file(table.location.display_path(&file.path).display()))?
-    {
-        None => Ok(()),
-        Some(column) => {
-            let what = format!("the statistics of a data file do not cover its content: {column}");
-            Err(wrong("store_damaged", &what, "restore the log of the table from a backup of the store"))
-        }
-    }
-}
-
-/// The column by which a reader would skip a file that holds matching rows.
-fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>, Error> {
-    let content = concat_batches(&table.schema, &scan::read_file(&file.path, &table.schema, &[])?)?;
-    Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
+    let content = scan::read_file(&file.path, &table.schema, &[])
+        .and_then(|batches| Ok(concat_batches(&table.schema, &batches)?))
+        .map_err(|e| e.diagnostic().in_file(table.location.display_path(&file.path).display()))?;
+    // By this column, a reader would skip a file that holds matching rows.
+    let Some(column) = file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))) else {
+        return Ok(());
+    };
+    let what = format!("the statistics of a data file do not cover its content: {column}");
+    Err(wrong("store_damaged", &what, "restore the log of the table from a backup of the store"))
 }

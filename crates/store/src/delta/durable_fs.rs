@@ -85,30 +85,20 @@ pub(crate) fn entries(dir: &FsPath) -> io::Result<Vec<Entry>> {
 fn stage<'a>(path: &'a FsPath, parts: &[&[u8]]) -> io::Result<(&'a FsPath, PathBuf)> {
     let dir = path.parent().unwrap_or(FsPath::new("."));
     create_folder(dir)?;
-    let staged = staged(path);
-    match write_synced(&staged, parts) {
-        Ok(()) => Ok((dir, staged)),
-        Err(error) => {
-            // Best effort: the error that is reported is the one that happened first.
-            let _ = std::fs::remove_file(&staged);
-            Err(error)
-        }
+    // The local object store does not list a name with a number after a hash sign.
+    let mut staged = path.as_os_str().to_owned();
+    staged.push(format!("#{}", std::process::id()));
+    let staged = PathBuf::from(staged);
+    let written = object_io::create_fresh(&staged).and_then(|mut file| {
+        parts.iter().try_for_each(|part| file.write_all(part))?;
+        file.sync_all()
+    });
+    if let Err(error) = written {
+        // Best effort: the error that is reported is the one that happened first.
+        let _ = std::fs::remove_file(&staged);
+        return Err(error);
     }
-}
-
-fn write_synced(staged: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
-    let mut file = object_io::create_fresh(staged)?;
-    for part in parts {
-        file.write_all(part)?;
-    }
-    file.sync_all()
-}
-
-/// Temporary name that the local object store does not list: a number after a hash sign.
-fn staged(path: &FsPath) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(format!("#{}", std::process::id()));
-    PathBuf::from(name)
+    Ok((dir, staged))
 }
 
 #[cfg(test)]

@@ -103,11 +103,6 @@ impl Location {
         ))
     }
 
-    /// Creates the folder, or the folder of the copies.
-    pub(crate) fn make(&self) -> Result<(), Error> {
-        durable_fs::create_folder(&self.dir).map_err(Error::io(&self.dir, "created"))
-    }
-
     /// Makes the names of new files durable; in a bucket, they are once the write returns.
     pub(crate) fn sync(&self) -> Result<(), Error> {
         if self.is_bucket() {

@@ -57,12 +57,9 @@ impl DataFile {
     }
 }
 
-/// A snapshot with the listing of its log.
-type Kept = (Snapshot, Vec<Entry>);
-
-/// The snapshot that is kept, shared by all who hold the table.
+/// The snapshot that is kept, with the listing of its log, shared by all who hold the table.
 #[derive(Clone, Default)]
-pub(crate) struct SnapshotCache(Arc<Mutex<Option<Kept>>>);
+pub(crate) struct SnapshotCache(Arc<Mutex<Option<(Snapshot, Vec<Entry>)>>>);
 
 /// The file of a commit below its table's folder.
 pub(crate) fn commit_file(version: u64) -> String {
@@ -75,10 +72,6 @@ impl SnapshotCache {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let (snapshot, log) = kept.as_ref()?;
         table.join(LOG).entries().is_ok_and(|found| found == *log).then(|| snapshot.clone())
-    }
-
-    pub(crate) fn clear(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// Replaces the cached snapshot, unless another commit is newer. In a bucket a listing costs

@@ -17,7 +17,7 @@ use futures::TryStreamExt;
 use jiff::Timestamp;
 
 use crate::delta::data_file;
-use crate::delta::durable_fs::Entry;
+use crate::delta::durable_fs::{self, Entry};
 use crate::delta::file_stats::Stats;
 use crate::delta::location::Location;
 use crate::delta::log_digests::{self, LogDigests};
@@ -78,7 +78,8 @@ impl Table {
     /// Its first commit brings a file without rows: an engine that is handed the list of files, as DuckDB
     /// is, fails on an empty one.
     pub(crate) fn create(&self) -> Result<(), Error> {
-        self.location.make()?;
+        let dir = self.location.dir();
+        durable_fs::create_folder(dir).map_err(Error::io(dir, "created"))?;
         let empty = Action::Add(self.empty(0)?);
         let made = self.location.block_on(async {
             let columns: StructType =
@@ -136,18 +137,15 @@ impl Table {
         let load = async {
             let mut delta = DeltaTable::new(self.location.log_store()?);
             delta.load().await?;
-            self.keep(delta)
+            Ok(delta)
         };
         let loaded = self.location.block_on(load);
         if let (Err(_), Some(cause)) = (&loaded, self.location.unreadable(LOG)) {
             return Err(cause);
         }
         // A damaged file is named before the library's own error about it.
-        if let Err(damaged) = self.check_log() {
-            self.latest.clear();
-            return Err(damaged);
-        }
-        loaded.map_err(self.failed("read"))
+        self.check_log()?;
+        loaded.and_then(|delta| self.keep(delta)).map_err(self.failed("read"))
     }
 
     /// Checks the log files that the current version is read from. In a bucket they would be fetched twice: there
@@ -254,9 +252,11 @@ impl Table {
         let commits = self.commit_times()?;
         let is_due = |since| kept.is_zero() || is_older(since, &commits, kept);
         let mut deleted = 0;
-        for Entry { path, written, .. } in self.location.entries()?.into_iter().filter(|e| is_data(&e.path)) {
+        for Entry { path, written, .. } in self.location.entries()? {
             let since = superseded.get(&path).copied().unwrap_or(written);
-            if !active.contains(path.as_path()) && is_due(since) {
+            // Data files, and those half written.
+            let is_data = path.to_str().is_some_and(|path| path.contains(".parquet"));
+            if is_data && !active.contains(path.as_path()) && is_due(since) {
                 self.location.delete(&path)?;
                 deleted += 1;
             }
@@ -306,11 +306,6 @@ fn is_older(since: SystemTime, commits: &[SystemTime], kept: Duration) -> bool {
         pair[1].duration_since(pair[0].max(since)).unwrap_or_default().min(LONGEST_INTERVAL)
     };
     instants.windows(2).map(counted).sum::<Duration>() >= kept + LONGEST_INTERVAL
-}
-
-/// Whether a file is a data file, or one half written.
-fn is_data(path: &Path) -> bool {
-    path.to_str().is_some_and(|path| path.contains(".parquet"))
 }
 
 /// Whether a fresh plan may succeed where this one failed.
