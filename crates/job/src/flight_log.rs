@@ -157,7 +157,6 @@ impl<'c> FlightLog<'c> {
     }
 }
 
-/// What is read of some actuators.
 fn used(all: &[Actuator]) -> Vec<(&Channels, &ActuatorColumns)> {
     all.iter().map(|at| (&at.mapping.channels, &at.columns)).collect()
 }

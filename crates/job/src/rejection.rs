@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use estimator::contact::Rejection;
 
-/// Rejections before the estimator, with their remedies.
 const BEFORE_ESTIMATOR: [(&str, &str); 3] = [
     ("nothing_selected", "check column and values of each `[[channel.when]]`: no sample meets all of them"),
     ("channel_zero", "check wiring and mapping: a channel that is zero throughout is not connected"),

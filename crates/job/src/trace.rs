@@ -8,7 +8,6 @@ use records::Diagnostic;
 use crate::config::part::Part;
 use crate::estimate;
 
-/// Columns of numbers, in their order.
 const COLUMNS: [&str; 11] = [
     "time_s",
     "motor_m",
@@ -64,7 +63,6 @@ impl Trace {
     }
 }
 
-/// The columns of an actuator, in the order of [`COLUMNS`].
 fn numbers(channels: &ActuatorChannels, part: &Part) -> Result<[Vec<f64>; COLUMNS.len()], Diagnostic> {
     let (samples, count) = (estimate::samples(channels), channels.dx_m.len());
     let mut steps: [Vec<f64>; 5] = std::array::from_fn(|_| vec![f64::NAN; count]);

@@ -11,7 +11,6 @@ const MAX_GAP: u64 = (1 << 20) / BLOCK;
 /// Blocks of one request at most: a failed request is repeated, and several run in parallel.
 const MAX_REQUEST: u64 = (8 << 20) / BLOCK;
 
-/// Numbers of the blocks that were fetched.
 #[derive(Debug, Default)]
 pub(crate) struct FetchedBlocks(BTreeSet<u64>);
 
@@ -32,7 +31,6 @@ impl FetchedBlocks {
         requests.into_iter().map(|blocks| blocks.start * BLOCK..size.min(blocks.end * BLOCK)).collect()
     }
 
-    /// Marks the blocks of a request as fetched.
     pub(crate) fn add(&mut self, request: &Range<u64>) {
         self.0.extend(request.start / BLOCK..request.end.div_ceil(BLOCK));
     }

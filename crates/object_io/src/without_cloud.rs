@@ -6,7 +6,6 @@ use crate::address::{Address, Client};
 use crate::error::Error;
 use crate::http_post::Posted;
 
-/// Always [`Error::NotBuilt`].
 pub(crate) fn client(address: &Address) -> Result<Client, Error> {
     Err(Error::NotBuilt { address: address.to_string() })
 }

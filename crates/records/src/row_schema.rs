@@ -226,7 +226,6 @@ pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, Row
         .collect()
 }
 
-/// The array of a column, if it has the column's type.
 fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<&'a ArrayRef, RowError> {
     let problem = |problem: String| RowError::Column { column: column.name, problem };
     let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
@@ -255,7 +254,6 @@ impl<'a> CellReader<'a> {
         Some(self.arrays[self.next - 1]).filter(|array| array.is_valid(self.row))
     }
 
-    /// An error in the cell taken last.
     fn problem(&self, problem: impl Into<String>) -> RowError {
         RowError::Value { column: self.columns[self.next - 1].name, row: self.row, problem: problem.into() }
     }
@@ -268,7 +266,6 @@ impl<'a> CellReader<'a> {
         Some(self.take()?.as_string::<i32>().value(self.row))
     }
 
-    /// Reads a text that is parsed: an identifier, a status.
     pub(crate) fn parse<T, E: ToString>(
         &mut self,
         parse: impl FnOnce(&'a str) -> Result<T, E>,
@@ -276,7 +273,6 @@ impl<'a> CellReader<'a> {
         parse(self.required(Self::text)?).map_err(|problem| self.problem(problem.to_string()))
     }
 
-    /// The elements of a list; `None` for an empty cell.
     fn list(&mut self) -> Option<ArrayRef> {
         Some(self.take()?.as_list::<i32>().value(self.row))
     }

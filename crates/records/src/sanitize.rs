@@ -6,7 +6,6 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// The longest text of one field of a diagnostic, in characters.
 pub(crate) const MAX_FIELD_CHARS: usize = 2000;
 
 /// Whether a character has an effect without being seen: controls, direction marks and overrides, zero widths, fillers,

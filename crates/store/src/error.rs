@@ -136,7 +136,6 @@ impl Error {
     }
 }
 
-/// What to do when the system refuses.
 fn io_remedy(error: &std::io::Error) -> &'static str {
     match error.kind() {
         ErrorKind::NotFound => {
@@ -173,7 +172,6 @@ fn first_line(error: &DeltaTableError) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
-/// Leading characters of a digest, enough to distinguish it from others.
 fn short(digest: &str) -> &str {
     digest.get(..12).unwrap_or(digest)
 }

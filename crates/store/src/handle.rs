@@ -17,7 +17,6 @@ use crate::error::Error;
 
 const LOCK: &str = "lock";
 
-/// Join of bookkeeping to records.
 pub(crate) type Join = Arc<dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError> + Send + Sync>;
 
 /// Result store, open for reading.
@@ -66,7 +65,6 @@ impl Store {
         &self.display_path
     }
 
-    /// Path of the lock file; `None` in a bucket.
     pub(crate) fn lock_file(&self) -> Option<PathBuf> {
         (!self.location.is_bucket()).then(|| self.location.dir().join(LOCK))
     }

@@ -18,7 +18,6 @@ pub(crate) const FORMAT: u32 = 3;
 const FIRST_FORMAT: u32 = 1;
 pub(crate) const MARKER: &str = "store.json";
 
-/// Content of `store.json`.
 #[derive(Serialize, Deserialize)]
 struct FormatMarker {
     freeplay_store: u32,
@@ -113,7 +112,6 @@ pub(crate) fn write_marker(location: &Location) -> Result<(), Error> {
     location.replace(MARKER, marker.as_bytes())
 }
 
-/// Whether the folder exists; a file of that name is an error.
 fn is_there(dir: &Path) -> Result<bool, Error> {
     match std::fs::read_dir(dir) {
         Ok(_) => Ok(true),
@@ -122,7 +120,6 @@ fn is_there(dir: &Path) -> Result<bool, Error> {
     }
 }
 
-/// Creates the folder if it does not exist, and syncs its parent.
 fn make_folder(dir: &Path) -> Result<(), Error> {
     if is_there(dir)? {
         return Ok(());

@@ -84,7 +84,6 @@ impl AlertChannel {
         Duration::from_secs_f64(self.timeout_s.clamp(1e-3, MAX_TIMEOUT_S))
     }
 
-    /// Reports each key of the channel whose value makes no sense.
     pub(super) fn check(&self, name: &str, faults: &mut Faults<'_>) {
         let mut report = |key: &[&str], what: String, hint: &str| {
             faults.report(key, Diagnostic::new("alert_channel", what).hint(hint));

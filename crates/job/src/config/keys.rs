@@ -19,7 +19,6 @@ pub(super) fn check(source: &Source<'_>, schema: &Value) -> Result<Vec<Diagnosti
     if walk.unknown.is_empty() { Ok(walk.implausible) } else { Err(walk.unknown) }
 }
 
-/// A walk through all tables of a source.
 struct Walk<'s> {
     source: &'s Source<'s>,
     /// The whole schema; a type that contains its own kind is given by reference.
@@ -66,7 +65,6 @@ impl<'s> Walk<'s> {
     }
 }
 
-/// Visits a value, or each value of a list.
 fn each<'t, 'i>(value: &'t DeValue<'i>, visit: &mut impl FnMut(&'t DeValue<'i>)) {
     match value {
         DeValue::Array(values) => values.iter().for_each(|v| each(v.get_ref(), visit)),

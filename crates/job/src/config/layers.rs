@@ -93,7 +93,6 @@ impl<'t> Source<'t> {
 pub(crate) struct Faults<'s> {
     source: &'s Source<'s>,
     table: Vec<String>,
-    /// What was found so far.
     pub(super) found: Vec<Diagnostic>,
 }
 
@@ -125,7 +124,6 @@ impl<'s> Faults<'s> {
     }
 }
 
-/// Whether a text fits a pattern of `*` and `?`.
 pub(super) fn fits(pattern: &str, text: &str) -> bool {
     glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(text))
 }

@@ -75,7 +75,6 @@ const REFUSED_ELSEWHERE: [&str; 7] = [
     "scale",
 ];
 
-/// What is wrong with the value of a key.
 pub(super) fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
     let range = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
     let is_signed = range.is_some_and(|(_, least, _)| *least == 0.0) || REFUSED_ELSEWHERE.contains(&key);

@@ -98,7 +98,6 @@ impl Overrides {
         self.overrides.iter().enumerate().filter_map(applies).collect()
     }
 
-    /// Whether anything is otherwise for a part.
     pub(super) fn applies_to_part(&self, part: &PartNumber) -> bool {
         self.overrides.iter().any(|one| one.names_part(part))
     }

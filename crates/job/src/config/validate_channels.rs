@@ -66,7 +66,6 @@ fn named(channels: &Channels) -> impl Iterator<Item = (&'static str, &ChannelMap
     .filter_map(|(name, channel, wanted)| Some((name, channel?, wanted)))
 }
 
-/// Reports every fault of a channel, or of one of its alternatives.
 fn check_choice(
     name: &str,
     channel: &ChannelMapping,
@@ -139,7 +138,6 @@ fn status_bits(channel: &ChannelMapping) -> Option<Diagnostic> {
     Some(Diagnostic::new("bad_parameter", what).hint(hint))
 }
 
-/// Reports the faults of a condition.
 fn check_condition(condition: &SampleFilter, document: &Document, faults: &mut Faults<'_>) {
     let column = &condition.column;
     let mut report = |fault: Diagnostic| faults.report(&["when"], fault);

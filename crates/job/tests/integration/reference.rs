@@ -73,7 +73,6 @@ fn section(page: &mut String, path: &str, said: &str, schema: &Value, tables: &m
     }
 }
 
-/// The plausible range of a number.
 fn range(key: &str) -> String {
     let listed = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
     listed.map_or_else(String::new, |(_, least, most)| format!(" Range {least:e}…{most:e}."))
@@ -100,7 +99,6 @@ fn choices<'v>(value: &'v Value, list: &str) -> impl Iterator<Item = &'v Value> 
     listed.into_iter().flatten().chain(listed.is_none().then_some(value))
 }
 
-/// The type in words.
 fn kind(value: &Value) -> String {
     let one = |v: &Value| -> Option<String> {
         if let Some(words) = words(v) {
@@ -126,7 +124,6 @@ fn kind(value: &Value) -> String {
     if kinds.is_empty() { "table".to_owned() } else { kinds.join(" or ") }
 }
 
-/// The allowed words.
 fn words(value: &Value) -> Option<String> {
     let listed = |value: &Value| -> Vec<String> {
         let many = value.get("enum").and_then(Value::as_array).into_iter().flatten();
@@ -137,7 +134,6 @@ fn words(value: &Value) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
-/// The doc comment as one line of a table.
 fn text(value: &Value) -> String {
     let text = value.get("description").and_then(Value::as_str).unwrap_or_default();
     text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")

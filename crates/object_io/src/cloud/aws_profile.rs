@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use configparser::ini::Ini;
 use object_store::aws::AmazonS3ConfigKey as Key;
 
-/// Supported profile keys.
 const SUPPORTED: [(&str, Key); 5] = [
     ("aws_access_key_id", Key::AccessKeyId),
     ("aws_secret_access_key", Key::SecretAccessKey),
@@ -16,7 +15,6 @@ const SUPPORTED: [(&str, Key); 5] = [
     ("region", Key::Region),
     ("endpoint_url", Key::Endpoint),
 ];
-/// Profile keys of unsupported credential sources.
 const UNSUPPORTED: [&str; 5] =
     ["role_arn", "sso_session", "sso_start_url", "credential_process", "source_profile"];
 

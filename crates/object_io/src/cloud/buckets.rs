@@ -13,7 +13,6 @@ use crate::cloud::retry::RetryingStore;
 use crate::error::Error;
 use crate::settings::settings;
 
-/// A client of the address's bucket that retries.
 pub(crate) fn client(address: &Address) -> Result<Client, Error> {
     let detail = |detail: String| Error::Settings { place: address.bucket_url(), detail };
     let built = match address.scheme {

@@ -24,14 +24,12 @@ use object_store::{
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 const MAX_DELAY: Duration = Duration::from_secs(15);
 
-/// Object store whose requests are retried for at most `give_up`.
 #[derive(Debug, Clone)]
 pub(crate) struct RetryingStore {
     inner: Arc<dyn ObjectStore>,
     give_up: Duration,
 }
 
-/// Retry deadline and exponential backoff of one request.
 struct Backoff {
     begun: Instant,
     delay: Duration,
@@ -85,7 +83,6 @@ impl RetryingStore {
         }
     }
 
-    /// One response with its complete body, length checked.
     async fn complete_body(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         let is_head = options.head;
         let answer = self.inner.get_opts(location, options).await?;
@@ -103,7 +100,6 @@ impl RetryingStore {
         Ok(GetResult { payload, meta, range, attributes })
     }
 
-    /// Whether an object has exactly this content.
     async fn content_equals(&self, location: &Path, payload: &PutPayload) -> Result<bool> {
         let there = self.get(location).await?.bytes().await?;
         Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))

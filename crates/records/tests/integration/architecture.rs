@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Layer of each crate: a crate may depend on crates of lower layers only.
 const LAYERS: [(&str, u32); 13] = [
     ("records", 0),
     ("object_io", 0),
@@ -112,7 +111,6 @@ type ModulePath = Vec<String>;
 /// Import of a file: the path as it is written, and whether it is re-exported.
 type Import = (bool, Vec<String>);
 
-/// The modules of a crate, with what each imports outside its tests.
 struct Modules(BTreeMap<ModulePath, Vec<Import>>);
 
 impl Modules {
@@ -130,7 +128,6 @@ impl Modules {
         Self(modules)
     }
 
-    /// The modules that each module imports.
     fn graph(&self) -> BTreeMap<ModulePath, BTreeSet<ModulePath>> {
         let imported = |(module, imports): (&ModulePath, &Vec<Import>)| {
             let target = |(is_public, path): &Import| {

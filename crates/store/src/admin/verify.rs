@@ -38,7 +38,6 @@ impl Store {
         findings
     }
 
-    /// Records that are stored twice, and logs whose records are not all stored.
     fn wrong_records(&self) -> Result<Vec<Diagnostic>, Error> {
         let files: Vec<PathBuf> = self.gaps.snapshot()?.paths().collect();
         let schema = GapRecord::schema();
@@ -141,7 +140,6 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
     findings
 }
 
-/// The first fault of a data file.
 fn check_file(table: &Table, file: &DataFile) -> Result<(), Diagnostic> {
     const RESTORE: &str = "restore it from a backup of the store";
     let wrong = |code: &str, what: &str, hint: &str| {

@@ -62,7 +62,6 @@ pub(crate) fn digest_of_name(name: &str) -> Option<&str> {
     hexadecimal.then_some(digest)
 }
 
-/// Compares a file's content with the digest its name carries.
 pub(crate) fn check(path: &Path) -> Result<(), Error> {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some(wanted) = digest_of_name(name) else { return Ok(()) };

@@ -6,7 +6,6 @@ use std::io::{self, Write};
 use std::path::{Path as FsPath, PathBuf};
 use std::time::SystemTime;
 
-/// Makes the entries of a folder durable.
 pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
     if cfg!(unix) { File::open(dir)?.sync_all() } else { Ok(()) }
 }
@@ -29,7 +28,6 @@ pub(crate) fn create(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
     Ok(is_ours)
 }
 
-/// Writes a whole file; replaces a file of the same name.
 pub(crate) fn replace(path: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
     let (dir, staged) = stage(path, parts)?;
     if let Err(error) = std::fs::rename(&staged, path) {

@@ -37,7 +37,6 @@ impl Stats {
         text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
     }
 
-    /// Whether the text column may hold a value from `first` to `last`.
     pub(crate) fn may_hold(&self, column: &str, first: &str, last: &str) -> bool {
         let bound =
             |bounds: &Map<String, Value>| bounds.get(column).and_then(Value::as_str).map(str::to_owned);

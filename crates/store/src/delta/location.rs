@@ -21,7 +21,6 @@ use crate::error::Error;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Location {
-    /// The folder itself, or the folder of the copies.
     dir: PathBuf,
     bucket: Option<BucketLocation>,
     /// Handle of the runtime of Delta's asynchronous library; for a bucket, of the threads that serve its connections.
@@ -48,7 +47,6 @@ impl Location {
         Ok(Self { dir, bucket, handle: object_io::handle()?, _runtime: None })
     }
 
-    /// A folder that exists.
     fn folder(path: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
         let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
@@ -115,7 +113,6 @@ impl Location {
         Ok(self.length(&self.dir.join(name))?.is_some())
     }
 
-    /// Size of a file, bytes; `None` if it is absent.
     pub(crate) fn length(&self, path: &Path) -> Result<Option<u64>, Error> {
         let Some(bucket) = &self.bucket else {
             return match std::fs::metadata(path) {
@@ -138,7 +135,6 @@ impl Location {
         (error.kind() != std::io::ErrorKind::NotFound).then(|| Error::io(path, "read")(error))
     }
 
-    /// A small file's content.
     pub(crate) fn read(&self, name: &str) -> Result<String, Error> {
         let path = self.dir.join(name);
         self.fetch(&path)?;
@@ -166,7 +162,6 @@ impl Location {
         Ok(())
     }
 
-    /// Writes a whole file, in place of one of the same name.
     pub(crate) fn replace(&self, name: &str, content: &[u8]) -> Result<(), Error> {
         self.put(&self.dir.join(name), content, PutMode::Overwrite).map(drop)
     }
@@ -216,7 +211,6 @@ impl Location {
         Ok(found)
     }
 
-    /// The key of a file that goes by this path.
     fn key(&self, bucket: &BucketLocation, path: &Path) -> String {
         let below = path.strip_prefix(&self.dir).unwrap_or(path).to_string_lossy().replace('\\', "/");
         if below.is_empty() { bucket.address.key().to_owned() } else { joined(bucket.address.key(), &below) }

@@ -24,7 +24,6 @@ const ACTIONS: [&str; 10] = [
     "sidecar",
 ];
 
-/// The log files of a table and their digests.
 #[derive(Debug)]
 pub(crate) struct LogDigests {
     files: BTreeMap<String, PathBuf>,
@@ -32,7 +31,6 @@ pub(crate) struct LogDigests {
 }
 
 impl LogDigests {
-    /// Lists both folders.
     pub(crate) fn list(table: &Location) -> Result<Self, Error> {
         let mut files = BTreeMap::new();
         for Entry { path, .. } in table.join(LOG).entries()? {
@@ -47,7 +45,6 @@ impl LogDigests {
         Ok(Self { files, digests })
     }
 
-    /// All log files.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
         self.files.values().map(PathBuf::as_path)
     }
@@ -95,7 +92,6 @@ impl LogDigests {
     }
 }
 
-/// Adds the digest of a log file that another program wrote.
 pub(crate) fn add(table: &Location, file: &Path) -> Result<(), Error> {
     let content = std::fs::read(file).map_err(Error::io(file, "read"))?;
     let digests = table.join(DIGESTS);

@@ -31,7 +31,6 @@ use crate::delta::durable_fs::{self, Entry};
 
 pub(crate) const LOG: &str = "_delta_log";
 pub(crate) const DIGESTS: &str = "_digests";
-/// Digits of the version at the beginning of a log file's name.
 const VERSION_DIGITS: usize = 20;
 /// The name of a commit or checkpoint; `None` for another file of the log.
 pub(crate) fn log_file(path: &FsPath) -> Option<&str> {
@@ -40,7 +39,6 @@ pub(crate) fn log_file(path: &FsPath) -> Option<&str> {
     (is_log && version(name).is_some()).then_some(name)
 }
 
-/// The version that a log file belongs to.
 pub(crate) fn version(name: &str) -> Option<u64> {
     let (digits, rest) = name.split_at_checked(VERSION_DIGITS)?;
     rest.starts_with('.').then(|| digits.parse().ok()).flatten()

@@ -29,7 +29,6 @@ impl Snapshot {
         self.files.iter().map(|file| file.path.clone())
     }
 
-    /// Paths of the data files with rows whose statistics `may_be_in` accepts.
     pub(crate) fn paths_where(&self, may_be_in: impl Fn(&Stats) -> bool) -> Vec<PathBuf> {
         let files = self.files.iter().filter(|file| file.has_rows() && may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()
@@ -50,7 +49,6 @@ impl DataFile {
         self.stats.num_records != Some(0)
     }
 
-    /// Whether the file name contains the digest of the content.
     pub(crate) fn has_digest(&self) -> bool {
         let name = self.path.file_name().and_then(|name| name.to_str());
         name.is_some_and(|name| data_file::digest_of_name(name).is_some())
@@ -61,7 +59,6 @@ impl DataFile {
 #[derive(Clone, Default)]
 pub(crate) struct SnapshotCache(Arc<Mutex<Option<(Snapshot, Vec<Entry>)>>>);
 
-/// The file of a commit below its table's folder.
 pub(crate) fn commit_file(version: u64) -> String {
     format!("{LOG}/{version:020}.json")
 }

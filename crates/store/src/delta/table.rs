@@ -129,7 +129,6 @@ impl Table {
         Ok(Some(Action::Metadata(MetadataExt::with_schema(state.metadata().clone(), &all)?)))
     }
 
-    /// The table as it is now.
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Error> {
         if let Some(newest) = self.latest.get(&self.location) {
             return Ok(newest);
@@ -170,7 +169,6 @@ impl Table {
         Ok((damaged, foreign))
     }
 
-    /// Caches the snapshot of a loaded table.
     fn keep(&self, delta: DeltaTable) -> Result<Snapshot, DeltaTableError> {
         let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
         let snapshot = Snapshot { version: delta.version().unwrap_or_default(), files, delta };
@@ -275,7 +273,6 @@ impl Table {
         Ok(commits.chain([SystemTime::now()]).collect())
     }
 
-    /// When each file that the log still remembers was superseded.
     fn superseded(&self, snapshot: &Snapshot) -> Result<HashMap<PathBuf, SystemTime>, DeltaTableError> {
         let tombstones: Vec<TombstoneView> = self.location.block_on(async {
             let log_store = snapshot.delta.log_store();

@@ -11,7 +11,6 @@ use crate::error::Error;
 /// The column that orders versions of a row; clocks may go back, commit numbers do not.
 pub(crate) const COMMIT: &str = "commit";
 
-/// A row type's columns and the number of the commit.
 pub(crate) fn schema<R: Row + FromCells>() -> SchemaRef {
     let columns = row_schema::schema::<R>();
     let fields =
@@ -19,7 +18,6 @@ pub(crate) fn schema<R: Row + FromCells>() -> SchemaRef {
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
-/// Rows as columns, all of one commit.
 pub(crate) fn to_batch<R: Row + FromCells>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
     let batch = row_schema::to_batch(rows)?;
     let mut arrays = batch.columns().to_vec();

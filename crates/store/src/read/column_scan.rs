@@ -34,13 +34,10 @@ pub struct ColumnScan {
     store: Store,
     files: Vec<PathBuf>,
     version: u64,
-    /// Columns of the result.
     wanted: SchemaRef,
     /// Columns that are read: those of the result, and those that the join and the conditions after it need.
     read: SchemaRef,
-    /// Conditions on stored columns.
     stored: Vec<Condition>,
-    /// Conditions on joined columns.
     joined: Vec<Condition>,
 }
 
@@ -50,7 +47,6 @@ impl Store {
         Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), names)?))
     }
 
-    /// The scan of one version of the table.
     pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query, wanted: &SchemaRef) -> ColumnScan {
         let is_joined = |column: &str| self.join.is_some() && JOINED.contains(&column);
         let (joined, mut stored): (Vec<_>, Vec<_>) =
@@ -104,7 +100,6 @@ impl ColumnScan {
         self.read_file(&self.files[part])
     }
 
-    /// The matching rows of all files, in one batch or more.
     pub(crate) fn read_all(&self) -> Result<Vec<RecordBatch>, Error> {
         // A joined condition applies to each file as soon as it is read, or all rows of the store would be held.
         scan::read_each(&self.files, &self.wanted, |file| self.read_file(file))
@@ -116,7 +111,6 @@ impl ColumnScan {
         rows.iter().map(|batch| Ok(self.finish(&join(batch)?)?)).collect()
     }
 
-    /// The matching rows and the wanted columns of a batch after the join.
     fn finish(&self, batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
         let batch = filter_record_batch(batch, &scan::matches(batch, &self.joined)?)?;
         let columns = self.wanted.fields().iter().map(|field| batch.schema_ref().index_of(field.name()));
@@ -125,7 +119,6 @@ impl ColumnScan {
     }
 }
 
-/// Records that are not withdrawn.
 pub(crate) fn not_withdrawn() -> Condition {
     Condition::texts("status", Status::Estimated.as_str(), Status::Refused.as_str())
 }

@@ -12,7 +12,6 @@ use polars::prelude::{
 
 use crate::error::Error;
 
-/// Column with the number of each row.
 const ROW: &str = "row";
 
 /// The named columns of batches of one schema as a Polars frame; times are microseconds.
@@ -60,7 +59,6 @@ pub(crate) fn sorted(
     Ok(interleave_record_batch(&batches.iter().collect::<Vec<_>>(), &places)?)
 }
 
-/// The distinct texts of a column, and the number of rows of each.
 pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize)>, Error> {
     let groups = frame.group_by([name])?;
     let (values, rows) = (groups.keys(), groups.get_groups().iter().map(|group| group.len()));
@@ -69,7 +67,6 @@ pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize
     Ok(texts.zip(rows).filter_map(|(text, rows)| Some((text?.to_owned(), rows))).collect())
 }
 
-/// Number of distinct combinations of values in the named columns.
 pub(crate) fn distinct(frame: &DataFrame, names: &[&str]) -> Result<usize, Error> {
     Ok(frame.group_by(names.iter().copied())?.get_groups().len())
 }

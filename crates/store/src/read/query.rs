@@ -34,7 +34,6 @@ pub struct Query {
 }
 
 impl Query {
-    /// Conditions that every matching record meets.
     pub(crate) fn conditions(&self) -> Vec<Condition> {
         let texts = [
             ("tail_number", &self.tail_number),

@@ -42,7 +42,6 @@ impl Condition {
         Self { column, bounds: Arc::new(StringArray::from(vec![first, last])) }
     }
 
-    /// Times in µs UTC.
     pub(crate) fn times(column: &'static str, first_us: i64, last_us: i64) -> Self {
         let bounds = TimestampMicrosecondArray::from(vec![first_us, last_us]).with_timezone("UTC");
         Self { column, bounds: Arc::new(bounds) }
@@ -58,7 +57,6 @@ impl Condition {
         times.value(0) <= latest && earliest <= times.value(1)
     }
 
-    /// Mask of the matching values.
     pub(crate) fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
         // Another program may have given the values another form.
         let is_coded = values.data_type() == &dictionary();
@@ -67,7 +65,6 @@ impl Condition {
         and(&gt_eq(&values, &first)?, &lt_eq(&values, &last)?)
     }
 
-    /// The condition as a filter of rows while a file is decoded.
     fn predicate(&self, builder: &Builder) -> Box<dyn ArrowPredicate> {
         let condition = self.clone();
         let mask = mask(builder, [self.column].into_iter());
@@ -78,7 +75,6 @@ impl Condition {
     }
 }
 
-/// Mask of the rows of a batch that meet every condition.
 pub(crate) fn matches(batch: &RecordBatch, conditions: &[Condition]) -> Result<BooleanArray, ArrowError> {
     let all = BooleanArray::from(vec![true; batch.num_rows()]);
     conditions.iter().try_fold(all, |mask, condition| {
@@ -168,13 +164,11 @@ fn opened(path: &Path, schema: &Schema) -> Result<Builder, Error> {
     Ok(ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata))
 }
 
-/// The columns of those names that a file has.
 fn mask<'a>(builder: &Builder, names: impl Iterator<Item = &'a str>) -> ProjectionMask {
     let roots: Vec<usize> = names.filter_map(|name| builder.schema().index_of(name).ok()).collect();
     ProjectionMask::roots(builder.parquet_schema(), roots)
 }
 
-/// A batch's columns in the form wanted; a column that came with a later release is empty.
 fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
     let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
         Some(column) if field.is_nullable() => without_infinities(cast(column, field.data_type())?),

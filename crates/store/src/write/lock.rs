@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// Interval at which a waiting process tries again.
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// Who holds a store: the content of the lock file, which another process shows. Machines may share a folder.
@@ -22,7 +21,6 @@ struct Holder {
 }
 
 impl Holder {
-    /// This process on this machine, from now on.
     fn this_process() -> Self {
         let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
         let name =
@@ -32,14 +30,12 @@ impl Holder {
     }
 }
 
-/// The held lock; letting it go is dropping it.
 #[derive(Debug)]
 pub(crate) struct Lock {
     _file: File,
 }
 
 impl Lock {
-    /// Takes the lock, waiting for as long as is allowed.
     pub(crate) fn take(path: &Path, wait: Option<Duration>) -> Result<Self, Error> {
         // `is_held` takes the lock for an instant: this must not fail another run.
         let deadline = Instant::now() + wait.unwrap_or_default().max(LOOK_AGAIN);
@@ -64,7 +60,6 @@ impl Lock {
         Ok(Self { _file: file })
     }
 
-    /// Whether another process holds the lock.
     pub(crate) fn is_held(path: &Path) -> Result<bool, Error> {
         let file = match File::open(path) {
             Ok(file) => file,

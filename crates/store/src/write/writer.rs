@@ -92,10 +92,8 @@ pub struct Writer {
     _lock: Option<Lock>,
 }
 
-/// What becomes of the stored record of a key.
 #[derive(Clone, Copy)]
 enum Decision<'a> {
-    /// This record takes its place.
     Replaced(&'a GapRecord),
     /// The stored record goes if its log has this digest: its samples are stored under another key now.
     Moved(&'a str),
@@ -254,13 +252,11 @@ impl Writer {
         Ok(Some(filter_record_batch(&all, &is_kept(&all, decisions)?)?))
     }
 
-    /// Some columns of all rows of a file, in one batch.
     fn read_all(&self, file: &DataFile, schema: &SchemaRef) -> Result<RecordBatch, Error> {
         Ok(concat_batches(schema, &self.store.read_file(&file.path, schema, &[])?)?)
     }
 }
 
-/// Number of rows that differ between two batches of the same columns.
 fn differing_rows(before: &RecordBatch, after: &RecordBatch) -> Result<usize, ArrowError> {
     let mut differs = BooleanArray::from(vec![false; before.num_rows()]);
     for (before, after) in before.columns().iter().zip(after.columns()) {
@@ -305,7 +301,6 @@ fn may_hold_any(stats: &Stats, keys: &BTreeSet<RecordKey>) -> bool {
     in_time.any(|key| stats.may_hold("tail_number", &key.tail_number, &key.tail_number))
 }
 
-/// Mask of the rows that no merge decision takes away.
 fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
     let digests = batch.column(batch.schema_ref().index_of("log_digest")?).as_string::<i32>();
     let is_kept = |(row, key): (usize, RecordKey)| match decisions.get(&key) {
@@ -316,7 +311,6 @@ fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<Boolea
     Ok(keys_of(batch)?.into_iter().enumerate().map(|row| Some(is_kept(row))).collect())
 }
 
-/// The keys of a batch, row by row.
 pub(crate) fn keys_of(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
     let keys = batch.project(&key_columns(batch.schema_ref())?)?;
     let departures = keys.column(0).as_primitive::<TimestampMicrosecondType>();
@@ -329,7 +323,6 @@ pub(crate) fn keys_of(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
     Ok((0..departures.len()).map(key).collect())
 }
 
-/// Where the columns of a key are.
 pub(crate) fn key_columns(schema: &Schema) -> Result<Vec<usize>, Error> {
     RecordKey::COLUMNS.iter().map(|name| Ok(schema.index_of(name)?)).collect()
 }

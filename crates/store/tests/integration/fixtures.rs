@@ -33,7 +33,6 @@ pub(crate) fn record(tail: usize, flight: i64, position: &str, gap_m: f64) -> Ga
     made_up::record(names, departure(flight), 1.5, estimate)
 }
 
-/// The account of the log of that flight.
 pub(crate) fn account(tail: usize, flight: i64) -> LogRecord {
     result(tail, flight, 0.0).account
 }
