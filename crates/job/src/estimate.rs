@@ -37,7 +37,7 @@ pub fn estimate(
     let mut estimate = if let Some(reason) = pre_check_rejection(channels) {
         GapEstimate::refused(reason)
     } else {
-        with_workspaces(channels.dx_m.len(), |workspaces| {
+        let by_method = |workspaces: &mut Workspaces| {
             let published =
                 match midrange::estimate_with(&samples(channels), &schedule, &mut workspaces.published) {
                     Ok(found) => Some(found),
@@ -55,7 +55,9 @@ pub fn estimate(
                 }
             };
             Ok(with_published(of_method.map_err(failed)?, published.as_ref()))
-        })?
+        };
+        let is_large = channels.dx_m.len() > MAX_KEPT_SAMPLES;
+        if is_large { by_method(&mut Workspaces::default()) } else { WORKSPACES.with_borrow_mut(by_method) }?
     };
     estimate.temperature_c = channels.temperature_c;
     if let Geometry::Rotary { reference_radius_m } = part.geometry {
@@ -99,14 +101,6 @@ struct Workspaces {
 
 thread_local! {
     static WORKSPACES: RefCell<Workspaces> = RefCell::default();
-}
-
-fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -> T {
-    if samples > MAX_KEPT_SAMPLES {
-        work(&mut Workspaces::default())
-    } else {
-        WORKSPACES.with_borrow_mut(work)
-    }
 }
 
 /// The filter of a part at the step of a log.

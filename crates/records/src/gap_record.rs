@@ -211,15 +211,12 @@ fn column_order(column: &str) -> usize {
     const IDENTITY: [&str; 4] = ["tail_number", "position", "part_number", "serial_number"];
     const LAST_OF_FIRST_RELEASE: &str = "nis";
     let (provenance, estimate) = (Provenance::columns("", ""), GapEstimate::columns("", ""));
-    let place = |name: &str| estimate.iter().position(|c| c.name == name);
-    if let Some(place) = IDENTITY.iter().position(|name| *name == column) {
-        place
-    } else if provenance.iter().any(|c| c.name == column) {
-        IDENTITY.len() + 1
-    } else if place(column) > place(LAST_OF_FIRST_RELEASE) {
-        IDENTITY.len() + 2
-    } else {
-        IDENTITY.len()
+    let mut later = estimate.iter().skip_while(|c| c.name != LAST_OF_FIRST_RELEASE).skip(1);
+    match IDENTITY.iter().position(|name| *name == column) {
+        Some(place) => place,
+        None if provenance.iter().any(|c| c.name == column) => IDENTITY.len() + 1,
+        None if later.any(|c| c.name == column) => IDENTITY.len() + 2,
+        None => IDENTITY.len(),
     }
 }
 

@@ -85,9 +85,8 @@ impl AlertChannel {
     }
 
     pub(super) fn check(&self, name: &str, faults: &mut Faults<'_>) {
-        let mut report = |key: &[&str], what: String, hint: &str| {
-            faults.report(key, Diagnostic::new("alert_channel", what).hint(hint));
-        };
+        let mut report =
+            |key: &[&str], what: String, hint: &str| faults.wrong(key, "alert_channel", what, hint);
         let targets = [self.command.is_some(), self.folder.is_some(), self.url.is_some()];
         if targets.iter().filter(|given| **given).count() != 1 {
             let what = format!("`alerts.{name}` needs one of `command`, `folder` and `url`");

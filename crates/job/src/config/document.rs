@@ -321,12 +321,12 @@ impl Document {
     /// numbers, which are reported in their place among the others.
     pub(super) fn check(&self, implausible: Vec<Diagnostic>, faults: &mut Faults<'_>) {
         if self.logs.files.is_empty() {
-            let fault = Diagnostic::new("no_logs", "`logs.files` has no pattern");
-            faults.report(&["logs", "files"], fault.hint("files = [\"logs/**/*.parquet\"]"));
+            let hint = "files = [\"logs/**/*.parquet\"]";
+            faults.wrong(&["logs", "files"], "no_logs", "`logs.files` has no pattern", hint);
         }
         if matches!(self.store.path.trim(), "" | ".") {
-            let fault = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
-            faults.report(&["store", "path"], fault.hint("path = \"results\""));
+            let what = "`store.path` is not a folder of its own";
+            faults.wrong(&["store", "path"], "empty_name", what, "path = \"results\"");
         }
         faults.within(&["clock"], |faults| check_clock(&self.clock, faults));
         faults.within(&["layout"], |faults| check_layout(&self.layout, faults));
@@ -346,9 +346,9 @@ impl Document {
     fn check_parts(&self, faults: &mut Faults<'_>) {
         for (number, part) in &self.part {
             if part.watch_m.is_some() && part.limit_m.or(self.trend.limit_m).is_none() {
-                let fault = Diagnostic::new("key_missing", "`watch_m` has no effect without a `limit_m`");
+                let what = "`watch_m` has no effect without a `limit_m`";
                 let hint = "add `limit_m = …` to the part, or `[trend] limit_m` for all parts";
-                faults.report(&["part", number, "watch_m"], fault.hint(hint));
+                faults.wrong(&["part", number, "watch_m"], "key_missing", what, hint);
             }
         }
         let numbers = || self.part.keys().map(String::as_str);
@@ -359,7 +359,7 @@ impl Document {
                 let near = near.map(|near| format!("nearest: `{near}`; ")).unwrap_or_default();
                 let what = format!("this override is for part `{name}`, which is not configured");
                 let hint = format!("{near}compare `parts` with the `[part.\"…\"]` tables");
-                faults.report(&["override"], Diagnostic::new("part_unknown", what).hint(hint));
+                faults.wrong(&["override"], "part_unknown", what, hint);
             }
         }
     }
@@ -372,7 +372,7 @@ impl Document {
                 let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
                 let what = format!("`identity.path` is not a valid regular expression: {why}");
                 let hint = "such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'";
-                faults.report(&["path"], Diagnostic::new("bad_pattern", what).hint(hint));
+                faults.wrong(&["path"], "bad_pattern", what, hint);
             }
             Some(Ok(regex)) => {
                 let facts: Vec<&str> = IdentityField::ALL.iter().map(|fact| fact.as_str()).collect();
@@ -390,7 +390,7 @@ impl Document {
         if self.identity.by_row && flight_columns(&self.identity).is_empty() {
             let what = "`identity.by_row` needs the columns in which rows name their flight";
             let hint = "such as columns = { tail_number = \"tail\", flight_id = \"flight\" }";
-            faults.report(&["by_row"], Diagnostic::new("key_missing", what).hint(hint));
+            faults.wrong(&["by_row"], "key_missing", what, hint);
         }
         if let Some(name) = self.identity.time_zone.as_deref().filter(|name| zone(name).is_err()) {
             faults.report(&["time_zone"], no_zone(name));
@@ -401,8 +401,8 @@ impl Document {
         for (name, group) in &self.group {
             faults.within(&["group", name], |faults| {
                 if group.files.is_empty() {
-                    let fault = Diagnostic::new("no_logs", format!("`group.{name}.files` names no file"));
-                    faults.report(&[], fault.hint("files = [\"loads/**/*.parquet\"]"));
+                    let what = format!("`group.{name}.files` names no file");
+                    faults.wrong(&[], "no_logs", what, "files = [\"loads/**/*.parquet\"]");
                 }
                 check_layout(&group.layout, faults);
                 if let Some(clock) = &group.clock {
@@ -423,21 +423,20 @@ fn no_zone(name: &str) -> Diagnostic {
 
 fn check_layout(layout: &Layout, faults: &mut Faults<'_>) {
     if layout.name_column.is_some() != layout.value_column.is_some() {
-        let fault = Diagnostic::new("key_missing", "`name_column` and `value_column` go together");
-        faults.report(&[], fault.hint("name_column = \"parameter\"\nvalue_column = \"value\""));
+        let hint = "name_column = \"parameter\"\nvalue_column = \"value\"";
+        faults.wrong(&[], "key_missing", "`name_column` and `value_column` go together", hint);
     }
 }
 
 /// Reports each key of a clock whose value makes no sense.
 pub(super) fn check_clock(clock: &ClockMapping, faults: &mut Faults<'_>) {
     if clock.column.as_deref() == Some("") {
-        let fault = Diagnostic::new("empty_name", "`clock.column` names no column");
         let hint = "name it, or delete the key and give `rate_hz`, the rate of evenly spaced rows";
-        faults.report(&["column"], fault.hint(hint));
+        faults.wrong(&["column"], "empty_name", "`clock.column` names no column", hint);
     }
     if clock.column.is_none() && clock.rate_hz.is_none() {
-        let fault = Diagnostic::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given");
-        faults.report(&[], fault.hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\""));
+        let what = "neither `clock.column` nor `clock.rate_hz` is given";
+        faults.wrong(&[], "no_clock", what, "[clock]\ncolumn = \"time_s\"\nunit = \"s\"");
     }
     if clock.unit == Some(TimeUnit::Count) && clock.rate_hz.is_none() {
         let what = "a clock in `count` needs `rate_hz`: how fast does it count?";

@@ -1,6 +1,7 @@
 //! The text of a configuration, in one file or several that override each other, the location of its keys, and the faults
 //! of their values, each with its line.
 
+use std::fmt::Display;
 use std::ops::Range;
 
 use records::Diagnostic;
@@ -114,6 +115,11 @@ impl<'s> Faults<'s> {
     pub(super) fn report(&mut self, key: &[&str], fault: Diagnostic) {
         let path: Vec<&str> = self.table.iter().map(String::as_str).chain(key.iter().copied()).collect();
         self.found.push(self.source.at(&path, fault));
+    }
+
+    /// Reports a fault by its code, what is wrong, and how to correct it.
+    pub(super) fn wrong(&mut self, key: &[&str], code: &str, what: impl Display, hint: impl Display) {
+        self.report(key, Diagnostic::new(code, what).hint(hint));
     }
 
     /// A pattern of `*` and `?`; a text that is none is reported.

@@ -83,27 +83,25 @@ impl Config {
     /// the first key of a wrong type, else every value that makes no sense.
     pub fn read_settings(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
+            const OTHER: &str =
+                "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
+            const AS_UTF_8: &str = "save the file as UTF-8";
             let file_name = file.display().to_string();
-            let text = std::fs::read_to_string(file).map_err(|e| {
-                const OTHER: &str =
-                    "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
-                let text = e.to_string();
-                let (why, hint) = match e.kind() {
-                    ErrorKind::NotFound => ("no such file", OTHER),
-                    ErrorKind::IsADirectory => ("this is a folder, not a file", OTHER),
-                    ErrorKind::InvalidData => ("it is no UTF-8 text", "save the file as UTF-8"),
-                    ErrorKind::PermissionDenied => {
-                        ("permission denied", "run as a user with read access, or change the file mode")
-                    }
-                    _ => (text.as_str(), OTHER),
-                };
+            let unreadable = |why: &str, hint: &str| {
                 let what = format!("the configuration cannot be read: {why}");
                 vec![Diagnostic::new("config_unreadable", what).in_file(&file_name).hint(hint)]
+            };
+            let text = std::fs::read_to_string(file).map_err(|e| match e.kind() {
+                ErrorKind::NotFound => unreadable("no such file", OTHER),
+                ErrorKind::IsADirectory => unreadable("this is a folder, not a file", OTHER),
+                ErrorKind::InvalidData => unreadable("it is no UTF-8 text", AS_UTF_8),
+                ErrorKind::PermissionDenied => {
+                    unreadable("permission denied", "run as a user with read access, or change the file mode")
+                }
+                _ => unreadable(&e.to_string(), OTHER),
             })?;
             if text.contains('\0') {
-                let what = "the configuration cannot be read: it holds NUL bytes, as text in UTF-16 does";
-                let c = Diagnostic::new("config_unreadable", what).in_file(&file_name);
-                return Err(vec![c.hint("save the file as UTF-8")]);
+                return Err(unreadable("it holds NUL bytes, as text in UTF-16 does", AS_UTF_8));
             }
             Ok((file_name, text))
         };

@@ -147,12 +147,10 @@ fn validate(
     };
     if settings.clock.is_some() && !settings.parts.is_empty() {
         let what = "an override for parts gives a `clock`, but a log has one clock for all its actuators";
-        let fault = Diagnostic::new("key_of_other_kind", what);
-        faults.report(&[], fault.hint("give it under `tails` alone"));
+        faults.wrong(&[], "key_of_other_kind", what, "give it under `tails` alone");
     }
     if settings.clock.is_none() && settings.channel.is_none() {
-        let fault = Diagnostic::new("key_missing", "an override changes nothing");
-        faults.report(&[], fault.hint("[override.channel.load]\nsign = -1"));
+        faults.wrong(&[], "key_missing", "an override changes nothing", "[override.channel.load]\nsign = -1");
         return one;
     }
     let failed = |key: &str, e: String| {

@@ -233,8 +233,7 @@ impl PartSettings {
         self.check_kind(faults);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
-            let fault = Diagnostic::new("limit_order", what);
-            faults.report(&["watch_m"], fault.hint("set `watch_m` below `limit_m`"));
+            faults.wrong(&["watch_m"], "limit_order", what, "set `watch_m` below `limit_m`");
         }
         let noise = self.check_noise(faults);
         let (actuator, geometry) = self.actuator(faults)?;
@@ -271,9 +270,9 @@ impl PartSettings {
             Kind::Rotary => (Kind::Linear, "rotary"),
         };
         for (key, _) in self.keys_of(other).into_iter().filter(|(_, value)| value.is_some()) {
-            let fault =
-                Diagnostic::new("key_of_other_kind", format!("`{key}` is not a key of a {kind} part"));
-            faults.report(&[key], fault.hint("`kind` is \"linear\" (default) or \"rotary\""));
+            let what = format!("`{key}` is not a key of a {kind} part");
+            let hint = "`kind` is \"linear\" (default) or \"rotary\"";
+            faults.wrong(&[key], "key_of_other_kind", what, hint);
         }
     }
 
@@ -300,7 +299,7 @@ impl PartSettings {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see \
                         docs/configuration.md";
             let what = "the part has no `noise`, and there are no default levels";
-            faults.report(&[], Diagnostic::new("key_missing", what).hint(hint));
+            faults.wrong(&[], "key_missing", what, hint);
             return None;
         };
         let mut level = |key, value| required(faults, &["noise", key], value);
@@ -385,7 +384,7 @@ fn required<T>(faults: &mut Faults<'_>, key: &[&str], value: Option<T>) -> Optio
     if value.is_none() {
         let name = key.join(".");
         let hint = format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)");
-        faults.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")).hint(hint));
+        faults.wrong(key, "key_missing", format!("the part has no `{name}`"), hint);
     }
     value
 }

@@ -19,8 +19,7 @@ pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Fault
             channel.choices().for_each(|choice| check_choice(name, choice, wanted, document, faults));
             if channel.alternatives.iter().any(|a| !a.alternatives.is_empty()) {
                 let what = format!("an alternative of `channel.{name}` has alternatives of its own");
-                let fault = Diagnostic::new("bad_pattern", what);
-                faults.report(&["alternatives"], fault.hint("list them all in one row, best first"));
+                faults.wrong(&["alternatives"], "bad_pattern", what, "list them all in one row, best first");
             }
             for choice in channel.choices().filter(|choice| !choice.column.is_empty()) {
                 let column = &choice.column;
@@ -29,8 +28,7 @@ pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Fault
                     Some(other) if other == name => format!("`{column}` is mapped to {name} twice"),
                     Some(other) => format!("`{column}` is mapped to both {other} and {name}"),
                 };
-                let fault = Diagnostic::new("column_twice", what);
-                faults.report(&["column"], fault.hint("two channels cannot share a column"));
+                faults.wrong(&["column"], "column_twice", what, "two channels cannot share a column");
             }
         });
     }
@@ -42,12 +40,12 @@ pub(super) fn check(channels: &Channels, document: &Document, faults: &mut Fault
             let what = "neither `screw_position` nor `relative_position` is mapped";
             let hint =
                 "[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\"";
-            faults.report(&[], Diagnostic::new("key_missing", what).hint(hint));
+            faults.wrong(&[], "key_missing", what, hint);
         }
         (Some(_), Some(_)) => {
             let what = "both `screw_position` and `relative_position` are mapped";
             let hint = "the relative position is screw − motor: map one of them";
-            faults.report(&["relative_position"], Diagnostic::new("key_of_other_kind", what).hint(hint));
+            faults.wrong(&["relative_position"], "key_of_other_kind", what, hint);
         }
         _ => {}
     }
@@ -80,8 +78,7 @@ fn check_choice(
         let needed = if one == other { one.to_owned() } else { format!("{one} or {other}") };
         let what =
             format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
-        let fault = Diagnostic::new("unit_contradicts", what);
-        faults.report(&["unit"], fault.hint(format!("it needs a unit of {needed}")));
+        faults.wrong(&["unit"], "unit_contradicts", what, format!("it needs a unit of {needed}"));
     }
     let mut report = |key: &str, code: &str, what: String| faults.report(&[key], Diagnostic::new(code, what));
     if column.trim().is_empty() {
