@@ -12,8 +12,8 @@ const ID_BYTES: usize = 256;
 #[error("a {0}")]
 pub struct IdError(String);
 
-macro_rules! identifier {
-    ($(#[$doc:meta])* $name:ident, $what:literal) => {
+macro_rules! identifiers {
+    ($($(#[$doc:meta])* $name:ident = $what:literal,)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[serde(try_from = "String")]
@@ -51,34 +51,21 @@ macro_rules! identifier {
                 Self::new(text)
             }
         }
-    };
+    )*};
 }
 
-identifier!(
+identifiers! {
     /// Aircraft: the tail on which an actuator is installed.
-    TailNumber,
-    "tail number"
-);
-identifier!(
+    TailNumber = "tail number",
     /// Position on the aircraft, e.g. `aileron_left`. Logs identify actuators by position.
-    Position,
-    "position"
-);
-identifier!(
+    Position = "position",
     /// Part number: the design, which determines stiffness, damping and mass.
-    PartNumber,
-    "part number"
-);
-identifier!(
+    PartNumber = "part number",
     /// Serial number: the unit that wears and has a trend; unique only together with its part number.
-    SerialNumber,
-    "serial number"
-);
-identifier!(
+    SerialNumber = "serial number",
     /// One flight of one tail.
-    FlightId,
-    "flight id"
-);
+    FlightId = "flight id",
+}
 
 #[cfg(test)]
 mod tests {

@@ -3,6 +3,8 @@
 //! Logs identify actuators by position, not by serial number; this table maps one to the other. The whole table
 //! is validated first: a unit cannot be in two positions at once, nor two units in one position.
 
+use std::cmp::Ordering;
+
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -142,11 +144,7 @@ impl Installations {
 
     /// Every installation in one position of a tail, by date.
     pub fn of_position(&self, tail: &str, position: &str) -> &[Installation] {
-        let key =
-            |row: &Installation| (row.tail_number.as_str(), row.position.as_str()).cmp(&(tail, position));
-        let first = self.rows.partition_point(|row| key(row).is_lt());
-        let count = self.rows[first..].partition_point(|row| key(row).is_eq());
-        &self.rows[first..first + count]
+        self.between(|row| (row.tail_number.as_str(), row.position.as_str()).cmp(&(tail, position)))
     }
 
     /// The unit installed in that position at that instant.
@@ -207,8 +205,13 @@ impl Installations {
     }
 
     fn of_tail(&self, tail: &TailNumber) -> &[Installation] {
-        let first = self.rows.partition_point(|installation| installation.tail_number < *tail);
-        let count = self.rows[first..].partition_point(|installation| installation.tail_number == *tail);
+        self.between(|row| row.tail_number.cmp(tail))
+    }
+
+    /// The rows that are equal by an order of the table.
+    fn between(&self, order: impl Fn(&Installation) -> Ordering) -> &[Installation] {
+        let first = self.rows.partition_point(|row| order(row).is_lt());
+        let count = self.rows[first..].partition_point(|row| order(row).is_eq());
         &self.rows[first..first + count]
     }
 }

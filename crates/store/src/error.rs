@@ -22,7 +22,7 @@ pub enum Error {
     #[error("{} cannot hold a store: Delta Lake takes `{found}` in its path for another character", dir.display())]
     Name { dir: PathBuf, found: String },
     #[error("{} has format {found}; this release supports format {known}", file.display())]
-    Format { file: PathBuf, found: String, known: u32 },
+    Format { file: PathBuf, found: String, known: u64 },
     #[error("{} is truncated: it holds `{found}`", file.display())]
     Torn { file: PathBuf, found: String },
     #[error("the store is {holder}")]

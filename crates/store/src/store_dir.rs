@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::delta::durable_fs;
 use crate::delta::location::Location;
@@ -14,14 +14,9 @@ use crate::handle::Store;
 /// 1: log records are *done* or *error*. 2: they may also be *known*, *not reached* or *unaccounted*.
 /// 3: files of one table may differ in later columns.
 /// Every earlier format is read, and is raised to the current one when the store is next written.
-pub(crate) const FORMAT: u32 = 3;
-const FIRST_FORMAT: u32 = 1;
+pub(crate) const FORMAT: u64 = 3;
+const FIRST_FORMAT: u64 = 1;
 pub(crate) const MARKER: &str = "store.json";
-
-#[derive(Serialize, Deserialize)]
-struct FormatMarker {
-    freeplay_store: u32,
-}
 
 impl Store {
     /// Opens a store for reading.
@@ -108,7 +103,7 @@ fn first_entry(location: &Location) -> Result<Option<String>, Error> {
 }
 
 pub(crate) fn write_marker(location: &Location) -> Result<(), Error> {
-    let marker = serde_json::json!(FormatMarker { freeplay_store: FORMAT }).to_string();
+    let marker = serde_json::json!({ "freeplay_store": FORMAT }).to_string();
     location.replace(MARKER, marker.as_bytes())
 }
 
@@ -132,7 +127,7 @@ fn make_folder(dir: &Path) -> Result<(), Error> {
 
 /// The format version, if the folder is a store of a known format. A store that lost its marker counts as one of the
 /// first format, so that the next writer writes the marker again.
-pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Error> {
+pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u64, Error> {
     let file = location.display_path(&location.dir().join(MARKER));
     // A copy may have lost the marker alone. A bucket without it gets it where the store is opened for writing.
     if !location.is_bucket() && !location.has(MARKER)? {
@@ -145,9 +140,10 @@ pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Erro
         return Err(Error::Foreign { dir: location.display_path(location.dir()), found: found.to_owned() });
     }
     let text = location.read(MARKER)?;
-    match serde_json::from_str::<FormatMarker>(&text) {
-        Ok(FormatMarker { freeplay_store: format @ 1..=FORMAT }) => Ok(format),
-        Ok(marker) => Err(Error::Format { file, found: marker.freeplay_store.to_string(), known: FORMAT }),
-        Err(_) => Err(Error::Torn { file, found: text.trim().chars().take(40).collect() }),
+    let marker: Option<Value> = serde_json::from_str(&text).ok();
+    match marker.and_then(|marker| marker["freeplay_store"].as_u64()) {
+        Some(format @ 1..=FORMAT) => Ok(format),
+        Some(other) => Err(Error::Format { file, found: other.to_string(), known: FORMAT }),
+        None => Err(Error::Torn { file, found: text.trim().chars().take(40).collect() }),
     }
 }

@@ -318,17 +318,14 @@ fn is_conflict(error: &DeltaTableError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{StringArray, TimestampMicrosecondArray};
-    use arrow::datatypes::{DataType, Field, Schema};
+    use arrow::array::TimestampMicrosecondArray;
+    use arrow::datatypes::{Field, Schema};
 
     use super::*;
     use records::row_schema::time_type;
 
     fn schema() -> SchemaRef {
-        Arc::new(Schema::new(vec![
-            Field::new("name", DataType::Utf8, false),
-            Field::new("at", time_type(), false),
-        ]))
+        Arc::new(Schema::new(vec![Field::new("at", time_type(), false)]))
     }
 
     fn table(dir: &Path) -> Table {
@@ -338,9 +335,8 @@ mod tests {
     }
 
     fn batch(numbers: Vec<i64>) -> RecordBatch {
-        let names = StringArray::from_iter_values(numbers.iter().map(|n| format!("n{n:02}")));
         let at = TimestampMicrosecondArray::from(numbers).with_timezone("UTC");
-        RecordBatch::try_new(schema(), vec![Arc::new(names), Arc::new(at)]).unwrap()
+        RecordBatch::try_new(schema(), vec![Arc::new(at)]).unwrap()
     }
 
     /// A file that was superseded one minute ago, under clocks that were right, ahead and ten years back.

@@ -12,22 +12,11 @@ use crate::error::Error;
 
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
-/// Who holds a store: the content of the lock file, which another process shows. Machines may share a folder.
 #[derive(Serialize, Deserialize)]
 struct Holder {
     pid: u32,
     host: String,
     started_utc: Timestamp,
-}
-
-impl Holder {
-    fn this_process() -> Self {
-        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-        let name =
-            name.or_else(|| std::env::var("COMPUTERNAME").ok()).or_else(|| std::env::var("HOSTNAME").ok());
-        let host = name.map_or_else(|| "this machine".to_owned(), |name| name.trim().to_owned());
-        Self { pid: std::process::id(), host, started_utc: Timestamp::now() }
-    }
 }
 
 #[derive(Debug)]
@@ -74,21 +63,24 @@ impl Lock {
     }
 }
 
+/// Writes who holds the lock, for other processes. Machines may share a folder.
 fn name(file: &mut File) -> std::io::Result<()> {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let name = name.or_else(|| std::env::var("COMPUTERNAME").ok()).or_else(|| std::env::var("HOSTNAME").ok());
+    let host = name.map_or_else(|| "this machine".to_owned(), |name| name.trim().to_owned());
+    let holder = Holder { pid: std::process::id(), host, started_utc: Timestamp::now() };
     file.set_len(0)?;
     file.rewind()?;
-    file.write_all(serde_json::to_string(&Holder::this_process())?.as_bytes())
+    file.write_all(serde_json::to_string(&holder)?.as_bytes())
 }
 
 /// What the holder wrote about itself; it may be writing just now.
 fn named(file: &mut File) -> String {
     let mut text = String::new();
     let read = file.rewind().and_then(|()| file.read_to_string(&mut text));
-    let holder: Option<Holder> = read.ok().and_then(|_| serde_json::from_str(&text).ok());
-    holder.map_or_else(
-        || "held by another process".to_owned(),
-        |Holder { pid, host, started_utc }| {
-            format!("held by pid {pid} on {host} since {}", started_utc.strftime("%Y-%m-%d %H:%M:%S UTC"))
-        },
-    )
+    let Some(holder) = read.ok().and_then(|_| serde_json::from_str::<Holder>(&text).ok()) else {
+        return "held by another process".to_owned();
+    };
+    let since = holder.started_utc.strftime("%Y-%m-%d %H:%M:%S UTC");
+    format!("held by pid {} on {} since {since}", holder.pid, holder.host)
 }
