@@ -1,8 +1,8 @@
 //! Result store: gap records, log records and run records in Delta tables.
 //!
 //! A store is a folder, or a prefix of a bucket, that other engines can open: `docs/store.md` explains its layout and the
-//! guarantees. One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
-//! one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
+//! guarantees. One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query
+//! reads one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
 //!
 //! ```
 //! use store::{LogResult, Query, Store};

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use deltalake::logstore::object_store::PutMode;
 use serde_json::Value;
 
 use crate::delta::durable_fs;
@@ -104,7 +105,7 @@ fn first_entry(location: &Location) -> Result<Option<String>, Error> {
 
 pub(crate) fn write_marker(location: &Location) -> Result<(), Error> {
     let marker = serde_json::json!({ "freeplay_store": FORMAT }).to_string();
-    location.replace(MARKER, marker.as_bytes())
+    location.put(&location.dir().join(MARKER), marker.as_bytes(), PutMode::Overwrite).map(drop)
 }
 
 fn is_there(dir: &Path) -> Result<bool, Error> {

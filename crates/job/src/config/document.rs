@@ -12,7 +12,8 @@ use ingest::mapping::units::TimeUnit;
 use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
 use records::time::DAY_S;
 use records::{Diagnostic, TailNumber};
-use schemars::JsonSchema;
+use schemars::transform::transform_subschemas;
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
@@ -145,25 +146,19 @@ pub struct Override {
     /// Part numbers, with `*` and `?`. Default: all.
     pub parts: Vec<String>,
     /// Keys of `[clock]` that differ; not for single parts.
-    #[schemars(with = "Option<ClockMapping>")]
+    #[schemars(with = "Option<ClockMapping>", transform = require_nothing)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock: Option<toml::Table>,
     /// Keys of `[channel]` that differ.
-    #[schemars(with = "Option<Channels>")]
+    #[schemars(with = "Option<Channels>", transform = require_nothing)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<toml::Table>,
 }
 
-/// Makes every key of a schema optional, at any depth.
-fn require_nothing(schema: &mut serde_json::Value) {
-    match schema {
-        serde_json::Value::Object(keys) => {
-            keys.remove("required");
-            keys.values_mut().for_each(require_nothing);
-        }
-        serde_json::Value::Array(all) => all.iter_mut().for_each(require_nothing),
-        _ => {}
-    }
+/// Makes every key of a schema optional, at any depth: an override holds the keys that differ, and needs none of the others.
+fn require_nothing(schema: &mut Schema) {
+    schema.remove("required");
+    transform_subschemas(&mut require_nothing, schema);
 }
 
 /// `[store]`.
@@ -295,13 +290,7 @@ impl Document {
         let settings = schemars::generate::SchemaSettings::draft2020_12()
             .for_deserialize()
             .with(|s| s.inline_subschemas = true);
-        let mut schema = settings.into_generator().into_root_schema_for::<Self>().to_value();
-        // An override holds the keys that differ, and needs none of the others.
-        for key in ["clock", "channel"] {
-            let of_override = format!("/properties/override/items/properties/{key}");
-            schema.pointer_mut(&of_override).into_iter().for_each(require_nothing);
-        }
-        schema
+        settings.into_generator().into_root_schema_for::<Self>().to_value()
     }
 
     /// The mapping without overrides.

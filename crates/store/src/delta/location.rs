@@ -162,12 +162,8 @@ impl Location {
         Ok(())
     }
 
-    pub(crate) fn replace(&self, name: &str, content: &[u8]) -> Result<(), Error> {
-        self.put(&self.dir.join(name), content, PutMode::Overwrite).map(drop)
-    }
-
     /// Writes a whole file; `false` when it is to be created, and another file has that name.
-    fn put(&self, path: &Path, content: &[u8], mode: PutMode) -> Result<bool, Error> {
+    pub(crate) fn put(&self, path: &Path, content: &[u8], mode: PutMode) -> Result<bool, Error> {
         let Some(bucket) = &self.bucket else {
             let written = match mode {
                 PutMode::Create => durable_fs::create(path, &[content]),

@@ -70,3 +70,13 @@ pub(crate) fn fresh() -> (tempfile::TempDir, Writer) {
     let writer = writer(dir.path());
     (dir, writer)
 }
+
+/// A new store with some flights of each of the first tails, a commit for each flight number.
+pub(crate) fn filled(tails: usize, flights: i64) -> (tempfile::TempDir, Writer) {
+    let (dir, mut writer) = fresh();
+    for flight in 0..flights {
+        let results: Vec<_> = (0..tails).map(|tail| result(tail, flight, 1e-6 * flight as f64)).collect();
+        writer.commit(&results).unwrap();
+    }
+    (dir, writer)
+}

@@ -5,18 +5,9 @@ use arrow::datatypes::{Float64Type, Int32Type, TimestampMicrosecondType};
 use jiff::SignedDuration;
 use proptest::prelude::*;
 use records::GapRecord;
-use store::{Query, Store, Writer};
+use store::{Query, Store};
 
-use crate::fixtures::{POSITIONS, departure, fresh, result};
-
-fn filled() -> (tempfile::TempDir, Writer) {
-    let (dir, mut writer) = fresh();
-    for flight in 0..4 {
-        let results: Vec<_> = (0..3).map(|tail| result(tail, flight, 1e-6 * flight as f64)).collect();
-        writer.commit(&results).unwrap();
-    }
-    (dir, writer)
-}
+use crate::fixtures::{POSITIONS, departure, filled, fresh, result};
 
 /// The same question asked of rows one by one.
 fn fits(query: &Query, record: &GapRecord) -> bool {
@@ -82,7 +73,7 @@ fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
 /// Whether files hold the rows of a run, or of a unit.
 #[test]
 fn a_query_and_the_parts_of_a_scan_answer_what_asking_every_row_would() {
-    let (dir, mut writer) = filled();
+    let (dir, mut writer) = filled(3, 4);
     let all = writer.store().records(&Query::default()).unwrap();
     assert_eq!(all.len(), 36);
     let check = |store: &Store| {
