@@ -134,7 +134,7 @@ pub fn plot_data(channels: &ActuatorChannels, part: &Part) -> Result<Option<Cont
 }
 
 /// The channels as input of the estimator.
-pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
+pub(crate) fn samples(channels: &ActuatorChannels) -> Samples<'_> {
     Samples {
         step_s: channels.step_s,
         motor_m: &channels.motor_m,
@@ -145,7 +145,7 @@ pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
 }
 
 /// Prior knowledge of a part for the contact regression.
-pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
+fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
     let unknown_force_n = match part.noise {
         estimator::NoiseModel::Sensors(sensors) => {
             Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0)

@@ -86,7 +86,7 @@ impl<'c> FlightLog<'c> {
     pub fn actuators(&self) -> impl Iterator<Item = &Actuator> {
         let tail = &self.identity.flight.tail_number;
         // Which columns a position has may depend on its part, so a position without a unit may lack some.
-        let booked = |at: &Position| self.installations.contains_position(tail, at);
+        let booked = |at: &Position| !self.installations.of_position(tail.as_str(), at.as_str()).is_empty();
         self.all.iter().filter(move |at| at.columns.lacking.is_empty() || booked(&at.columns.position))
     }
 
@@ -204,7 +204,8 @@ pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, 
 /// Why no unit has a log's channels. The text is the same for all logs of one cause, so that it is reported once.
 fn no_installation(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
     let (tail, at) = (&id.flight.tail_number, id.flight.departure_utc);
-    if !installations.contains_tail(tail) {
+    let of_tail = installations.of_tail(tail);
+    if of_tail.is_empty() {
         let near = nearest(tail.as_str(), installations.iter().map(|stay| stay.tail_number.as_str()));
         let near = near.map(|near| format!("nearest: {near}; ")).unwrap_or_default();
         let hint = format!("{near}compare the spelling in logs and table; then `freeplay run --retry`");
@@ -218,9 +219,8 @@ fn no_installation(id: &Identity, position: &Position, installations: &Installat
     let from = before.map(|removed| format!(" from {}", day(removed))).unwrap_or_default();
     let until = after.map(|installed| format!(" until {}", day(installed))).unwrap_or_default();
     let what = format!("no unit is booked in {position} of {tail}{from}{until}");
-    let of_tail = installations.iter().filter(|stay| stay.tail_number == *tail);
-    let booked: BTreeSet<&str> = of_tail.map(|stay| stay.position.as_str()).collect();
-    let booked: Vec<&str> = booked.into_iter().collect();
+    let mut booked: Vec<&str> = of_tail.iter().map(|stay| stay.position.as_str()).collect();
+    booked.dedup();
     let hint = format!(
         "the table has {} of {tail}; add the stay to it, then `freeplay run --retry`",
         booked.join(", ")

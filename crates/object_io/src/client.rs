@@ -1,9 +1,9 @@
-//! One client per bucket, and the shared asynchronous runtime.
+//! One client per bucket, the shared asynchronous runtime, and the timeouts of requests.
 
 use std::collections::HashMap;
 use std::future::Future;
-use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
-use std::time::Instant;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError, RwLock};
+use std::time::{Duration, Instant};
 
 use object_store::path::Path;
 use tokio::runtime::{Builder, Handle, Runtime};
@@ -52,4 +52,30 @@ impl Address {
         let answer = question(&client, &location).await;
         answer.map_err(|error| Error::of(self, clock.elapsed().as_secs_f64(), &error))
     }
+}
+
+/// Timeouts of object-store requests, process-wide.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Time after which an incomplete request is aborted and repeated.
+    pub timeout: Duration,
+    /// Time after which a request is no longer repeated.
+    pub give_up: Duration,
+}
+
+impl Settings {
+    /// Default timeouts.
+    pub const DEFAULT: Self = Self { timeout: Duration::from_secs(30), give_up: Duration::from_mins(3) };
+}
+
+static SETTINGS: RwLock<Settings> = RwLock::new(Settings::DEFAULT);
+
+/// Sets the timeouts of clients that are created from now on.
+pub fn configure(settings: Settings) {
+    *SETTINGS.write().unwrap_or_else(PoisonError::into_inner) = settings;
+}
+
+#[cfg(feature = "cloud")]
+pub(crate) fn settings() -> Settings {
+    *SETTINGS.read().unwrap_or_else(PoisonError::into_inner)
 }

@@ -21,14 +21,12 @@ mod http_post;
 mod listing;
 mod local_file;
 mod object_file;
-mod settings;
 
 pub use address::{Address, Client, is_address};
-pub use client::{block_on, handle};
+pub use client::{Settings, block_on, configure, handle};
 pub use cloud::post_json;
 pub use error::Error;
 pub use http_post::{Posted, check_url};
 pub use listing::{ListEntry, head, list};
 pub use local_file::{create_fresh, system_error};
 pub use object_file::ObjectFile;
-pub use settings::{Settings, configure};

@@ -189,23 +189,14 @@ impl Installations {
         self.of_tail(tail).iter().filter(move |installation| installation.covers(at))
     }
 
-    /// Whether the table has an installation on that tail.
-    pub fn contains_tail(&self, tail: &TailNumber) -> bool {
-        !self.of_tail(tail).is_empty()
-    }
-
-    /// Whether the table has a unit in that position of that tail, at any time.
-    pub fn contains_position(&self, tail: &TailNumber, position: &Position) -> bool {
-        self.of_tail(tail).iter().any(|installation| installation.position == *position)
+    /// Every installation on that tail, by position and date.
+    pub fn of_tail(&self, tail: &TailNumber) -> &[Installation] {
+        self.between(|row| row.tail_number.cmp(tail))
     }
 
     /// Every installation, by tail, position and date.
     pub fn iter(&self) -> impl Iterator<Item = &Installation> {
         self.rows.iter()
-    }
-
-    fn of_tail(&self, tail: &TailNumber) -> &[Installation] {
-        self.between(|row| row.tail_number.cmp(tail))
     }
 
     /// The rows that are equal by an order of the table.

@@ -120,7 +120,8 @@ macro_rules! row {
         $(#[$attribute])*
         $vis struct $name {
             $(
-                #[doc = concat!($($doc),*)]
+                #[allow(missing_docs, reason = "a field without a comment has that of the field before")]
+                $(#[doc = $doc])*
                 $(#[serde($($serde)*)])?
                 $field_vis $field: $type,
             )*

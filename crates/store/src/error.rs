@@ -55,11 +55,8 @@ impl Error {
     /// The error as a person meets it: with its stable code, its file and a remedy.
     pub fn diagnostic(&self) -> Diagnostic {
         let (code, remedy) = self.code_and_remedy();
-        let diagnostic = Diagnostic::new(code, self).hint(remedy);
-        match self.file() {
-            Some(file) => diagnostic.in_file(file.display()),
-            None => diagnostic,
-        }
+        let file = self.file().map(|file| file.display().to_string());
+        Diagnostic { file, ..Diagnostic::new(code, self).hint(remedy) }
     }
 
     /// The error of the system that caused this one, if one did: it is no finding about the content of the store.

@@ -30,7 +30,7 @@ mod write;
 
 pub use admin::info::Info;
 pub use admin::withdraw::Withdrawal;
-pub use delta::foreign_table::live_files;
+pub use delta::table::live_files;
 pub use error::Error;
 pub use handle::Store;
 pub use read::column_scan::ColumnScan;

@@ -20,9 +20,7 @@ use records::{Diagnostic, PartNumber, TailNumber};
 use serde::Serialize;
 
 pub use alerts::AlertChannel;
-pub use document::{
-    AsOf, Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
-};
+pub use document::{AsOf, Document, EstimateSettings, Method, Override};
 use layers::{ConfigLayer, Faults, Source};
 use overrides::Overrides;
 pub use part::QuantityLimits;

@@ -49,8 +49,5 @@ fn other_type(message: &str) -> Option<Diagnostic> {
     let hint =
         if is_single && found == "map" { Some("write a table in single brackets: `[name]`") } else { hint };
     let diagnostic = Diagnostic::new("bad_toml", format!("expected {wanted}, found {found}"));
-    Some(match hint {
-        Some(hint) => diagnostic.hint(hint),
-        None => diagnostic,
-    })
+    Some(Diagnostic { hint: hint.map(str::to_owned), ..diagnostic })
 }

@@ -50,8 +50,9 @@ fn section(page: &mut String, path: &str, said: &str, schema: &Value, tables: &m
     for (key, value) in keys {
         // Overrides need no key, and their keys are those of the tables that they override.
         let needed = if required.contains(&key.as_str()) { ", needed" } else { "" };
-        let row =
-            |needed: &str| format!("| `{key}` | {}{needed} | {}{} |\n", kind(value), text(value), range(key));
+        let range = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
+        let range = range.map(|(_, least, most)| format!(" Range {least:e}…{most:e}.")).unwrap_or_default();
+        let row = |needed: &str| format!("| `{key}` | {}{needed} | {}{range} |\n", kind(value), text(value));
         table.push_str(&row(needed));
         keys_only.push_str(&row(""));
         below.extend(inner(key, value, path).map(|(path, schema)| (path, text(value), schema)));
@@ -71,11 +72,6 @@ fn section(page: &mut String, path: &str, said: &str, schema: &Value, tables: &m
     for (path, said, schema) in below {
         section(page, &path, &said, schema, tables);
     }
-}
-
-fn range(key: &str) -> String {
-    let listed = PLAUSIBLE.iter().find(|(name, ..)| *name == key);
-    listed.map_or_else(String::new, |(_, least, most)| format!(" Range {least:e}…{most:e}."))
 }
 
 /// The object in a value, and what its table is called; alternatives of a channel are channels again.

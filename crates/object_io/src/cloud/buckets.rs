@@ -8,10 +8,10 @@ use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::{ClientOptions, RetryConfig};
 
 use crate::address::{Address, Client, Scheme};
+use crate::client::settings;
 use crate::cloud::aws_profile;
 use crate::cloud::retry::RetryingStore;
 use crate::error::Error;
-use crate::settings::settings;
 
 pub(crate) fn client(address: &Address) -> Result<Client, Error> {
     let detail = |detail: String| Error::Settings { place: address.bucket_url(), detail };

@@ -21,7 +21,6 @@ pub struct Info {
     pub last_departure_utc: Option<Timestamp>,
     /// Logs with an account.
     pub logs: usize,
-    /// Logs whose processing failed.
     pub failed_logs: usize,
     /// Data files of the records.
     pub files: usize,

@@ -3,7 +3,6 @@
 pub(crate) mod data_file;
 pub(crate) mod durable_fs;
 pub(crate) mod file_stats;
-pub(crate) mod foreign_table;
 pub(crate) mod location;
 pub(crate) mod log_digests;
 pub(crate) mod log_storage;

@@ -55,9 +55,12 @@ impl DataFile {
     }
 }
 
-/// The snapshot that is kept, with the listing of its log, shared by all who hold the table.
+/// A snapshot with the listing of its log.
+type Kept = (Snapshot, Vec<Entry>);
+
+/// The snapshot that is kept, shared by all who hold the table.
 #[derive(Clone, Default)]
-pub(crate) struct SnapshotCache(Arc<Mutex<Option<(Snapshot, Vec<Entry>)>>>);
+pub(crate) struct SnapshotCache(Arc<Mutex<Option<Kept>>>);
 
 pub(crate) fn commit_file(version: u64) -> String {
     format!("{LOG}/{version:020}.json")

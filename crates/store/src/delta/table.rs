@@ -1,6 +1,6 @@
 //! One Delta table: its snapshot, and a change to it that lands whole or not at all.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -286,6 +286,29 @@ impl Table {
     }
 }
 
+/// Data files of the current version of a Delta table of another program, by its log: files that were withdrawn or compacted away may
+/// still be in its folder. Each has its path below the folder, with `/` between folders, and whether a deletion vector marks
+/// some of its rows as deleted. A log that maps columns to other names in the files is an error.
+pub fn live_files(folder: &Path) -> Result<BTreeMap<String, bool>, Error> {
+    let location = Location::at(folder)?;
+    let load = async {
+        let mut delta = DeltaTable::new(location.log_store()?);
+        delta.load().await?;
+        let snapshot = delta.snapshot()?;
+        let mode = snapshot.metadata().configuration().get("delta.columnMapping.mode");
+        if mode.is_some_and(|mode| mode != "none") {
+            let unsupported =
+                "the table maps its columns to other names in the files (`delta.columnMapping.mode`)";
+            return Err(DeltaTableError::Generic(unsupported.into()));
+        }
+        let files = snapshot.log_data();
+        let live =
+            |view: LogicalFileView| (view.path().into_owned(), view.deletion_vector_descriptor().is_some());
+        Ok(files.iter().map(live).collect())
+    };
+    location.block_on(load).map_err(|source| Error::LogTable { source: Box::new(source) })
+}
+
 /// An interval between two commits counts as this long at most: longer ones may be a clock that was set.
 const LONGEST_INTERVAL: Duration = Duration::from_hours(48);
 /// File systems and buckets have clocks of their own, which differ by less than this.
@@ -421,24 +444,17 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_is_torn_while_it_is_kept_is_an_error() {
+    fn a_kept_table_that_was_torn_is_an_error_and_one_in_its_place_is_read_anew() {
         let dir = tempfile::tempdir().unwrap();
-        let own = table(dir.path());
+        let (own, folder) = (table(dir.path()), dir.path().join("numbers"));
         (1..=3).for_each(|n| append(&own, n));
-        let first = dir.path().join("numbers").join(commit_file(1));
+        let first = folder.join(commit_file(1));
         std::fs::write(&first, &std::fs::read(&first).unwrap()[..40]).unwrap();
         assert!(own.snapshot().is_err());
-    }
-
-    #[test]
-    fn a_table_that_was_put_in_the_place_of_another_is_read_anew() {
-        let dir = tempfile::tempdir().unwrap();
-        let own = table(dir.path());
-        (1..=3).for_each(|n| append(&own, n));
-        std::fs::remove_dir_all(dir.path().join("numbers")).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
         (4..=5).for_each(|n| append(&table(dir.path()), n));
         assert_eq!(rows(&own), 2);
-        std::fs::remove_dir_all(dir.path().join("numbers")).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
         assert!(own.snapshot().is_err());
     }
 }

@@ -39,9 +39,7 @@ stored_row! {
     /// The columns of a record that show from which log and from which samples it was computed.
     #[derive(Debug, Clone, PartialEq)]
     pub struct HeldRecord {
-        /// Path of the log that it was computed from.
         pub log_path: String,
-        /// Digest of that log.
         pub log_digest: String,
         status: Status,
         gap_m: Option<f64>,

@@ -39,17 +39,18 @@ fn link(from: &Path, to: &Path) {
     }
 }
 
+fn texts<R: std::fmt::Debug>(rows: &[R]) -> Vec<String> {
+    let mut texts: Vec<String> = rows.iter().map(|row| format!("{row:?}")).collect();
+    texts.sort();
+    texts
+}
+
 /// The rows of every table as text; the columns of a scan are those of the records.
 fn rows(store: &Store) -> Result<String, store::Error> {
     let scan = store.scan_columns(&Query::default(), &["gap_m"])?;
     (0..scan.file_count()).try_for_each(|file| scan.read(file).map(drop))?;
-    let mut records: Vec<String> =
-        store.records(&Query::default())?.iter().map(|record| format!("{record:?}")).collect();
-    records.sort();
-    let mut accounts: Vec<String> = store.accounts()?.iter().map(|account| format!("{account:?}")).collect();
-    accounts.sort();
-    let runs: Vec<String> = store.runs()?.iter().map(|run| format!("{run:?}")).collect();
-    Ok([records, accounts, runs].concat().join("\n"))
+    let records = texts(&store.records(&Query::default())?);
+    Ok([records, texts(&store.accounts()?), texts(&store.runs()?)].concat().join("\n"))
 }
 
 #[test]
