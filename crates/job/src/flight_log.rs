@@ -239,22 +239,21 @@ pub fn config_digest(
     positions: &[Position],
 ) -> String {
     let mut hash = blake3::Hasher::new();
+    let add = |hash: &mut blake3::Hasher, text: &str| {
+        hash.update(text.as_bytes()).update(&[0]);
+    };
     for position in positions {
         let installation = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
         let digest = installation.map(|s| config.digest(&flight.tail_number, &s.part_number));
-        for text in [Some(position.as_str()), digest.as_deref()] {
-            hash.update(text.unwrap_or_default().as_bytes());
-            hash.update(&[0]);
-        }
+        add(&mut hash, position.as_str());
+        add(&mut hash, &digest.unwrap_or_default());
     }
     hash.update(config.mapping_text(&flight.tail_number).as_bytes());
     // A flights table may supply the identity of a log: when its row changes, the log may be another flight.
     let (tail, id) = (flight.tail_number.as_str(), flight.flight_id.as_str());
     if let Some(row) = config.flights.of(tail, id, flight.departure_utc) {
-        for text in [row.flight_id.as_str(), &row.departure_utc.to_string()] {
-            hash.update(text.as_bytes());
-            hash.update(&[0]);
-        }
+        add(&mut hash, row.flight_id.as_str());
+        add(&mut hash, &row.departure_utc.to_string());
     }
     hash.finalize().to_hex().to_string()
 }

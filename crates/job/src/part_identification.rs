@@ -43,7 +43,10 @@ impl IdentifiedParams {
         let noise = |noise: WhiteNoise| Identified { value: noise.rms, uncertainty: Some(noise.uncertainty) };
         let exact = |value: f64| Identified { value, uncertainty: None };
         let friction_n = found.and_then(|found| {
-            let load_n = rms_n(&channels.load_n);
+            let present = || channels.load_n.iter().filter(|load_n| !load_n.is_nan());
+            let mean_square_n2 =
+                present().map(|load_n| load_n * load_n).sum::<f64>() / present().count().max(1) as f64;
+            let load_n = mean_square_n2.sqrt();
             Some(found.friction.at_n(load_n)).filter(|friction_n| *friction_n > MIN_FRICTION_SHARE * load_n)
         });
         Self([
@@ -101,11 +104,6 @@ fn screw_noise(channels: &ActuatorChannels, resolution: Option<f64>) -> Option<W
     // The channel that was recorded carries the noise of one sensor, the other that of both.
     let [own, relative] = [&screw_m, &channels.dx_m].map(|values| white_noise(values, resolution));
     own.into_iter().chain(relative).min_by(|a, b| a.rms.total_cmp(&b.rms))
-}
-
-fn rms_n(load_n: &[f64]) -> f64 {
-    let present = || load_n.iter().filter(|f| !f.is_nan());
-    (present().map(|f| f * f).sum::<f64>() / present().count().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

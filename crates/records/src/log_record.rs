@@ -80,11 +80,6 @@ stored_row! {
 }
 
 impl LogRecord {
-    /// Keys of the records that the log produced.
-    pub fn record_keys(&self) -> Vec<RecordKey> {
-        if self.estimated + self.refused > 0 { self.keys() } else { Vec::new() }
-    }
-
     /// Keys of the records that its flight may have, one per position; none where the log was not identified.
     pub fn keys(&self) -> Vec<RecordKey> {
         let Some((tail, departure)) = self.tail_number.as_ref().zip(self.departure_utc) else {

@@ -382,7 +382,11 @@ impl Document {
             faults.wrong(&["by_row"], "key_missing", what, hint);
         }
         if let Some(name) = self.identity.time_zone.as_deref().filter(|name| zone(name).is_err()) {
-            faults.report(&["time_zone"], no_zone(name));
+            let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
+            let fault = Diagnostic::new("bad_zone", format!("unknown time zone `{name}`"));
+            let otherwise = "names such as `UTC`, `Europe/Istanbul`, `America/New_York`";
+            let known = known.iter().map(String::as_str);
+            faults.report(&["time_zone"], with_nearest(fault, name, known, otherwise));
         }
     }
 
@@ -400,14 +404,6 @@ impl Document {
             });
         }
     }
-}
-
-/// An unknown time zone, with the zone that was probably meant.
-fn no_zone(name: &str) -> Diagnostic {
-    let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
-    let diagnostic = Diagnostic::new("bad_zone", format!("unknown time zone `{name}`"));
-    let otherwise = "names such as `UTC`, `Europe/Istanbul`, `America/New_York`";
-    with_nearest(diagnostic, name, known.iter().map(String::as_str), otherwise)
 }
 
 fn check_layout(layout: &Layout, faults: &mut Faults<'_>) {

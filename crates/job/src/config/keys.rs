@@ -36,8 +36,13 @@ impl<'s> Walk<'s> {
             let name: &str = key.get_ref();
             let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
             let Some(inner) = known.and_then(|k| k.get(name)).or(others) else {
-                let names = known.into_iter().flat_map(|k| k.keys().map(String::as_str));
-                self.unknown.push(self.source.at_span(key.span(), diagnostic(name, above, names)));
+                let place =
+                    if above.is_empty() { "the configuration".to_owned() } else { format!("`[{above}]`") };
+                let names: Vec<&str> = known.into_iter().flat_map(|k| k.keys().map(String::as_str)).collect();
+                let keys = format!("its keys are {}", names.join(", "));
+                let fault = Diagnostic::new("unknown_key", format!("`{name}` is not a key of {place}"));
+                let fault = with_nearest(fault, name, names, keys);
+                self.unknown.push(self.source.at_span(key.span(), fault));
                 continue;
             };
             each(value.get_ref(), &mut |value| match value {
@@ -80,14 +85,6 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
         }
         _ => None,
     }
-}
-
-fn diagnostic<'n>(name: &str, above: &str, known: impl Iterator<Item = &'n str>) -> Diagnostic {
-    let place = if above.is_empty() { "the configuration".to_owned() } else { format!("`[{above}]`") };
-    let names: Vec<&str> = known.collect();
-    let keys = format!("its keys are {}", names.join(", "));
-    let diagnostic = Diagnostic::new("unknown_key", format!("`{name}` is not a key of {place}"));
-    with_nearest(diagnostic, name, names, keys)
 }
 
 /// The diagnostic of an unknown name with a hint: the known name that was probably meant, or another text if none is near.

@@ -31,16 +31,15 @@ pub(crate) struct RetryingStore {
 }
 
 struct Backoff {
-    begun: Instant,
+    deadline: Instant,
     delay: Duration,
-    give_up: Duration,
 }
 
 impl Backoff {
     /// Waits before the next attempt; returns the error if it is permanent or the deadline has passed.
     async fn wait_after(&mut self, error: Error) -> Result<()> {
         let is_passing = matches!(error, Error::Generic { .. } | Error::JoinError { .. });
-        if !is_passing || self.begun.elapsed() + self.delay > self.give_up {
+        if !is_passing || Instant::now() + self.delay > self.deadline {
             return Err(error);
         }
         tokio::time::sleep(self.delay).await;
@@ -55,7 +54,7 @@ impl RetryingStore {
     }
 
     fn backoff(&self) -> Backoff {
-        Backoff { begun: Instant::now(), delay: FIRST_DELAY, give_up: self.give_up }
+        Backoff { deadline: Instant::now() + self.give_up, delay: FIRST_DELAY }
     }
 
     /// Repeats a request until it succeeds, fails permanently or the deadline passes.
@@ -98,11 +97,6 @@ impl RetryingStore {
         }
         let payload = GetResultPayload::Stream(stream::once(async { Ok(bytes) }).boxed());
         Ok(GetResult { payload, meta, range, attributes })
-    }
-
-    async fn content_equals(&self, location: &Path, payload: &PutPayload) -> Result<bool> {
-        let there = self.get(location).await?.bytes().await?;
-        Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))
     }
 
     /// The keys after `last`, from a listing that resumes after the last received key where a request fails.
@@ -150,8 +144,9 @@ impl ObjectStore for RetryingStore {
         let is_new = options.mode == PutMode::Create;
         let put = self.with_retry(|| self.inner.put_opts(location, payload.clone(), options.clone())).await;
         match put {
-            Err(Error::AlreadyExists { .. }) if is_new && self.content_equals(location, &payload).await? => {
-                Ok(PutResult { e_tag: None, version: None })
+            Err(error @ Error::AlreadyExists { .. }) if is_new => {
+                let is_same = self.get(location).await?.bytes().await? == Bytes::from(payload);
+                if is_same { Ok(PutResult { e_tag: None, version: None }) } else { Err(error) }
             }
             put => put,
         }

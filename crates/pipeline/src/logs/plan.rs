@@ -205,7 +205,8 @@ pub fn plan(
     let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     // Names and digests of a hundred thousand logs are made only where they decide something.
     let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
-        accounts.values().flat_map(LogRecord::record_keys).collect()
+        let with_records = accounts.values().filter(|account| account.estimated + account.refused > 0);
+        with_records.flat_map(LogRecord::keys).collect()
     } else {
         HashSet::new()
     };

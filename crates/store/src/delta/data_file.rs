@@ -31,7 +31,13 @@ pub(crate) fn write(
     batch: &RecordBatch,
     data_change: bool,
 ) -> Result<Add, Error> {
-    let content = encode(batch)?;
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
+        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .build();
+    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties))?;
+    writer.write(batch)?;
+    let content = writer.into_inner()?;
     let name = format!("{version:012}-{}.parquet", blake3::hash(&content).to_hex());
     // An interrupted attempt may have left the same content under the same name.
     location.create(&location.dir().join(&name), &content)?;
@@ -43,16 +49,6 @@ pub(crate) fn write(
         stats: Some(file_stats::of(batch)),
         ..Add::default()
     })
-}
-
-fn encode(batch: &RecordBatch) -> Result<Vec<u8>, Error> {
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
-        .set_max_row_group_row_count(Some(GROUP_ROWS))
-        .build();
-    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties))?;
-    writer.write(batch)?;
-    Ok(writer.into_inner()?)
 }
 
 /// The digest a file's name carries; none for a file that another program wrote.

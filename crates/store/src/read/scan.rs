@@ -219,16 +219,6 @@ mod tests {
 
     use super::*;
 
-    fn written(dir: &Path, name: &str, batch: &RecordBatch) -> PathBuf {
-        let path = dir.join(name);
-        let groups = WriterProperties::builder().set_max_row_group_row_count(Some(2)).build();
-        let mut writer =
-            ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), Some(groups)).unwrap();
-        writer.write(batch).unwrap();
-        writer.close().unwrap();
-        path
-    }
-
     /// Files that another program wrote may hold long texts and nanoseconds, and lack what came later.
     #[test]
     fn a_column_is_filtered_and_read_in_one_form_whatever_form_a_file_has() {
@@ -237,7 +227,12 @@ mod tests {
         let times = TimestampNanosecondArray::from(vec![1_000_000_000, 2_000_000_000, 3_000_000_000]);
         let times: ArrayRef = Arc::new(times.with_timezone("UTC"));
         let batch = RecordBatch::try_from_iter([("tail_number", texts), ("departure_utc", times)]).unwrap();
-        let file = written(dir.path(), "a", &batch);
+        let file = dir.path().join("a");
+        let groups = WriterProperties::builder().set_max_row_group_row_count(Some(2)).build();
+        let mut writer =
+            ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), Some(groups)).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
         let schema = |names: &[&str]| only(&GapRecord::schema(), names).unwrap();
         let wanted = schema(&["departure_utc", "tail_number", "skew_se_s"]);
         let found = read_file(&file, &wanted, &[]).unwrap().remove(0);
