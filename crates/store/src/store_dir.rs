@@ -61,7 +61,10 @@ impl Store {
                 table.create()?;
             }
         }
-        store.location.sync()?;
+        if !store.location.is_bucket() {
+            let dir = store.location.dir();
+            durable_fs::sync_dir(dir).map_err(Error::io(dir, "synced"))?;
+        }
         Ok(store)
     }
 }

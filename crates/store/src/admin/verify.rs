@@ -77,16 +77,14 @@ fn first_of(mut findings: impl ExactSizeIterator<Item = Diagnostic>, problem: &s
     named
 }
 
-type FlightKey<'a> = (&'a str, i64);
-
 /// Logs with more records than are stored of their flight, and the number that is stored. A flight with several logs is
 /// left out: a later log may have replaced records of an earlier one.
 fn incomplete_logs<'a>(logs: &'a [LogRecord], keys: &[RecordKey]) -> Vec<(&'a LogRecord, i64)> {
-    let mut stored: BTreeMap<FlightKey<'_>, i64> = BTreeMap::new();
+    let mut stored: BTreeMap<(&str, i64), i64> = BTreeMap::new();
     for key in keys {
         *stored.entry((&key.tail_number, key.departure_us)).or_default() += 1;
     }
-    let mut by_flight: BTreeMap<FlightKey<'_>, Vec<&LogRecord>> = BTreeMap::new();
+    let mut by_flight: BTreeMap<(&str, i64), Vec<&LogRecord>> = BTreeMap::new();
     for log in logs {
         let Some((tail, at)) = log.tail_number.as_ref().zip(log.departure_utc) else { continue };
         by_flight.entry((tail, at.as_microsecond())).or_default().push(log);

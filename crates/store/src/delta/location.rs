@@ -101,14 +101,6 @@ impl Location {
         ))
     }
 
-    /// Makes the names of new files durable; in a bucket, they are once the write returns.
-    pub(crate) fn sync(&self) -> Result<(), Error> {
-        if self.is_bucket() {
-            return Ok(());
-        }
-        durable_fs::sync_dir(&self.dir).map_err(Error::io(&self.dir, "synced"))
-    }
-
     pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
         Ok(self.length(&self.dir.join(name))?.is_some())
     }

@@ -26,7 +26,7 @@ const ACTIONS: [&str; 10] = [
 
 #[derive(Debug)]
 pub(crate) struct LogDigests {
-    files: BTreeMap<String, PathBuf>,
+    pub(crate) files: BTreeMap<String, PathBuf>,
     digests: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -43,10 +43,6 @@ impl LogDigests {
             }
         }
         Ok(Self { files, digests })
-    }
-
-    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
-        self.files.values().map(PathBuf::as_path)
     }
 
     /// The log files that the current version is read from: the newest checkpoint and the commits after it.

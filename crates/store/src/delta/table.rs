@@ -161,7 +161,7 @@ impl Table {
     pub(crate) fn damaged_log_files(&self) -> Result<(Vec<Error>, Vec<PathBuf>), Error> {
         let log = LogDigests::list(&self.location)?;
         let (mut damaged, mut foreign) = (Vec::new(), Vec::new());
-        for file in log.files() {
+        for file in log.files.values() {
             self.location.fetch(file)?;
             damaged.extend(log.check(file).err());
             foreign.extend(log.is_foreign(file).then(|| file.to_owned()));
