@@ -49,9 +49,15 @@ impl IdentifiedParams {
             let load_n = mean_square_n2.sqrt();
             Some(found.friction.at_n(load_n)).filter(|friction_n| *friction_n > MIN_FRICTION_SHARE * load_n)
         });
+        // The channel that was recorded, the screw's own position or the relative one, carries the noise of one sensor,
+        // the other that of both.
+        let screw_m: Vec<f64> =
+            channels.dx_m.iter().zip(&channels.motor_m).map(|(dx, motor)| dx + motor).collect();
+        let [own, relative] = [&screw_m, &channels.dx_m].map(|values| white_noise(values, screw.resolution));
+        let screw_noise = own.into_iter().chain(relative).min_by(|a, b| a.rms.total_cmp(&b.rms));
         Self([
             found.map(|found| exact(found.stiffness_n_per_m)),
-            screw_noise(channels, screw.resolution).map(noise),
+            screw_noise.map(noise),
             screw.resolution.map(exact),
             white_noise(&channels.motor_m, motor.resolution).map(noise),
             motor.resolution.map(exact),
@@ -95,15 +101,6 @@ impl IdentifiedParams {
         })
         .collect()
     }
-}
-
-/// White noise of the screw channel as it was recorded: the screw's own position, or the relative one.
-fn screw_noise(channels: &ActuatorChannels, resolution: Option<f64>) -> Option<WhiteNoise> {
-    let screw_m: Vec<f64> =
-        channels.dx_m.iter().zip(&channels.motor_m).map(|(dx, motor)| dx + motor).collect();
-    // The channel that was recorded carries the noise of one sensor, the other that of both.
-    let [own, relative] = [&screw_m, &channels.dx_m].map(|values| white_noise(values, resolution));
-    own.into_iter().chain(relative).min_by(|a, b| a.rms.total_cmp(&b.rms))
 }
 
 #[cfg(test)]

@@ -35,12 +35,7 @@ fn escape(text: &str, is_hidden: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Replaces invisible characters by their code points; line feeds and tabs stay.
-///
-/// ```
-/// # use records::sanitize::escape_invisible;
-/// assert_eq!(escape_invisible("S1\u{202e}\u{1b}[2J"), "S1[U+202E][U+001B][2J");
-/// ```
+/// Replaces invisible characters by their code points, such as `[U+202E]`; line feeds and tabs stay.
 pub fn escape_invisible(text: &str) -> Cow<'_, str> {
     escape(text, is_invisible)
 }

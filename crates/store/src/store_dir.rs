@@ -45,8 +45,12 @@ impl Store {
     pub fn create_or_open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         check_name(dir)?;
-        if !object_io::is_address(dir) {
-            make_folder(dir)?;
+        if !object_io::is_address(dir) && !is_there(dir)? {
+            durable_fs::create_folder(dir).map_err(Error::io(dir, "created"))?;
+            // A bare name such as `results` has an empty parent, which is the current folder.
+            let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
+            parent
+                .map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))?;
         }
         let location = Location::at(dir)?;
         match first_entry(&location)? {
@@ -113,16 +117,6 @@ fn is_there(dir: &Path) -> Result<bool, Error> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(false),
         Err(e) => Err(Error::io(dir, "opened")(e)),
     }
-}
-
-fn make_folder(dir: &Path) -> Result<(), Error> {
-    if is_there(dir)? {
-        return Ok(());
-    }
-    durable_fs::create_folder(dir).map_err(Error::io(dir, "created"))?;
-    // A bare name such as `results` has an empty parent, which is the current folder.
-    let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
-    parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
 /// The format version, if the folder is a store of a known format. A store that lost its marker counts as one of the

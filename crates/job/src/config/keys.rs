@@ -7,7 +7,7 @@ use records::Diagnostic;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};
 
-use super::layers::Source;
+use super::layers::{Source, at_span};
 use super::limits::implausible;
 
 /// Every number of the source that no actuator, sensor, recorder or machine can have, at its key; as an error, every
@@ -42,14 +42,14 @@ impl<'s> Walk<'s> {
                 let keys = format!("its keys are {}", names.join(", "));
                 let fault = Diagnostic::new("unknown_key", format!("`{name}` is not a key of {place}"));
                 let fault = with_nearest(fault, name, names, keys);
-                self.unknown.push(self.source.at_span(key.span(), fault));
+                self.unknown.push(at_span(self.source.layers, &key.span(), fault));
                 continue;
             };
             each(value.get_ref(), &mut |value| match value {
                 DeValue::Table(table) => self.table(table, inner, &path),
                 value => {
                     let found = number(value).and_then(|number| implausible(name, number));
-                    self.implausible.extend(found.map(|c| self.source.at_span(key.span(), c)));
+                    self.implausible.extend(found.map(|c| at_span(self.source.layers, &key.span(), c)));
                 }
             });
         }

@@ -39,7 +39,7 @@ impl ConfigLayer {
 
 /// Texts and their table with spans.
 pub(super) struct Source<'t> {
-    layers: &'t [ConfigLayer],
+    pub(super) layers: &'t [ConfigLayer],
     table: Spanned<DeTable<'t>>,
 }
 
@@ -68,12 +68,7 @@ impl<'t> Source<'t> {
 
     /// Gives a diagnostic the line of a key, or of the nearest table above it that is written.
     pub(super) fn at(&self, path: &[&str], diagnostic: Diagnostic) -> Diagnostic {
-        let span = self.locate(path).unwrap_or(0..0);
-        self.at_span(span, diagnostic)
-    }
-
-    pub(super) fn at_span(&self, span: Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
-        at_span_of(self.layers, &span, diagnostic)
+        at_span(self.layers, &self.locate(path).unwrap_or(0..0), diagnostic)
     }
 
     fn locate(&self, path: &[&str]) -> Option<Range<usize>> {
@@ -156,17 +151,17 @@ pub(super) fn at_text(layers: &[ConfigLayer], value: &str, diagnostic: Diagnosti
     let quoted = [format!("\"{value}\""), format!("'{value}'")];
     let found = layers.iter().rev().find_map(|layer| quoted.iter().find_map(|text| layer.text.find(text)));
     match (found, layers.first()) {
-        (Some(start), _) => at_span_of(layers, &(start..start), diagnostic),
+        (Some(start), _) => at_span(layers, &(start..start), diagnostic),
         (None, Some(layer)) => diagnostic.in_file(&layer.file),
         (None, None) => diagnostic,
     }
 }
 
 fn from_toml(layers: &[ConfigLayer], error: &toml::de::Error) -> Diagnostic {
-    at_span_of(layers, &error.span().unwrap_or(0..0), toml_errors::diagnostic(error.message()))
+    at_span(layers, &error.span().unwrap_or(0..0), toml_errors::diagnostic(error.message()))
 }
 
-fn at_span_of(layers: &[ConfigLayer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
+pub(super) fn at_span(layers: &[ConfigLayer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
     let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return diagnostic };
     let text = &layer.text[layer.start..];
     let at = (span.start - layer.start).min(text.len());

@@ -74,11 +74,8 @@ impl Config {
     }
 
     /// Reads files, each of which overrides those before it, and checks the result, without any table that it names.
-    /// Relative paths start from the first file's folder.
-    ///
-    /// # Errors
-    /// All diagnostics at once: an unreadable file or broken TOML alone, else every unknown key, else
-    /// the first key of a wrong type, else every value that makes no sense.
+    /// Relative paths start from the first file's folder. Diagnostics come all at once: an unreadable file or broken TOML
+    /// alone, else every unknown key, else the first key of a wrong type, else every value that makes no sense.
     pub fn read_settings(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
             const OTHER: &str =
@@ -184,9 +181,8 @@ impl Config {
         self.parts.contains_key(part) && self.overrides.applies_to_part(part)
     }
 
-    /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the
-    /// method, the part and the version of the method. Limits and schedules are left out, since they move
-    /// none.
+    /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the method, the part and
+    /// the version of the method. Limits and schedules are left out, since they move none.
     pub fn digest(&self, tail: &TailNumber, part: &PartNumber) -> Arc<str> {
         self.overrides.cached(tail, Some(part), |mapping| self.digest_with(mapping, part))
     }

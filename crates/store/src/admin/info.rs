@@ -19,7 +19,6 @@ pub struct Info {
     pub tails: usize,
     pub first_departure_utc: Option<Timestamp>,
     pub last_departure_utc: Option<Timestamp>,
-    /// Logs with an account.
     pub logs: usize,
     pub failed_logs: usize,
     /// Data files of the records.

@@ -51,7 +51,16 @@ impl Store {
     pub fn runs(&self) -> Result<Vec<RunRecord>, Error> {
         let mut runs = self.newest(&self.runs, &[], |run: &RunRecord| run.run_id.clone())?;
         for run in runs.iter_mut().filter(|run| !run.has_ended()) {
-            add_up(run, &self.run_logs(&run.run_id)?);
+            let logs = self.run_logs(&run.run_id)?;
+            let with = |wanted: &[LogOutcome]| {
+                logs.iter().filter(|log| wanted.contains(&log.outcome)).count() as i64
+            };
+            run.done = with(&[LogOutcome::Done, LogOutcome::Error, LogOutcome::Unaccounted]);
+            run.errors = with(&[LogOutcome::Error]);
+            run.not_reached = with(&[LogOutcome::NotReached]);
+            let stored = || logs.iter().filter(|log| log.outcome != LogOutcome::Known);
+            run.estimated = stored().map(|log| log.estimated).sum();
+            run.refused = stored().map(|log| log.refused).sum();
         }
         runs.sort_by_key(|run| run.started_utc);
         Ok(runs)
@@ -135,14 +144,4 @@ fn count(log: &mut LogRecord, record: &GapRecord) {
         Status::Refused => log.refused += 1,
         Status::Withdrawn => {}
     }
-}
-
-fn add_up(run: &mut RunRecord, logs: &[LogRecord]) {
-    let with = |wanted: &[LogOutcome]| logs.iter().filter(|log| wanted.contains(&log.outcome)).count() as i64;
-    run.done = with(&[LogOutcome::Done, LogOutcome::Error, LogOutcome::Unaccounted]);
-    run.errors = with(&[LogOutcome::Error]);
-    run.not_reached = with(&[LogOutcome::NotReached]);
-    let stored = || logs.iter().filter(|log| log.outcome != LogOutcome::Known);
-    run.estimated = stored().map(|log| log.estimated).sum();
-    run.refused = stored().map(|log| log.refused).sum();
 }

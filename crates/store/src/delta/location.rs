@@ -120,13 +120,6 @@ impl Location {
         }
     }
 
-    /// Why a local folder cannot be read; `None` when it can, and in a bucket.
-    pub(crate) fn unreadable(&self, name: &str) -> Option<Error> {
-        let path = self.dir.join(name);
-        let error = (!self.is_bucket()).then(|| std::fs::read_dir(&path).err()).flatten()?;
-        (error.kind() != std::io::ErrorKind::NotFound).then(|| Error::io(path, "read")(error))
-    }
-
     pub(crate) fn read(&self, name: &str) -> Result<String, Error> {
         let path = self.dir.join(name);
         self.fetch(&path)?;

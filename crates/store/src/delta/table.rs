@@ -139,8 +139,13 @@ impl Table {
             Ok(delta)
         };
         let loaded = self.location.block_on(load);
-        if let (Err(_), Some(cause)) = (&loaded, self.location.unreadable(LOG)) {
-            return Err(cause);
+        let log = self.location.dir().join(LOG);
+        if loaded.is_err()
+            && !self.location.is_bucket()
+            && let Err(cause) = std::fs::read_dir(&log)
+            && cause.kind() != std::io::ErrorKind::NotFound
+        {
+            return Err(Error::io(log, "read")(cause));
         }
         // A damaged file is named before the library's own error about it.
         self.check_log()?;
@@ -415,18 +420,16 @@ mod tests {
         assert_eq!(rows(&table), 3);
     }
 
-    /// Files in the table's log: names, sizes and statistics, in order.
-    fn listed_files(snapshot: &Snapshot) -> Vec<String> {
-        let file = |file: &DataFile| format!("{:?} {} {:?}", file.path, file.size_bytes, file.stats);
-        snapshot.files.iter().map(file).collect()
-    }
-
     #[test]
     fn the_cached_snapshot_equals_the_log_after_every_commit_of_two_writers() {
         let dir = tempfile::tempdir().unwrap();
         let location = Location::at(dir.path()).unwrap();
         let opened = || Table::new(&location, "numbers", schema());
         let (own, other) = (table(dir.path()), opened());
+        let listed_files = |snapshot: &Snapshot| -> Vec<String> {
+            let files = snapshot.files.iter();
+            files.map(|file| format!("{:?} {} {:?}", file.path, file.size_bytes, file.stats)).collect()
+        };
         // Past two checkpoints, with files that come and go.
         for n in 1..=45 {
             append(if n % 2 == 0 { &own } else { &other }, n);

@@ -68,8 +68,7 @@ fn until_us(time: Timestamp) -> i64 {
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
     ///
-    /// Files whose bounds rule them out are not opened; those that are opened are compared with their
-    /// digests first.
+    /// Files whose bounds rule them out are not opened; those that are opened are compared with their digests first.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
         let rows = self.select(&self.gaps.snapshot()?, query, &GapRecord::schema()).read_all()?;
         frame::sorted(&rows, &RecordKey::COLUMNS, query.last)

@@ -131,20 +131,3 @@ fn only_files_that_hold_the_unit_or_the_day_are_opened_also_after_a_checkpoint()
     assert_eq!(store.records(&day).unwrap().len(), POSITIONS.len());
     assert!(store.records(&Query::default()).is_err());
 }
-
-#[test]
-fn a_number_that_is_not_finite_is_stored_as_missing() {
-    let (_dir, mut writer) = fresh();
-    let mut overflowed = result(0, 0, 1e-5);
-    overflowed.records[0].estimate.nis = Some(f64::INFINITY);
-    overflowed.records[1].estimate.nis = Some(f64::NAN);
-    writer.commit(&[overflowed, result(1, 0, 1e-5)]).unwrap();
-    let records = writer.store().records(&Query::default()).unwrap();
-    assert_eq!(records.len(), 2 * POSITIONS.len());
-    let sound = result(1, 0, 1e-5).records[0].estimate.nis;
-    assert!(records.iter().all(|record| record.estimate.nis.is_none() || record.estimate.nis == sound));
-    let scan = writer.store().scan_columns(&Query::default(), &["nis"]).unwrap();
-    for batch in (0..scan.file_count()).flat_map(|part| scan.read(part).unwrap()) {
-        assert!(batch.column(0).as_primitive::<Float64Type>().iter().flatten().all(f64::is_finite));
-    }
-}

@@ -135,3 +135,10 @@ fn a_batch_that_holds_no_records_is_an_error_that_names_the_column() {
         assert!(error.starts_with(expected), "{error}");
     }
 }
+
+#[test]
+fn a_number_that_is_not_finite_is_stored_as_missing() {
+    let of_nis = |nis| GapEstimate { nis: Some(nis), ..GapEstimate::default() };
+    let batch = to_batch(&[f64::INFINITY, f64::NAN, 1.0].map(of_nis)).unwrap();
+    assert_eq!(batch.column_by_name("nis").unwrap().null_count(), 2);
+}
