@@ -23,6 +23,9 @@ const MISSING_SHARE: f64 = 0.005;
 ///
 /// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is rejected. The results
 /// of the contact regression are there under [`Method::Contact`] only: no other method runs it.
+///
+/// # Errors
+/// A diagnostic when the settings of the part do not fit the step of the log.
 pub fn estimate(
     channels: &ActuatorChannels,
     part: &Part,
@@ -74,6 +77,9 @@ pub fn estimate(
 }
 
 /// Result of the contact regression, or the code of the rejection before or by it, without the published statistic.
+///
+/// # Errors
+/// As [`estimate`].
 pub fn contact_regression(
     channels: &ActuatorChannels,
     part: &Part,
@@ -104,6 +110,9 @@ thread_local! {
 }
 
 /// The filter of a part at the step of a log.
+///
+/// # Errors
+/// A diagnostic when a noise level or the step cannot be.
 pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagnostic> {
     if contact::is_too_slow(channels.step_s) {
         let rate_hz = channels.step_s.recip();
@@ -116,6 +125,9 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
 }
 
 /// S(t) of a log, m, NaN outside the segments, and the published statistic of it, where it moves.
+///
+/// # Errors
+/// As [`filter`], and when the channels are no input of it.
 pub fn filter_output(
     channels: &ActuatorChannels,
     part: &Part,
@@ -128,6 +140,9 @@ pub fn filter_output(
 }
 
 /// Plot data of the contact regression; `None` where it rejects the flight.
+///
+/// # Errors
+/// A diagnostic when the settings of the part cannot be.
 pub fn plot_data(channels: &ActuatorChannels, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
     contact::plot_data(&samples(channels), &prior(channels, part))
         .map_err(|e| Diagnostic::new("estimate_failed", e))

@@ -49,6 +49,9 @@ pub struct FlightLog<'c> {
 
 impl<'c> FlightLog<'c> {
     /// Opens a log; `display_name` is its name in records and diagnostics.
+    ///
+    /// # Errors
+    /// A diagnostic when the log cannot be read or identified.
     pub fn open(
         files: &LogFiles,
         display_name: &str,
@@ -71,6 +74,9 @@ impl<'c> FlightLog<'c> {
     }
 
     /// Whether every page that is read carries a checksum.
+    ///
+    /// # Errors
+    /// A diagnostic when a page header cannot be read.
     pub fn is_checked(&self) -> Result<bool, Diagnostic> {
         let checked = self.log.has_page_checksums(&used(&self.all));
         checked.map_err(|e| e.diagnostic().in_file(&self.display_name))
@@ -91,6 +97,9 @@ impl<'c> FlightLog<'c> {
     }
 
     /// The actuator in a position that the log had when its records were stored.
+    ///
+    /// # Errors
+    /// A diagnostic when the log has no such position any more.
     pub fn actuator_at(&self, position: &str) -> Result<&Actuator, Diagnostic> {
         self.all.iter().find(|at| at.columns.position.as_str() == position).ok_or_else(|| {
             Diagnostic::new("no_position", format!("the log has no position {position} any more"))
@@ -127,6 +136,9 @@ impl<'c> FlightLog<'c> {
     }
 
     /// The unit that sat in a position that day, and the settings of its part.
+    ///
+    /// # Errors
+    /// A diagnostic when no unit is installed there, or the part is not configured.
     pub fn unit(&self, at: &Actuator) -> Result<(&'c Installation, &'c Part), Diagnostic> {
         let (flight, position) = (&self.identity.flight, &at.columns.position);
         let installation = self
@@ -138,6 +150,9 @@ impl<'c> FlightLog<'c> {
 
     /// Estimates one actuator as a given part, regardless of the installations table. Its channels are returned, too,
     /// unless the log lacks one of them.
+    ///
+    /// # Errors
+    /// A diagnostic when its channels cannot be read.
     pub fn estimate(
         &self,
         at: &Actuator,
@@ -151,6 +166,9 @@ impl<'c> FlightLog<'c> {
     }
 
     /// Reads the channels of one actuator of a given part.
+    ///
+    /// # Errors
+    /// A diagnostic when they cannot be read.
     pub fn channels(&self, at: &Actuator, part: &Part) -> Result<ActuatorChannels, Diagnostic> {
         let read = self.log.read_actuator(&at.columns, &at.mapping.channels, part.geometry);
         read.map_err(|e| e.diagnostic().in_file(&self.display_name))
@@ -162,6 +180,9 @@ fn used(all: &[Actuator]) -> Vec<(&Channels, &ActuatorColumns)> {
 }
 
 /// Passes the channels of every actuator of a log to `take`, all as those of one part. The log needs no identity.
+///
+/// # Errors
+/// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.
 pub fn read_as_part(
     files: &LogFiles,
     display_name: &str,
@@ -190,6 +211,9 @@ pub fn read_as_part(
 }
 
 /// The settings of a part number.
+///
+/// # Errors
+/// A diagnostic when the configuration does not know it.
 pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Diagnostic> {
     config.parts.get(number).ok_or_else(|| {
         let near = nearest(number.as_str(), config.parts.keys().map(PartNumber::as_str));
@@ -274,6 +298,9 @@ pub fn digest_without_identity(config: &Config, installations: &Installations) -
 }
 
 /// The paths of the flights in a file: its own, unless its rows name their flight.
+///
+/// # Errors
+/// A diagnostic when the file cannot be read.
 pub fn flights_in(
     path: &Path,
     display_name: &str,
@@ -286,6 +313,9 @@ pub fn flights_in(
 
 /// Which flight a log or a file of a group is of, and of which actuator where it holds but one, without reading its
 /// channels.
+///
+/// # Errors
+/// A diagnostic when the file cannot be read, put on one clock or identified.
 pub fn identify(
     files: &LogFiles,
     group: Option<&str>,

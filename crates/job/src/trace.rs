@@ -38,6 +38,9 @@ impl Trace {
     }
 
     /// Puts the samples of an actuator of a log behind those that are there.
+    ///
+    /// # Errors
+    /// A diagnostic when the settings of the part do not fit the step of the log.
     pub fn add(&mut self, log: &str, channels: &ActuatorChannels, part: &Part) -> Result<(), Diagnostic> {
         let count = channels.dx_m.len();
         let (log, position) = (vec![log.to_owned(); count], vec![channels.position.to_string(); count]);

@@ -63,6 +63,9 @@ impl Address {
     }
 
     /// As [`Address::parse`], for a path that must be an address.
+    ///
+    /// # Errors
+    /// [`Error::Address`] when it is not an address or names no bucket.
     pub fn parse_required(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::parse(path)?.ok_or_else(|| Error::no_scheme(path.display().to_string()))
@@ -74,6 +77,9 @@ impl Address {
     }
 
     /// The key as an `object_store` path.
+    ///
+    /// # Errors
+    /// [`Error::Address`] for a key with `//`, `.` or `..` as a folder.
     pub fn location(&self) -> Result<object_store::path::Path, Error> {
         object_store::path::Path::parse(&self.key)
             .map_err(|e| Error::Address { text: self.to_string(), detail: e.to_string() })

@@ -15,11 +15,17 @@ use crate::error::Error;
 static CLIENTS: LazyLock<Mutex<HashMap<(Scheme, String), Client>>> = LazyLock::new(Mutex::default);
 
 /// Runs a future to completion on the shared runtime; the caller's thread blocks.
+///
+/// # Errors
+/// [`Error::Settings`] when the system gives no threads.
 pub fn block_on<F: Future>(work: F) -> Result<F::Output, Error> {
     Ok(handle()?.block_on(work))
 }
 
 /// Handle of the shared runtime, for other asynchronous work: connections live as long as the runtime.
+///
+/// # Errors
+/// [`Error::Settings`] when the system gives no threads.
 pub fn handle() -> Result<Handle, Error> {
     static RUNTIME: OnceLock<Result<Runtime, String>> = OnceLock::new();
     let started =
@@ -44,6 +50,9 @@ impl Address {
     }
 
     /// Asks the bucket about the object of this address.
+    ///
+    /// # Errors
+    /// As [`Address::client`] and [`Address::location`]; the error of the request.
     pub async fn request<T>(
         &self,
         question: impl AsyncFnOnce(&Client, &Path) -> object_store::Result<T>,

@@ -44,6 +44,9 @@ pub fn list(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> R
 }
 
 /// Metadata of one object.
+///
+/// # Errors
+/// [`Error::Missing`] when the object does not exist, else the error of the request.
 pub fn head(address: &Address) -> Result<ListEntry, Error> {
     let meta = block_on(address.request(async |client, location| client.head(location).await))??;
     Ok(ListEntry::of(address, meta))

@@ -30,6 +30,10 @@ pub struct ObjectFile {
 
 impl ObjectFile {
     /// Opens the object; no content is fetched yet.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::Denied`], [`Error::Unreachable`]; [`Error::Spool`] when the
+    /// temporary file cannot be created.
     pub fn open(address: &Address) -> Result<Self, Error> {
         let meta = block_on(address.request(async |client, location| client.head(location).await))??;
         let file = tempfile::tempfile().map_err(|e| spool_error(address, e))?;

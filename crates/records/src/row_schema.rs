@@ -89,6 +89,9 @@ pub trait Cells: Sized {
 /// A type of field that is also read.
 pub trait FromCells: Cells {
     /// Reads the next cell, or the next cells of a nested row.
+    ///
+    /// # Errors
+    /// [`RowError::Value`] when a cell is empty where a value is required, or out of range.
     fn read(cells: &mut CellReader<'_>) -> Result<Self, RowError>;
 }
 
@@ -200,6 +203,9 @@ pub fn schema<R: Row>() -> SchemaRef {
 
 /// Rows as columns. Times are cut to whole microseconds; a number that is not finite is missing, where it may be, and every
 /// other keeps its bits.
+///
+/// # Errors
+/// [`RowError::Arrow`] when there are more rows than a batch can hold.
 pub fn to_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
     let declared = R::columns("", "");
     let mut arrays: Vec<(usize, ArrayRef)> = declared

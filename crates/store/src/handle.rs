@@ -86,6 +86,9 @@ impl Store {
     /// Verifies the digest of a data file, once per store handle and its clones.
     ///
     /// Neither Delta Lake nor Polars detects a changed byte of a data file.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] when it differs.
     pub(crate) fn check(&self, file: &Path) -> Result<(), Error> {
         let verified = || self.verified.lock().unwrap_or_else(PoisonError::into_inner);
         // The mutex is not held during the check, so that threads verify different files in parallel.

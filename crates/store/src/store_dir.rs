@@ -42,6 +42,9 @@ impl Store {
     }
 
     /// Opens a store; creates it if the folder is missing or empty.
+    ///
+    /// # Errors
+    /// As [`Store::open`], except that a missing store is created; [`Error::Io`] when it cannot be.
     pub fn create_or_open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         check_name(dir)?;

@@ -59,6 +59,9 @@ impl Config {
     }
 
     /// Reads the configuration as [`Config::read_settings`], and the flights table that it names.
+    ///
+    /// # Errors
+    /// As [`Config::read_settings`], and the faults of the table.
     pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let mut config = Self::read_settings(files)?;
         // Before the first table is read: it may lie in an object store.
@@ -108,6 +111,9 @@ impl Config {
     }
 
     /// Reads and checks the text of a configuration whose relative paths start from `folder`.
+    ///
+    /// # Errors
+    /// As [`Config::read_settings`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let file_name = file.display().to_string();
         Self::from_layers(ConfigLayer::stack([(file_name, text.to_owned())]), file, folder)

@@ -10,6 +10,9 @@ use crate::write::writer::{self, Writer};
 
 impl Store {
     /// The newest row of every alert and channel, by time, unit and channel; none of a store without alerts.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn alerts(&self) -> Result<Vec<AlertRecord>, Error> {
         let mut alerts =
             self.rows(&self.alerts, |alert: &AlertRecord| format!("{} {}", alert.alert_id, alert.channel))?;
@@ -23,6 +26,9 @@ impl Store {
     }
 
     /// Every event of every work request, earliest first.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn work_events(&self) -> Result<Vec<WorkEvent>, Error> {
         // Two commands on a bucket, which has no lock, may have chosen the same number.
         let name = |event: &WorkEvent| {
@@ -32,6 +38,9 @@ impl Store {
     }
 
     /// The newest state of every unit; none before the first run that ended.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn states(&self) -> Result<Vec<UnitState>, Error> {
         self.rows(&self.states, |state: &UnitState| {
             format!("{} {}", state.part_number.as_deref().unwrap_or_default(), state.serial_number)
@@ -45,16 +54,25 @@ impl Store {
 
 impl Writer {
     /// Writes rows of alerts; each takes the place of the row with the same identifier and channel.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn write_alerts(&mut self, alerts: &[AlertRecord]) -> Result<(), Error> {
         append(&self.store().alerts, alerts)
     }
 
     /// Writes states of units; each takes the place of the unit's earlier one.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn write_states(&mut self, states: &[UnitState]) -> Result<(), Error> {
         append(&self.store().states, states)
     }
 
     /// Adds events of work requests, in one commit.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn add_work_events(&mut self, events: &[WorkEvent]) -> Result<(), Error> {
         append(&self.store().work, events)
     }

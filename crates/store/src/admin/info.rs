@@ -35,6 +35,9 @@ pub struct Info {
 
 impl Store {
     /// Figures about the newest version of the store.
+    ///
+    /// # Errors
+    /// As [`Store::scan`].
     pub fn info(&self) -> Result<Info, Error> {
         let snapshot = self.gaps.snapshot()?;
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];

@@ -22,6 +22,9 @@ const SILENT: SignedDuration = SignedDuration::from_hours(1);
 
 impl Store {
     /// What became of each log of a run, by name.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogRecord>, Error> {
         let of_run = Condition::texts("run_id", run_id, run_id);
         let logs = self.newest(&self.logs, &[of_run], |account: &LogRecord| account.log_path.clone())?;
@@ -48,6 +51,9 @@ impl Store {
     /// The newest account of every run, by the time it began.
     ///
     /// The figures of a run that has not ended are those of its logs.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn runs(&self) -> Result<Vec<RunRecord>, Error> {
         let mut runs = self.newest(&self.runs, &[], |run: &RunRecord| run.run_id.clone())?;
         for run in runs.iter_mut().filter(|run| !run.has_ended()) {
@@ -68,6 +74,9 @@ impl Store {
 
     /// Digest of the tables that the latest run wrote into all records; `None` if this run has not ended. The latest run is
     /// that whose row was committed last: a clock may go back.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn tables_digest(&self) -> Result<Option<String>, Error> {
         // Under one name, the newest row of all.
         let latest = self.newest(&self.runs, &[], |_: &RunRecord| String::new())?.pop();
@@ -75,6 +84,9 @@ impl Store {
     }
 
     /// Whether a run holds the store now; in a bucket, whether a run without an end sent a heartbeat recently.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the lock cannot be read.
     pub fn is_held(&self) -> Result<bool, Error> {
         match self.lock_file() {
             Some(file) => Lock::is_held(&file),
@@ -95,18 +107,27 @@ impl Store {
 
 impl Writer {
     /// Writes down that a run begins, and the logs it means to do, each *not reached* as yet.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn begin_run(&mut self, run: &RunRecord, logs: &[LogRecord]) -> Result<(), Error> {
         writer::account(&self.store().logs, logs)?;
         writer::account(&self.store().runs, slice::from_ref(run))
     }
 
     /// Writes down how a run ended.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn end_run(&mut self, run: &RunRecord) -> Result<(), Error> {
         writer::account(&self.store().runs, slice::from_ref(run))
     }
 
     /// Finishes the accounts of runs that were killed: who writes holds the lock, so none of them lives. In a
     /// bucket, where there is none, runs that gave a sign of life within the hour are left to themselves.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
     pub fn close_killed_runs(&mut self) -> Result<Vec<RunRecord>, Error> {
         let runs = self.store().runs()?;
         let is_killed = |run: &RunRecord| !run.has_ended() && !self.store().may_live(run);

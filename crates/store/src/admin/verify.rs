@@ -56,6 +56,9 @@ impl Store {
 
 impl Writer {
     /// Gives the commits of other programs the digests that Freeplay's own have: they were meant. Returns their number.
+    ///
+    /// # Errors
+    /// When a log cannot be listed or read, or a digest cannot be written.
     pub fn accept_foreign(&mut self) -> Result<usize, Error> {
         let mut accepted = 0;
         for table in self.store().existing_tables() {

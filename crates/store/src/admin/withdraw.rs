@@ -32,6 +32,9 @@ impl Writer {
     /// Withdraws the matching records, or brings withdrawn ones back, in one commit.
     ///
     /// A query selects by tail, flight, position and departure, and `log_path` the records of one log.
+    ///
+    /// # Errors
+    /// As [`Writer::rewrite`].
     pub fn withdraw(
         &mut self,
         query: &Query,

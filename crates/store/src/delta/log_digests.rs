@@ -65,6 +65,9 @@ impl LogDigests {
     }
 
     /// Compares a log file with its digests, and checks that its actions are those of the protocol.
+    ///
+    /// # Errors
+    /// [`Error::LogDamaged`] when they differ; [`Error::Io`] when the file cannot be read.
     pub(crate) fn check(&self, file: &Path) -> Result<(), Error> {
         let content = std::fs::read(file).map_err(Error::io(file, "read"))?;
         let digest = blake3::hash(&content).to_hex();

@@ -43,6 +43,9 @@ pub struct ColumnScan {
 
 impl Store {
     /// Some columns of the matching records, file by file. `query.last` has no effect, since a scan has no order.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
     pub fn scan_columns(&self, query: &Query, names: &[&str]) -> Result<ColumnScan, Error> {
         Ok(self.select(&self.gaps.snapshot()?, query, &scan::only(&GapRecord::schema(), names)?))
     }
@@ -75,6 +78,9 @@ impl Store {
 
 impl ColumnScan {
     /// Other columns of the same rows, in the same order.
+    ///
+    /// # Errors
+    /// For a name that no column has.
     pub fn with_columns(&self, names: &[&str]) -> Result<Self, Error> {
         let mut scan = Self { wanted: scan::only(&GapRecord::schema(), names)?, ..self.clone() };
         if self.joined.is_empty() && !BOOKED.iter().any(|name| names.contains(name)) {

@@ -69,17 +69,27 @@ impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
     ///
     /// Files whose bounds rule them out are not opened; those that are opened are compared with their digests first.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that was committed,
+    /// [`Error::Parquet`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
         let rows = self.select(&self.gaps.snapshot()?, query, &GapRecord::schema()).read_all()?;
         frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 
     /// The records that fit as rows, in the order of [`Store::scan`].
+    ///
+    /// # Errors
+    /// As [`Store::scan`]; [`Error::Row`] when a cell is not valid in its column.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         Ok(from_batch(&self.scan(query)?)?)
     }
 
     /// The different values of a column of texts, in order.
+    ///
+    /// # Errors
+    /// As [`Store::records`]; [`Error::Frame`] when there is no such column.
     pub fn distinct(&self, column: &str) -> Result<BTreeSet<String>, Error> {
         let schema = scan::only(&GapRecord::schema(), &[column])?;
         let rows = self.select(&self.gaps.snapshot()?, &Query::default(), &schema).read_all()?;
@@ -88,6 +98,9 @@ impl Store {
     }
 
     /// The newest account of every log, by name.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn accounts(&self) -> Result<Vec<LogRecord>, Error> {
         // In the order of their words: `done`, `error` and `known` settle a log, `not_reached` and `unaccounted` do not.
         let settled = Condition::texts("outcome", LogOutcome::Done.as_str(), LogOutcome::Known.as_str());
@@ -99,6 +112,9 @@ impl Store {
     ///
     /// A listing of the folder would find superseded files too. A table has one file at least; a table that does not exist has
     /// none.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read.
     pub fn table_files(&self, name: &str) -> Result<Vec<PathBuf>, Error> {
         let Some(table) = self.existing_tables().into_iter().find(|table| table.name == name) else {
             return Ok(Vec::new());

@@ -85,6 +85,9 @@ pub(crate) fn matches(batch: &RecordBatch, conditions: &[Condition]) -> Result<B
 
 impl Store {
     /// The wanted columns of a file's matching rows, once the file's digest is verified.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] when the file is not the one that was committed, and as [`read_file`].
     pub(crate) fn read_file(
         &self,
         path: &Path,
@@ -136,6 +139,10 @@ pub(crate) fn read_each(
 }
 
 /// The wanted columns of a file's matching rows.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Parquet`] and [`Error::Arrow`] when the file cannot be read, or lacks a column that is never
+/// empty.
 pub(crate) fn read_file(
     path: &Path,
     schema: &SchemaRef,

@@ -38,6 +38,9 @@ const MANY_FILES: usize = 100;
 
 impl Store {
     /// Whether compaction pays: a table has over a hundred files more than twice the number that its rows fill.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when a table's log cannot be read.
     pub fn needs_compaction(&self) -> Result<bool, Error> {
         for table in self.existing_tables() {
             let snapshot = table.snapshot()?;
@@ -70,6 +73,9 @@ impl Writer {
     }
 
     /// Deletes data files that were superseded, or written and never committed, longer ago than given.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when a file cannot be deleted, [`Error::Table`] when the log cannot be read.
     pub fn vacuum(&mut self, kept: Duration) -> Result<usize, Error> {
         let tables = self.store().existing_tables();
         tables.iter().map(|table| table.vacuum(kept)).sum()

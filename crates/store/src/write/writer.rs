@@ -136,6 +136,9 @@ impl Writer {
     }
 
     /// The stored records of some keys; withdrawn ones are left out.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
         self.held_where(&[not_withdrawn()], |stats| may_hold_any(stats, keys), |key| keys.contains(key))
     }
@@ -176,6 +179,9 @@ impl Writer {
 
     /// Rewrites those data files whose rows a function changes, in one commit, and returns the number of changed rows.
     /// The function sees some columns of the stored records, in this order, and returns them with as many rows.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`], and what the function fails with.
     pub fn rewrite(
         &mut self,
         columns: &[&str],
