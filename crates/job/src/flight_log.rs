@@ -109,6 +109,9 @@ impl<'c> FlightLog<'c> {
 
     /// Estimates one actuator of the log; `of_run` is the provenance of the records of a run, but for the log. Its error
     /// says nothing of the others of the log.
+    ///
+    /// # Errors
+    /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
     pub fn record(&self, at: &Actuator, of_run: &Provenance) -> Result<GapRecord, Diagnostic> {
         let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
         let (installation, part) = self.unit(at).map_err(in_file)?;
@@ -431,6 +434,9 @@ pub fn pieces_undeclared(
 }
 
 /// Runs work on one log; a panic becomes a diagnostic of code `panic`, with its message and location.
+///
+/// # Errors
+/// The error of the work, or code `panic`.
 pub fn catch_panic<T>(
     display_name: &str,
     work: impl FnOnce() -> Result<T, Diagnostic>,

@@ -38,6 +38,9 @@ pub struct Address {
 
 impl Address {
     /// Parses an address; `None` when the path is not one. A misspelled scheme is an error, as is a missing bucket.
+    ///
+    /// # Errors
+    /// [`Error::Address`] when it names no bucket, or its scheme is misspelled or unknown.
     pub fn parse(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
         let scheme = Scheme::VARIANTS

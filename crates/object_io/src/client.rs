@@ -38,6 +38,10 @@ pub fn handle() -> Result<Handle, Error> {
 
 impl Address {
     /// The client of the address's bucket; [`Error::NotBuilt`] without the feature `cloud`.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] when credentials, region or endpoint are wrong or missing; [`Error::NotBuilt`] without the
+    /// feature `cloud`.
     pub fn client(&self) -> Result<Client, Error> {
         let mut clients = CLIENTS.lock().unwrap_or_else(PoisonError::into_inner);
         let name = (self.scheme, self.bucket.clone());

@@ -14,6 +14,9 @@ pub enum Posted {
 }
 
 /// Checks an address of HTTP. The message of an error omits the address, which may hold a secret.
+///
+/// # Errors
+/// If it is not one; the message omits the address, which may hold a secret.
 pub fn check_url(text: &str) -> Result<(), String> {
     parse(text).map(drop)
 }

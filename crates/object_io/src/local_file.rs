@@ -6,6 +6,9 @@ use std::path::Path;
 
 /// Creates a file, and replaces one that an earlier process left. A link of that name is replaced, not followed. Another
 /// process that creates the file at the same time makes it fail.
+///
+/// # Errors
+/// If an old file cannot be removed, or another process creates the file at the same time.
 pub fn create_fresh(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

@@ -48,6 +48,10 @@ impl ObjectFile {
 
     /// Fetches the ranges that are not in the file yet; ranges are clipped to the object's length. An object that is no
     /// longer the one that was opened is [`Error::Changed`].
+    ///
+    /// # Errors
+    /// [`Error::Changed`] when the object is no longer the one that was opened, [`Error::Unreachable`] when no
+    /// complete response came in time, [`Error::Spool`] when the disk is full.
     pub fn ensure_range(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Error> {
         let clip = |range: Range<u64>| range.start.min(self.meta.size)..range.end.min(self.meta.size);
         let wanted: Vec<Range<u64>> =

@@ -21,6 +21,9 @@ macro_rules! identifiers {
 
         impl $name {
             /// Creates the identifier from text without the white space around it; it has 1 to 256 bytes.
+            ///
+            /// # Errors
+            /// [`IdError`] when the text is blank or longer than 256 bytes.
             pub fn new(text: impl AsRef<str>) -> Result<Self, IdError> {
                 let text = text.as_ref().trim();
                 match text.len() {

@@ -72,6 +72,9 @@ pub struct Installations {
 
 impl Installations {
     /// Builds the table from rows in any order; an error has every contradiction between them, in row order.
+    ///
+    /// # Errors
+    /// Every contradiction, in row order: see [`Error`].
     pub fn new(mut rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
         let reversed = |(row, Installation { serial_number, installed_utc, removed_utc, .. }): (
             usize,

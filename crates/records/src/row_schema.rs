@@ -218,6 +218,9 @@ pub fn to_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
 }
 
 /// As [`to_batch`], with every column nullable: the schema of tables for users.
+///
+/// # Errors
+/// As [`to_batch`].
 pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
     let batch = to_batch(rows)?;
     let fields = batch.schema_ref().fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
@@ -225,6 +228,10 @@ pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
     Ok(batch.with_schema(schema)?)
 }
 /// Columns as rows; other columns are ignored.
+///
+/// # Errors
+/// [`RowError::Column`] when a column is missing or has another type; [`RowError::Value`] when a cell is out of range,
+/// or empty where a value is required.
 pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, RowError> {
     let columns = R::columns("", "");
     let arrays = columns.iter().map(|column| typed(batch, column)).collect::<Result<Vec<_>, _>>()?;

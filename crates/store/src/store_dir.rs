@@ -21,6 +21,10 @@ pub(crate) const MARKER: &str = "store.json";
 
 impl Store {
     /// Opens a store for reading; where there is none, the error is [`Error::Missing`].
+    ///
+    /// # Errors
+    /// [`Error::Missing`] when there is no store, [`Error::Foreign`] when the folder holds other files,
+    /// [`Error::Format`] when a newer release wrote it.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         let missing = || Error::Missing { dir: dir.to_owned() };

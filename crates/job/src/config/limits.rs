@@ -99,6 +99,9 @@ pub(super) fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
 pub const PLAUSIBLE_LIMIT_M: (f64, f64) = (1e-6, 0.01);
 
 /// A limit that an aircraft may be grounded by, m; an error, in words, if it was probably meant in another unit.
+///
+/// # Errors
+/// In words, when it is so small or so large that it was meant in another unit.
 pub fn plausible_limit_m(limit_m: f64) -> Result<f64, String> {
     if (PLAUSIBLE_LIMIT_M.0..=PLAUSIBLE_LIMIT_M.1).contains(&limit_m) {
         Ok(limit_m)

@@ -293,7 +293,10 @@ impl Table {
 
 /// Data files of the current version of a Delta table of another program, by its log: files that were withdrawn or compacted away may
 /// still be in its folder. Each has its path below the folder, with `/` between folders, and whether a deletion vector marks
-/// some of its rows as deleted. A log that maps columns to other names in the files is an error.
+/// some of its rows as deleted.
+///
+/// # Errors
+/// When the log cannot be read, or maps columns to other names in the files.
 pub fn live_files(folder: &Path) -> Result<BTreeMap<String, bool>, Error> {
     let location = Location::at(folder)?;
     let load = async {

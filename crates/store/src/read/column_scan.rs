@@ -102,6 +102,10 @@ impl ColumnScan {
     }
 
     /// The matching rows of one file, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
+    /// [`Error::Arrow`] when it cannot be read.
     pub fn read(&self, part: usize) -> Result<Vec<RecordBatch>, Error> {
         self.read_file(&self.files[part])
     }

@@ -59,6 +59,9 @@ impl Writer {
     ///
     /// Rows do not change. Memory holds the rows of five files, or of five tails where these have more. An error leaves the
     /// tables as they were.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`]; the tables are unchanged then.
     pub fn compact(&mut self) -> Result<Compaction, Error> {
         let store = self.store();
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };

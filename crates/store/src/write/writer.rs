@@ -103,6 +103,9 @@ impl Store {
     /// Locks the store for writing; waits at most `wait` for another writer.
     ///
     /// A bucket has no lock: a commit that another one preceded is rejected there, and planned again.
+    ///
+    /// # Errors
+    /// [`Error::Held`] names the holder; [`Error::Io`] when the folder cannot be written.
     pub fn lock(&self, wait: Option<Duration>) -> Result<Writer, Error> {
         let lock = self.lock_file().map(|file| Lock::take(&file, wait)).transpose()?;
         if check_marker(&self.location, MARKER)? < FORMAT {
@@ -125,6 +128,10 @@ impl Writer {
     /// dies in between has stored whole flights without accounts: its logs are run again, and supersede
     /// their own records. Superseding copies those files only that hold a superseded record. An error leaves what was
     /// stored before as it was.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Table`] when the disk refuses, [`Error::Damaged`] when a file to be
+    /// copied is not the one that was committed. What was stored before is intact.
     pub fn commit(&mut self, results: &[LogResult]) -> Result<(), Error> {
         let decisions = decisions(results);
         if !decisions.is_empty() {
