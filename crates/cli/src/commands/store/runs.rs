@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use jiff::Timestamp;
 use records::Status;
 use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
 
@@ -58,7 +59,10 @@ pub(crate) fn runs(
     match one {
         None => all(store, &runs[runs.len().saturating_sub(last)..], format, output),
         Some(id) => {
-            let found = if id == "last" { runs.last() } else { runs.iter().find(|run| run.run_id == id) };
+            // A run under a wrong clock, dated ahead, is not the last one.
+            let now = Timestamp::now();
+            let begun = || runs.iter().rfind(|run| run.started_utc <= now).or(runs.last());
+            let found = if id == "last" { begun() } else { runs.iter().find(|run| run.run_id == id) };
             let unknown = || {
                 let what = format!("no run `{id}` in the store");
                 Failure::usage("no_such_run", what, "`freeplay store runs` lists them; `last` is the newest")
