@@ -8,7 +8,7 @@
 //!
 //! A log that fails, or lost a position, takes nothing away: its last good records stay.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use job::Config;
@@ -378,8 +378,10 @@ impl<'a> OwnershipLedger<'a> {
 
     /// Takes back the stored gaps of logs that are gone whose samples this run has stored under another departure or tail: their
     /// log was delivered again with another identity. Its digest differs with its metadata; its estimates are equal to the bit.
+    /// A log that comes back as it was is processed again.
     pub(crate) fn moved_samples(&self, writer: &Writer) -> Result<Vec<LogResult>, Error> {
-        let gone: HashSet<&String> = self.plan.gone.values().flatten().map(|log| &log.log_path).collect();
+        let gone = self.plan.gone.values().flatten().map(|log| (&log.log_path, log));
+        let gone: HashMap<&String, &LogRecord> = gone.collect();
         let departures = || self.own.keys().map(|key| key.departure_us);
         let (Some(first_us), Some(last_us), false) =
             (departures().min(), departures().max(), gone.is_empty())
@@ -389,17 +391,20 @@ impl<'a> OwnershipLedger<'a> {
         let before = writer.held_between(first_us - MOST_CORRECTED_US, last_us + MOST_CORRECTED_US)?;
         let own = self.own.values().map(|own| &own.held).filter(|held| held.is_estimated());
         let own: HashMap<_, &HeldRecord> = own.map(|held| (held.samples_key(), held)).collect();
-        let mut moved = BTreeMap::<&str, Vec<(RecordKey, String)>>::new();
-        for (key, stored) in &before {
-            let is_gone = gone.contains(&stored.log_path) && !self.own.contains_key(key);
-            if let Some(own) = own.get(&stored.samples_key()).filter(|_| is_gone) {
-                moved.entry(&own.log_path).or_default().push((key.clone(), stored.log_digest.clone()));
-            }
+        let mut moved = BTreeMap::<&String, LogResult>::new();
+        for (key, stored) in before.into_iter().filter(|(key, _)| !self.own.contains_key(key)) {
+            let Some((log, account)) = gone.get_key_value(&stored.log_path) else { continue };
+            let Some(own) = own.get(&stored.samples_key()) else { continue };
+            let of_log = moved.entry(log).or_insert_with(|| LogResult {
+                account: (*account).clone(),
+                records: Vec::new(),
+                moved_from: Vec::new(),
+            });
+            of_log.account.estimated -= 1;
+            of_log.account.error_detail = Some(format!("its samples are those of {}", own.log_path));
+            of_log.moved_from.push((key, stored.log_digest));
         }
-        let result = |(log, moved_from): (&str, Vec<(RecordKey, String)>)| {
-            Some(LogResult { account: self.accounts.get(log)?.clone(), records: Vec::new(), moved_from })
-        };
-        Ok(moved.into_iter().filter_map(result).collect())
+        Ok(moved.into_values().collect())
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
