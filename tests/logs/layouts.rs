@@ -61,34 +61,41 @@ fn flights_in_the_rows_of_a_few_files_give_the_numbers_of_their_own_files() {
     );
 }
 
-/// A log is delivered again under another name with another departure, and then once more while the former file is there. The
-/// records of a file that is gone move; those of one that is there stay, and its samples count once.
+/// A log is delivered again with another departure, in its metadata or in its name alone. The records of a file that is gone
+/// move, and are made again when it comes back; the samples of both then count once.
 #[test]
 fn a_log_delivered_again_with_another_departure_counts_once() {
-    let fleet = one_tail();
-    fleet.run_ok(&["run"]);
-    let estimates = |fleet: &TestFleet| -> Vec<u64> {
-        let rows = fleet.rows(&["trend", "--tail", "N412FP"]);
-        rows.iter().map(|row| row["estimates"].as_u64().unwrap()).collect()
-    };
-    let (records, counted) = (numbers(&fleet).len(), estimates(&fleet));
-    let deliver = |from: &std::path::Path, name: &str, departure: &str| {
-        let mut facts = facts(from);
-        facts
-            .iter_mut()
-            .filter(|(key, _)| key == "departure_utc")
-            .for_each(|(_, at)| *at = departure.to_owned());
-        let to = fleet.path(&format!("sample-data/logs/N412FP/{name}.parquet"));
-        rewrite(from, &to, &facts, |_| true);
-        to
-    };
-    let log = fleet.logs_of("N412FP").pop().unwrap();
-    let again = deliver(&log, "again", "2026-11-17T01:02:03Z");
-    std::fs::remove_file(&log).unwrap();
-    fleet.run_ok(&["run"]);
-    assert_eq!((numbers(&fleet).len(), estimates(&fleet)), (records, counted.clone()));
-    deliver(&again, "once-more", "2026-11-15T01:02:03Z");
-    fleet.run_ok(&["run"]);
-    assert!(numbers(&fleet).len() > records);
-    assert_eq!(estimates(&fleet), counted);
+    for is_in_name in [false, true] {
+        let fleet = one_tail();
+        if is_in_name {
+            fleet.configure("[identity]", "[identity]\npath = '(?<departure_utc>\\d{8}T\\d{6}Z)_'");
+            fleet.configure(", departure_utc = \"departure_utc\"", "");
+        }
+        fleet.run_ok(&["run"]);
+        let estimates = || -> Vec<u64> {
+            let rows = fleet.rows(&["trend", "--tail", "N412FP"]);
+            rows.iter().map(|row| row["estimates"].as_u64().unwrap()).collect()
+        };
+        let (records, counted) = (numbers(&fleet).len(), estimates());
+        let log = fleet.logs_of("N412FP").pop().unwrap();
+        let again = fleet.path("sample-data/logs/N412FP/20261117T010203Z_again.parquet");
+        let mut facts = facts(&log);
+        let departure = facts.iter_mut().filter(|(key, _)| !is_in_name && key == "departure_utc");
+        departure.for_each(|(_, at)| *at = "2026-11-17T01:02:03Z".to_owned());
+        let kept = fleet.path("kept");
+        if is_in_name {
+            std::fs::copy(&log, &again).unwrap();
+        } else {
+            rewrite(&log, &again, &facts, |_| true);
+        }
+        std::fs::rename(&log, &kept).unwrap();
+        fleet.run_ok(&["run"]);
+        fleet.run_ok(&["store", "verify"]);
+        assert_eq!((numbers(&fleet).len(), estimates()), (records, counted.clone()), "name {is_in_name}");
+        std::fs::rename(&kept, &log).unwrap();
+        fleet.run_ok(&["run"]);
+        fleet.run_ok(&["store", "verify"]);
+        assert!(numbers(&fleet).len() > records, "name {is_in_name}");
+        assert_eq!(estimates(), counted, "name {is_in_name}");
+    }
 }

@@ -84,6 +84,9 @@ struct OwnRecord {
     refused: Option<String>,
 }
 
+/// Keys of stored records whose samples are stored under another one now, each with the digest of its log.
+type MovedKeys = Vec<(RecordKey, String)>;
+
 /// What becomes of a record that another log holds too.
 enum Claim {
     /// The new record counts.
@@ -202,7 +205,7 @@ impl<'a> OwnershipLedger<'a> {
             self.waiting.insert(account.log_path.clone(), ProcessedLog { account, records, diagnostics });
             return Ok(Vec::new());
         }
-        let moved_from = self.moved_from(&account, &records, writer)?;
+        let (moved_from, left) = self.moved_from(&account, &records, writer)?;
         let (mut kept, mut displaced) = (Vec::new(), BTreeMap::<String, bool>::new());
         let (mut copy_of, mut contradicts, mut worse_than) = (None, None, None);
         for (record, claim) in records.into_iter().zip(claims) {
@@ -234,6 +237,7 @@ impl<'a> OwnershipLedger<'a> {
         }
         let done = ProcessedLog { account, records: kept, diagnostics };
         let mut results = vec![self.store(done, moved_from, report)];
+        results.extend(left);
         for (log, is_same) in displaced {
             let Some(mut loser) = self.accounts.get(&log).cloned() else { continue };
             let left = self.left_to(&loser);
@@ -354,31 +358,35 @@ impl<'a> OwnershipLedger<'a> {
             .is_some_and(|before| before.estimated + before.refused > 0 && plan::is_same_flight(before, log))
     }
 
-    /// Keys and log digests under which the same samples are stored: their flight had another identity, and the log was this
-    /// one, or one of the same content that is gone.
+    /// Keys and log digests under which the same samples are stored, where this log had another identity, and what is left of
+    /// logs of the same content that are gone.
     fn moved_from(
         &self,
         account: &LogRecord,
         records: &[GapRecord],
         writer: &Writer,
-    ) -> Result<Vec<(RecordKey, String)>, Error> {
+    ) -> Result<(MovedKeys, Vec<LogResult>), Error> {
         let own = self.plan.accounts.get(&account.log_path);
         let gone = account.log_digest.as_ref().and_then(|digest| self.plan.gone.get(digest));
-        let before = own.into_iter().chain(gone.into_iter().flatten());
+        let gone = gone.into_iter().flatten();
+        let before = own.into_iter().chain(gone.clone());
         let before = before.filter(|before| !plan::is_same_flight(before, account));
         let keys: BTreeSet<RecordKey> = before.flat_map(LogRecord::keys).collect();
         if keys.is_empty() || records.is_empty() {
-            return Ok(Vec::new());
+            return Ok(Default::default());
         }
         let new: Vec<HeldRecord> = records.iter().map(HeldRecord::of).collect();
         let mut held = writer.held(&keys)?;
         held.retain(|_, stored| new.iter().any(|new| stored.is_same_as(new)));
-        Ok(held.into_iter().map(|(key, stored)| (key, stored.log_digest)).collect())
+        let gone: HashMap<&String, &LogRecord> = gone.map(|log| (&log.log_path, log)).collect();
+        let (of_gone, own): (Vec<_>, Vec<_>) =
+            held.into_iter().partition(|(_, stored)| gone.contains_key(&stored.log_path));
+        let of_gone = of_gone.into_iter().map(|(key, stored)| (key, stored, account.log_path.as_str()));
+        Ok((own.into_iter().map(|(key, stored)| (key, stored.log_digest)).collect(), left_of(&gone, of_gone)))
     }
 
     /// Takes back the stored gaps of logs that are gone whose samples this run has stored under another departure or tail: their
     /// log was delivered again with another identity. Its digest differs with its metadata; its estimates are equal to the bit.
-    /// A log that comes back as it was is processed again.
     pub(crate) fn moved_samples(&self, writer: &Writer) -> Result<Vec<LogResult>, Error> {
         let gone = self.plan.gone.values().flatten().map(|log| (&log.log_path, log));
         let gone: HashMap<&String, &LogRecord> = gone.collect();
@@ -391,20 +399,12 @@ impl<'a> OwnershipLedger<'a> {
         let before = writer.held_between(first_us - MOST_CORRECTED_US, last_us + MOST_CORRECTED_US)?;
         let own = self.own.values().map(|own| &own.held).filter(|held| held.is_estimated());
         let own: HashMap<_, &HeldRecord> = own.map(|held| (held.samples_key(), held)).collect();
-        let mut moved = BTreeMap::<&String, LogResult>::new();
-        for (key, stored) in before.into_iter().filter(|(key, _)| !self.own.contains_key(key)) {
-            let Some((log, account)) = gone.get_key_value(&stored.log_path) else { continue };
-            let Some(own) = own.get(&stored.samples_key()) else { continue };
-            let of_log = moved.entry(log).or_insert_with(|| LogResult {
-                account: (*account).clone(),
-                records: Vec::new(),
-                moved_from: Vec::new(),
-            });
-            of_log.account.estimated -= 1;
-            of_log.account.error_detail = Some(format!("its samples are those of {}", own.log_path));
-            of_log.moved_from.push((key, stored.log_digest));
-        }
-        Ok(moved.into_values().collect())
+        let before = before.into_iter().filter(|(key, _)| !self.own.contains_key(key));
+        let moved = before.filter_map(|(key, stored)| {
+            let owner = own.get(&stored.samples_key())?.log_path.as_str();
+            Some((key, stored, owner))
+        });
+        Ok(left_of(&gone, moved))
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
@@ -462,12 +462,7 @@ impl<'a> OwnershipLedger<'a> {
         results
     }
 
-    fn store(
-        &mut self,
-        done: ProcessedLog,
-        moved_from: Vec<(RecordKey, String)>,
-        report: &mut RunSummary,
-    ) -> LogResult {
+    fn store(&mut self, done: ProcessedLog, moved_from: MovedKeys, report: &mut RunSummary) -> LogResult {
         let ProcessedLog { mut account, records, diagnostics } = done;
         self.errors.insert(account.log_path.clone(), diagnostics);
         let is_refused = |record: &&GapRecord| record.estimate.status == Status::Refused;
@@ -496,6 +491,27 @@ impl<'a> OwnershipLedger<'a> {
             }
         }
     }
+}
+
+/// What is left of logs that are gone whose stored records belong to another log now, which is named with each. A log that comes
+/// back as it was has none, so that it is processed again.
+fn left_of<'l>(
+    gone: &HashMap<&String, &LogRecord>,
+    moved: impl Iterator<Item = (RecordKey, HeldRecord, &'l str)>,
+) -> Vec<LogResult> {
+    let mut left = BTreeMap::<&String, LogResult>::new();
+    for (key, stored, owner) in moved {
+        let Some((log, account)) = gone.get_key_value(&stored.log_path) else { continue };
+        let LogResult { account, moved_from, .. } = left.entry(log).or_insert_with(|| LogResult {
+            account: (*account).clone(),
+            records: Vec::new(),
+            moved_from: Vec::new(),
+        });
+        *(if stored.is_estimated() { &mut account.estimated } else { &mut account.refused }) -= 1;
+        account.error_detail = Some(format!("its samples are those of {owner}"));
+        moved_from.push((key, stored.log_digest));
+    }
+    left.into_values().collect()
 }
 
 /// Hash of the tail and the flight id of a log that was identified.

@@ -165,10 +165,13 @@ pub(crate) fn execute_run(
         }
         Ok(())
     })?;
-    for late in [ledger.resolve_waiting(&writer, &mut report)?, ledger.moved_samples(&writer)?] {
-        if !late.is_empty() {
-            writer.commit(&late)?;
-        }
+    let waited = ledger.resolve_waiting(&writer, &mut report)?;
+    if !waited.is_empty() {
+        writer.commit(&waited)?;
+    }
+    let moved = ledger.moved_samples(&writer)?;
+    if !moved.is_empty() {
+        writer.commit(&moved)?;
     }
     report.not_reached_logs = ledger.not_reached(&inputs.run_id);
     report.not_reached = report.not_reached_logs.len();
