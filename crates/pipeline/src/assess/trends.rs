@@ -143,9 +143,10 @@ pub(crate) fn assess_run(
     let Changes { changed, states } = changes(config, &store.states()?, &now, run);
     let causes: BTreeMap<UnitKey, &String> =
         changed.iter().map(|change| (change.unit(), &change.because)).collect();
+    let horizon_hours = config.document.trend.planning_horizon_hours;
     let gap = |row: &TrendRow| Finding {
         cause: causes.get(&row.unit()).map(|cause| (*cause).clone()),
-        ..Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))
+        ..Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of), horizon_hours)
     };
     let of_common = Finding::of_common_changes(&quantity_changes, as_of);
     let findings =

@@ -88,7 +88,9 @@ fn before<'a>(known: &[&'a AlertRecord], finding: &Finding) -> Option<(i64, Opti
         return match known.iter().max_by_key(|row| row.change_number) {
             Some(last) => {
                 let state = last.to_state.as_deref();
-                (state != finding.state).then_some((last.change_number, state))
+                let is_calm = matches!(finding.state, Some("normal" | "watch"));
+                let stands = state == Some("plan") && is_calm && finding.is_near_plan;
+                (state != finding.state && !stands).then_some((last.change_number, state))
             }
             // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
             None => finding.is_noteworthy().then_some((0, None)),

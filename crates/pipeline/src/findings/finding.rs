@@ -9,6 +9,9 @@ use crate::fleet::histories::UnitKey;
 /// Quantity of the free play.
 pub const GAP: &str = "gap";
 
+/// Planning horizons within which a `plan` that was sent stands.
+const NEAR_PLAN: f64 = 1.1;
+
 /// State of a quantity other than the gap that has not changed.
 pub(crate) const UNCHANGED: &str = "normal";
 
@@ -30,6 +33,9 @@ pub struct Finding {
     pub as_of_utc: Timestamp,
     /// Departure of the unit's latest flight.
     pub latest_flight_utc: Option<Timestamp>,
+    /// Whether the unit wears and its earliest crossing is beyond the planning horizon by a tenth at most: a `plan` that
+    /// was sent stands, or it would come and go with the scatter of the forecast.
+    pub is_near_plan: bool,
     /// The assessment, of a gap.
     pub assessment: Option<TrendRow>,
     /// The open work request about it.
@@ -80,7 +86,13 @@ impl Finding {
         if self.quantity == GAP { self.state.is_some() } else { self.state != Some(UNCHANGED) }
     }
 
-    pub(crate) fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
+    /// The state of a unit's gap, where the limit is planned for within some flight hours.
+    pub(crate) fn of_gap(
+        row: &TrendRow,
+        latest_flight_utc: Option<Timestamp>,
+        planning_horizon_hours: f64,
+    ) -> Self {
+        let is_near = |hours: f64| hours <= NEAR_PLAN * planning_horizon_hours;
         Self {
             unit: row.unit(),
             tail_number: row.tail_number.clone(),
@@ -90,6 +102,7 @@ impl Finding {
             reason: row.reason.clone(),
             as_of_utc: row.as_of_utc,
             latest_flight_utc,
+            is_near_plan: row.trend == "wearing" && row.crossing_hours_p05.is_some_and(is_near),
             assessment: Some(row.clone()),
             ..Self::default()
         }

@@ -288,6 +288,21 @@ fn a_unit_that_lost_its_flights_is_one_alert() {
     assert_eq!(detect(&known, std::slice::from_ref(&other)), []);
 }
 
+/// The forecast scatters from flight to flight: `plan` near the horizon does not come and go, and `act` is never kept back.
+#[test]
+fn a_plan_that_was_sent_stands_while_its_crossing_is_near_the_horizon() {
+    let channels = channels();
+    let known =
+        alert_changes::detect(&[], &[finding("S1", Some("plan"), 0)], &channels, "0", Timestamp::UNIX_EPOCH);
+    let changes = |state, is_near_plan| {
+        let next = Finding { is_near_plan, ..finding("S1", Some(state), 1) };
+        let found = alert_changes::detect(&known, &[next], &channels, "1", Timestamp::UNIX_EPOCH);
+        found.iter().filter(|row| row.channel.is_empty()).count()
+    };
+    assert_eq!((changes("watch", true), changes("normal", true)), (0, 0));
+    assert_eq!((changes("watch", false), changes("act", true), changes("unassessed", true)), (1, 1, 1));
+}
+
 /// A change that a tail made, first seen on a day.
 fn tail_change(day: i64, as_of_day: i64) -> Finding {
     let at = |day: i64| Timestamp::from_second(1_780_000_000 + 86_400 * day).unwrap();
