@@ -24,7 +24,6 @@ pub(crate) fn is_attended() -> bool {
     io::stdin().is_terminal() && io::stdout().is_terminal() && io::stderr().is_terminal()
 }
 
-/// Console output with its verbosity, colour and format.
 #[derive(Debug, Clone)]
 pub(crate) struct Output {
     quiet: bool,
@@ -32,7 +31,6 @@ pub(crate) struct Output {
     progress: bool,
     color: bool,
     form: LogFormat,
-    /// Configuration files of this call.
     configs: Vec<PathBuf>,
 }
 

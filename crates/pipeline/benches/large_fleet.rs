@@ -27,7 +27,6 @@ type Outcomes<T> = Result<T, Box<dyn Error>>;
 const POSITIONS: [&str; 4] = ["aileron_left", "aileron_right", "elevator_left", "elevator_right"];
 const PARTS: [&str; 2] = ["EMA-27-1040", "EMA-27-1060"];
 const HOURS: f64 = 2.0;
-/// Flights in one commit.
 const COMMIT: usize = 4_000;
 /// One log of this number has failed, and one record of the number below is refused.
 const ERROR_EVERY: usize = 997;

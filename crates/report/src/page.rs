@@ -58,7 +58,6 @@ pub(crate) fn part_path(part_number: &str, page: usize) -> String {
     if page == 0 { format!("part/{stem}.html") } else { format!("part/{stem}.page-{}.html", page + 1) }
 }
 
-/// Path of a tail's page, relative to the report folder.
 pub(crate) fn tail_path(tail_number: &str) -> String {
     format!("tail/{}.html", file_stem("tail", &[tail_number]))
 }

@@ -12,10 +12,8 @@ use records::Installations;
 use store::Store;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
-use crate::exit::Failure;
-use crate::output::Output;
+use crate::{Failure, Output};
 
-/// Version written into every record.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub(crate) fn load_config(global: &Global) -> Result<Config, Failure> {
@@ -206,7 +204,6 @@ impl KnownNames {
 }
 
 impl UnitFilterArgs {
-    /// The selected units, for an assessment at a date.
     pub(crate) fn selection(&self, as_of_utc: Option<Timestamp>) -> UnitSelection {
         UnitSelection {
             tail_number: self.tail.clone(),

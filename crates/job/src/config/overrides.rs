@@ -11,7 +11,6 @@ use super::document::{Document, Override, check_clock};
 use super::layers::Faults;
 use super::validate_channels;
 
-/// The checked overrides of a configuration, and the mappings that were derived from them.
 #[derive(Debug, Default)]
 pub(super) struct Overrides {
     /// The mapping without overrides.
@@ -19,7 +18,6 @@ pub(super) struct Overrides {
     overrides: Vec<ValidatedOverride>,
     /// By the numbers of the overrides that apply.
     mappings: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
-    /// Cached mappings, by the numbers of the overrides and the part.
     cached: Mutex<MappingCache>,
 }
 

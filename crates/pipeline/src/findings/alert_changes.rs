@@ -16,7 +16,6 @@ use crate::findings::finding::{Finding, GAP, UNCHANGED};
 pub type Channels = BTreeMap<String, AlertChannel>;
 
 const CHANGE: &str = "change";
-/// Kind of the rows that hold the states known when alerts begin.
 const BASELINE: &str = "baseline";
 
 /// Changes of one tail or part in one quantity within these days are one: later flights can move its date.
@@ -101,7 +100,6 @@ fn before<'a>(known: &[&'a AlertRecord], finding: &Finding) -> Option<(i64, Opti
     (!is_known).then_some((number, Some(UNCHANGED)))
 }
 
-/// Whether a channel gets the changes to a finding's state.
 fn selects(channel: &AlertChannel, finding: &Finding) -> bool {
     let (part, tail) = (finding.unit.0.as_deref(), finding.tail_number.as_deref());
     channel.enabled && channel.selects(finding.state, part, tail)

@@ -14,12 +14,10 @@ const VERSION: u32 = 1;
 /// Units listed in the summary of a baseline.
 const MAX_LISTED: usize = 50;
 
-/// Word of a state in messages.
 pub(super) fn word(state: Option<&str>) -> &str {
     state.unwrap_or(NOT_ASSESSED)
 }
 
-/// Name of a unit as text of one line.
 pub(super) fn unit_text(part: Option<&str>, serial: &str) -> String {
     let name = part.map_or_else(|| serial.to_owned(), |part| format!("{part} / {serial}"));
     escape_cell(&name).into_owned()

@@ -28,7 +28,6 @@ pub struct Finding {
     /// First flight of a change that a tail or a part made; none for a unit's state.
     pub since_utc: Option<Timestamp>,
     pub as_of_utc: Timestamp,
-    /// Departure of the unit's latest flight.
     pub latest_flight_utc: Option<Timestamp>,
     /// The assessment, of a gap.
     pub assessment: Option<TrendRow>,
@@ -70,7 +69,6 @@ impl Finding {
         })
     }
 
-    /// Serial number of a unit.
     pub(crate) fn serial_number(&self) -> Option<&str> {
         Some(self.unit.1.as_str()).filter(|_| self.since_utc.is_none())
     }

@@ -151,7 +151,6 @@ fn diagnostics(failed: &[AlertRecord]) -> Vec<Diagnostic> {
     of_channels.into_iter().map(diagnostic).collect()
 }
 
-/// Courier of a run: rows go to the store, messages to the configured channels.
 struct StoreCourier<'a> {
     config: &'a Config,
     writer: &'a mut Writer,

@@ -177,7 +177,6 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
     })
 }
 
-/// Whether a state opens a request.
 fn wants_work(state: Option<&str>) -> bool {
     rank(state) >= State::Plan
 }

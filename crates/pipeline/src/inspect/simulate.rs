@@ -12,8 +12,7 @@ use simulator::{
     Spec,
 };
 
-use crate::error::Error;
-use crate::run::event::Event;
+use crate::{Error, Event};
 
 /// Reads a spec, or takes the sample fleet's.
 ///
@@ -128,7 +127,6 @@ fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Erro
     Ok(name)
 }
 
-/// A second file with the same content.
 fn copy(file: &Path) -> Result<(), Error> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let second = file.with_file_name(format!("{name}_copy.parquet"));
@@ -202,7 +200,6 @@ fn installations(plan: &Plan) -> String {
     })
 }
 
-/// Every flight, with and without a log.
 fn flights(plan: &Plan) -> String {
     csv("tail_number,flight_id,departure_utc,flight_hours,tail_hours_end", &plan.flights, |of| {
         let (names, departure) = (format!("{},{}", of.tail_number, of.flight_id), instant(of.departure_us));

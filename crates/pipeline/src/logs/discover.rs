@@ -95,12 +95,11 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
 
 /// Logs to inspect.
 #[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct SelectedLogs {
     /// The logs, each with its name.
     pub logs: Vec<NamedLog>,
-    /// Files that cannot be read.
     pub faults: Vec<Diagnostic>,
-    /// What is left out, in words.
     pub notes: Vec<String>,
 }
 

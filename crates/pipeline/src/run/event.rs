@@ -6,14 +6,26 @@ use records::Diagnostic;
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub enum Event {
-    /// The plan is complete: number and bytes of the logs to read.
-    Planned { logs: usize, bytes: u64 },
-    /// A worker took a log.
-    Started { log: String },
+    Planned {
+        logs: usize,
+        bytes: u64,
+    },
+    Started {
+        log: String,
+    },
     /// A log is finished, with its gaps, its flights without one, and its errors.
-    Finished { log: String, bytes: u64, estimated: usize, refused: usize, diagnostics: Vec<Diagnostic> },
+    Finished {
+        log: String,
+        bytes: u64,
+        estimated: usize,
+        refused: usize,
+        diagnostics: Vec<Diagnostic>,
+    },
     /// Number of logs that are now safe in the store.
-    Stored { logs: usize },
-    /// Number of units whose trends are being assessed.
-    Trends { units: usize },
+    Stored {
+        logs: usize,
+    },
+    Trends {
+        units: usize,
+    },
 }

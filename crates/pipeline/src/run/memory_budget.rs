@@ -6,7 +6,6 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// 36 million samples, rounded up.
 const BYTES_PER_SAMPLE: u64 = 40;
 
-/// Budget of bytes in use at a time.
 #[derive(Debug)]
 pub(crate) struct MemoryBudget {
     limit_bytes: u64,
@@ -28,7 +27,6 @@ impl MemoryBudget {
         Self { limit_bytes, in_use_bytes: Mutex::new(0), freed: Condvar::new() }
     }
 
-    /// What the channels of one actuator will need.
     pub(crate) fn actuator_bytes(samples: usize) -> u64 {
         (samples as u64).saturating_mul(BYTES_PER_SAMPLE)
     }

@@ -38,7 +38,6 @@ pub fn within_time_limit<T: Send + 'static>(
     })
 }
 
-/// The error of a log that was not finished within its limit.
 pub(crate) fn log_timeout(display_name: &str, limit_s: f64) -> Diagnostic {
     let what = format!("the log was not finished within {limit_s} s");
     Diagnostic::new("log_timeout", what).in_file(display_name).hint(

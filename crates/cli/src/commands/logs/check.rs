@@ -12,12 +12,10 @@ use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 
 use crate::args::{CheckArgs, Global};
-use crate::exit::{Code, Failure};
-use crate::output::{Output, escape};
-use crate::row_output;
-use crate::table::{self, number, text};
-
 use crate::commands::context::load_with_installations;
+use crate::output::escape;
+use crate::table::{self, number, text};
+use crate::{Code, Failure, Output, row_output};
 
 /// More logs than these are summarised, one line each.
 const MOST_WHOLE_LOGS: usize = 3;

@@ -12,13 +12,10 @@ use records::{Diagnostic, Installations, PartNumber};
 use report::{EstimatePlot, estimate_plot_html, estimate_plot_svg};
 
 use crate::args::{EstimateArgs, Global};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
-use crate::table::{self, count, number, or_dash, text, unit_name};
-
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
 use crate::commands::results::query::{flags_text, load};
+use crate::table::{self, count, number, or_dash, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
 /// Estimates the given logs.
 ///
@@ -96,7 +93,6 @@ fn page(found: &[EstimateRow]) -> String {
     format!("{}; nothing was stored\n", count(found.len(), "estimate")) + &table::of(found, columns)
 }
 
-/// Writes per-sample filter output of every actuator of the logs.
 fn write_trace(file: &Path, trace: &Trace, output: &Output) -> Result<(), Failure> {
     if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         let what = format!("{}: a trace is written as Parquet", display_path(file));

@@ -24,9 +24,7 @@ use crate::table::{self, count, unit_name};
 const MAX_SHOWN: usize = 5;
 /// Failed logs, recorder and quantity changes that are printed.
 const MAX_FAILURES: usize = 10;
-/// Changed units that are printed.
 const MAX_CHANGED: usize = 20;
-/// Command that prints all findings.
 const IN_JSON: &str = "`freeplay run --json`";
 /// Command that prints every log of the latest run with its error.
 const LOGS_OF_RUN: &str = "`freeplay store runs --run last`";
@@ -83,7 +81,6 @@ pub(super) fn text(report: &RunSummary, config: &str, code: Code) -> String {
     page.0
 }
 
-/// Logs found, records stored and rejected.
 fn counts(report: &RunSummary, page: &mut Page) {
     for run in &report.cut_short {
         let started = run.started_utc.strftime("previous run %Y-%m-%dT%H:%M:%SZ");
@@ -251,7 +248,6 @@ fn fleet(report: &RunSummary, page: &mut String) {
     page.push_str(&unit_table(report.work_list.iter().collect(), u8::MAX));
 }
 
-/// State changes of this run, unit by unit.
 fn changes(changed: &[UnitChange], report: &RunSummary, page: &mut String) {
     if changed.is_empty() {
         return;
@@ -267,7 +263,6 @@ fn changes(changed: &[UnitChange], report: &RunSummary, page: &mut String) {
     }
 }
 
-/// State and event changes of a unit as text.
 fn change_text(unit: &UnitChange, report: &RunSummary) -> String {
     let word = |state: Option<&str>| state.unwrap_or("no state").to_owned();
     let mut changes = Vec::new();

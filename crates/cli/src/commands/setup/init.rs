@@ -9,14 +9,10 @@ use pipeline::inspect::simulate::{SAMPLE_FOLDER, write_sample};
 use pipeline::logs::temporary_files::is_temporary;
 
 use crate::args::InitArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::display_path;
 use crate::commands::setup::proposal::Proposal;
+use crate::table::count;
+use crate::{Code, Failure, Output, progress, row_output};
 
 const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
 
@@ -66,7 +62,6 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-/// Writes the sample fleet with its configuration.
 fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
     let there = ["pipeline.toml", SAMPLE_FOLDER].map(|name| dir.join(name)).into_iter().find(|p| p.exists());
     if let Some(path) = there {
@@ -86,7 +81,6 @@ fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-/// Writes a new file.
 fn write(path: &Path, text: &str, output: &Output) -> Result<(), Failure> {
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file =

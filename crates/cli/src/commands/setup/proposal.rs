@@ -18,7 +18,6 @@ use crate::exit::Failure;
 use crate::output::escape;
 use crate::table::count;
 
-/// Maximum number of logs from which a mapping is inferred.
 const MOST_SAMPLES: usize = 60;
 
 /// Maximum number of logs that are searched for tails and positions.
@@ -30,7 +29,6 @@ const MOST_GROUPS: usize = 6;
 /// Placeholder for the part number, which no log contains.
 const PART: &str = "PART-NUMBER";
 
-/// Head of a proposed installations table.
 const INSTALLATIONS_HEAD: &str = "\
 # Proposed: one row per tail and position found, each with a placeholder unit.
 # Enter the real part and serial numbers and dates: a trend belongs to the unit and follows it to other positions.
@@ -41,9 +39,7 @@ tail_number,position,part_number,serial_number,installed_utc,removed_utc
 /// Logs from which the same mapping is inferred.
 struct Variant {
     offer: InferredMapping,
-    /// The first of these logs.
     log: PathBuf,
-    /// Number of these logs in the sample.
     logs: usize,
 }
 
@@ -76,7 +72,6 @@ impl Variant {
         }
     }
 
-    /// Its tails as elements of a list.
     fn tails(&self) -> String {
         self.offer.tails.iter().map(|tail| quoted(tail)).collect::<Vec<_>>().join(", ")
     }
@@ -208,9 +203,7 @@ pub(crate) struct Proposal {
     /// Pattern of the main logs, relative to the folder of all logs.
     files: String,
     groups: BTreeMap<String, Group>,
-    /// Layouts of single tails.
     overrides: Vec<Variant>,
-    /// Layouts that the proposal does not cover.
     uncovered: Vec<Variant>,
 }
 
@@ -413,7 +406,6 @@ impl Configuration<'_> {
     }
 }
 
-/// Channels by the names of their tables.
 const CHANNELS: [(Role, &str); 4] = [
     (Role::Motor, "motor_position"),
     (Role::Screw, "screw_position"),
@@ -421,7 +413,6 @@ const CHANNELS: [(Role, &str); 4] = [
     (Role::Temperature, "temperature"),
 ];
 
-/// The usual unit of a channel.
 fn usual(role: Role) -> Unit {
     let units = [(Role::Motor, Unit::Degree), (Role::Screw, Unit::Millimetre), (Role::Load, Unit::Newton)];
     units.iter().find(|(of, _)| *of == role).map_or(Unit::Celsius, |(_, unit)| *unit)
@@ -463,7 +454,6 @@ fn unite(offer: &mut InferredMapping, other: &InferredMapping) {
     offer.by_row |= other.by_row;
 }
 
-/// Every pair of a tail and a position.
 fn pairs(tails: &BTreeSet<String>, positions: &BTreeSet<String>) -> Vec<(String, String)> {
     tails.iter().flat_map(|tail| positions.iter().map(|own| (tail.clone(), own.clone()))).collect()
 }

@@ -51,14 +51,12 @@ impl MappingFault {
     }
 }
 
-/// Scope, evidence and remedy.
 impl std::fmt::Display for MappingFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}; {}", self.scope(), self.evidence(), self.remedy)
     }
 }
 
-/// Rejections of the latest flights of some actuators.
 #[derive(Default)]
 struct Tally<'a> {
     codes: Vec<Option<&'a str>>,

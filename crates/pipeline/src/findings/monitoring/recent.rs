@@ -41,7 +41,6 @@ impl RecentFlight<'_> {
     }
 }
 
-/// Where which unit sits; empty where its records have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PositionKey<'a> {
     pub(crate) tail_number: &'a str,
