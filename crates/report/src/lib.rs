@@ -4,7 +4,6 @@
 //! number is in the page as text; scripts only magnify. Templates escape every external string.
 
 mod charts;
-mod file_names;
 mod format;
 mod model;
 mod page;

@@ -17,8 +17,8 @@ use crate::error::{Error, is_passing};
 use crate::logs::discover_remote;
 use crate::logs::file_stat::{FileStat, SeenObjects};
 use crate::logs::local_files;
+use crate::logs::local_files::is_temporary;
 use crate::logs::table_folders::{TableFault, TableFolders};
-use crate::logs::temporary_files::is_temporary;
 
 /// The logs that fit the patterns.
 #[derive(Debug, Clone, Default)]

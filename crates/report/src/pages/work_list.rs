@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use records::TrendRow;
 
-use crate::charts::sparkline::sparkline;
+use crate::charts::quantities::sparkline;
 use crate::model::{Report, UnitView};
 
 /// Name of the group of units that are on no known aircraft.

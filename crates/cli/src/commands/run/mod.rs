@@ -1,6 +1,5 @@
 //! `run`: processes new and changed logs, updates trends and prints the run summary.
 
-mod follow_up;
 mod metrics;
 mod summary;
 

@@ -7,12 +7,12 @@ use std::time::Duration;
 use jiff::Timestamp;
 use pipeline::assess::changes::{Cause, UnitChange};
 use pipeline::findings::monitoring::recorder_change::RecorderChange;
+use pipeline::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use pipeline::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use pipeline::run::summary::LogError;
 use pipeline::{RunSummary, State};
-use records::Quantity;
+use records::{Quantity, WorkRequest};
 
-use super::follow_up;
 use crate::commands::context::VERSION;
 use crate::commands::results::trend::unit_table;
 use crate::exit::Code;
@@ -76,7 +76,7 @@ pub(super) fn text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     fleet(report, &mut page.0);
     changes(&report.changed, report, &mut page.0);
-    page.0.push_str(&follow_up::section(&report.follow_up));
+    page.0.push_str(&follow_up_section(&report.follow_up));
     page.0.push_str(&exit_text(report, code));
     page.0
 }
@@ -302,4 +302,70 @@ fn exit_text(report: &RunSummary, code: Code) -> String {
             .to_owned()
     };
     table::labelled("Exit code 1: ", &text)
+}
+
+/// Requests listed in each line.
+const MAX_REQUESTS: usize = 5;
+
+/// Work requests and alerts; empty without both.
+fn follow_up_section(follow_up: &FollowUpSummary) -> String {
+    let mut page = work_section(&follow_up.work_requests);
+    if let Some(alerts) = &follow_up.alerts {
+        page.push_str(&table::labelled("alerts: ", &alerts_text(alerts)));
+    }
+    if page.is_empty() { page } else { format!("\n{page}") }
+}
+
+fn work_section(work: &WorkSummary) -> String {
+    let mut page = String::new();
+    let counts = [(work.open, "open"), (work.acknowledged, "acknowledged"), (work.deferred, "deferred")];
+    let changes =
+        [(&work.new, "new"), (&work.returned, "back"), (&work.moved, "moved"), (&work.closed, "closed")];
+    if counts.iter().all(|(n, _)| *n == 0) && changes.iter().all(|(some, _)| some.is_empty()) {
+        return page;
+    }
+    let counts: Vec<String> = counts.iter().map(|(n, status)| format!("{n} {status}")).collect();
+    let _ = writeln!(page, "work requests: {} (`freeplay work list`)", counts.join(", "));
+    for (some, what) in changes.iter().filter(|(some, _)| !some.is_empty()) {
+        let more = some.len().saturating_sub(MAX_REQUESTS);
+        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+        page.push_str(&table::labelled(&format!("  {what:<11} "), &(listed(some) + &more)));
+    }
+    page
+}
+
+fn listed(some: &[WorkRequest]) -> String {
+    let name = |request: &WorkRequest| {
+        let unit = unit_name(request.part_number.as_deref(), &request.serial_number);
+        format!("{} {}", request.request_id, escape(&unit))
+    };
+    some.iter().take(MAX_REQUESTS).map(name).collect::<Vec<_>>().join(", ")
+}
+
+fn alerts_text(alerts: &AlertSummary) -> String {
+    let mut parts = Vec::new();
+    if alerts.is_baseline {
+        parts.push("the present states are the baseline; changes are sent from now on".to_owned());
+    } else if alerts.is_held {
+        parts.push("changes wait for a run that processes every log".to_owned());
+    } else {
+        parts.push(count(alerts.changes, "state change"));
+    }
+    for (n, what) in [
+        (alerts.sent, "sent"),
+        (alerts.failed, "not sent, the next run sends again"),
+        (alerts.waiting, "left for the next run"),
+        (alerts.unconfirmed + alerts.unconfirmed_before, "unconfirmed (`freeplay store alerts --unsent`)"),
+    ] {
+        if n > 0 {
+            parts.push(format!("{} {what}", count(n, "message")));
+        }
+    }
+    for (channel, n) in &alerts.without_channel {
+        let (messages, channel) = (count(*n, "message"), escape(channel));
+        parts.push(format!(
+            "{messages} for `[alerts.{channel}]`, which is no longer configured (`freeplay store alerts --drop {channel}`)"
+        ));
+    }
+    parts.join("; ")
 }

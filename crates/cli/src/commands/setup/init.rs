@@ -6,15 +6,13 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use pipeline::inspect::simulate::{SAMPLE_FOLDER, write_sample};
-use pipeline::logs::temporary_files::is_temporary;
+use pipeline::logs::local_files::is_temporary;
 
 use crate::args::InitArgs;
 use crate::commands::context::display_path;
-use crate::commands::setup::proposal::Proposal;
+use crate::commands::setup::proposal::{Proposal, TEMPLATE};
 use crate::table::count;
 use crate::{Code, Failure, Output, progress, row_output};
-
-const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
 
 const FILES: [(&str, &str); 2] = [
     ("pipeline.toml", TEMPLATE),
@@ -50,7 +48,7 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     if let Some(folder) = &args.from {
         let logs = logs(folder)?;
         let proposal = Proposal::of(folder, &logs)?;
-        (toml, table) = (proposal.configuration(TEMPLATE, folder, &args.dir)?, proposal.installations(&logs));
+        (toml, table) = (proposal.configuration(folder, &args.dir)?, proposal.installations(&logs));
         output.note(&proposal.coverage());
     }
     fs::create_dir_all(&args.dir)?;

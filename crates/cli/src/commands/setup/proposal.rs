@@ -26,6 +26,9 @@ const MOST_LOGS: usize = 5000;
 /// Maximum number of channel groups: more kinds of files are tails or days.
 const MOST_GROUPS: usize = 6;
 
+/// The configuration that `init` writes without logs.
+pub(crate) const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
+
 /// Placeholder for the part number, which no log contains.
 const PART: &str = "PART-NUMBER";
 
@@ -293,13 +296,7 @@ impl Proposal {
     }
 
     /// Template with the mapping of the logs below a folder, to be verified with `check`.
-    pub(crate) fn configuration(&self, template: &str, folder: &Path, dir: &Path) -> Result<String, Failure> {
-        let mut trend = template;
-        let [head, tables, _, estimate, _, part] = MARKERS.map(|marker| {
-            let (before, after) = trend.split_once(marker).unwrap_or((trend, ""));
-            trend = after;
-            before
-        });
+    pub(crate) fn configuration(&self, folder: &Path, dir: &Path) -> Result<String, Failure> {
         let (offer, log) = (&self.main.offer, &self.main.log);
         let names = |names: Vec<&str>| escape(&names.join(", "));
         let positions = names(offer.positions.iter().map(String::as_str).collect());
@@ -311,8 +308,6 @@ impl Proposal {
         let lacks_format = identity_path.as_ref().map_or(has_tail, |(_, format)| format.is_none());
         let text = Configuration {
             proposal: self,
-            head,
-            tables,
             positions: if positions.is_empty() { "none".to_owned() } else { positions },
             position_path: position_path.map(|(_, path)| path),
             identity_path,
@@ -320,12 +315,6 @@ impl Proposal {
             has_departure,
             lacks_departure: lacks_format && !has_departure,
             others: names(offer.others.iter().take(12).map(String::as_str).collect()),
-            estimate,
-            linear_part: part
-                .replace("EMA-27-1040", PART)
-                .replace("\nlimit_m", "\n# limit_m")
-                .replace("\nwatch_m", "\n# watch_m"),
-            trend,
             folder: relative(folder, dir)?,
         };
         text.render().map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
@@ -348,15 +337,11 @@ impl Proposal {
     }
 }
 
-/// Where the proposal takes over from the common template, and where it gives back.
-const MARKERS: [&str; 6] = [
-    "files = [\"logs/**/*.parquet\"]\n",
-    "\n# Which flight a log is.",
-    "[estimate]\n",
-    "\n# One table per part number",
-    "[part.\"EMA-27-1040\"]\n",
-    "[trend]\n",
-];
+/// What the common template has after a text and before another one, or its end.
+fn common(from: &str, to: &str) -> &'static str {
+    let (_, rest) = TEMPLATE.split_once(from).unwrap_or_default();
+    rest.split_once(to).map_or(rest, |(text, _)| text)
+}
 
 /// A proposed `pipeline.toml`: the common template with the mapping of some logs, and placeholders of a part without limits,
 /// which a run refuses. Keys that could not be inferred are left to fill in.
@@ -364,8 +349,6 @@ const MARKERS: [&str; 6] = [
 #[template(path = "proposal.toml", escape = "none")]
 struct Configuration<'p> {
     proposal: &'p Proposal,
-    head: &'p str,
-    tables: &'p str,
     positions: String,
     /// The expression that finds the position in the path, where the path holds nothing else of the identity.
     position_path: Option<String>,
@@ -376,9 +359,6 @@ struct Configuration<'p> {
     lacks_departure: bool,
     /// Columns that were not understood.
     others: String,
-    estimate: &'p str,
-    linear_part: String,
-    trend: &'p str,
     folder: PathBuf,
 }
 
