@@ -1,7 +1,6 @@
 //! Plan of a run: the logs found, those already processed, and the reason to process each of the others.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::PathBuf;
 
 use ingest::LogFiles;
 use jiff::Timestamp;
@@ -163,14 +162,7 @@ pub fn plan(
     accounts: Vec<LogRecord>,
     request: &Request,
 ) -> Plan {
-    let seen = found.seen;
-    let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
-        found.logs.into_iter().map(|(log_path, files)| (log_path, (files, None))).collect();
-    let faulty = |(log_path, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
-        (log_path, (LogFiles::one(path), Some(diagnostic)))
-    };
-    logs.extend(found.faulty.into_iter().map(faulty));
-    let found = logs;
+    let DiscoveredLogs { logs: found, seen, .. } = found;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let contents: HashSet<&String> = here.iter().filter_map(|a| a.log_digest.as_ref()).collect();
     let lies_elsewhere =
@@ -298,7 +290,10 @@ impl Planner<'_> {
     /// Why this log is processed in this run, or nothing when it is up to date.
     fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
         let Some(account) = account else { return Some(WorkReason::New) };
-        let digest = |flight| config_digest(self.config, self.installations, &flight, &positions_of(account));
+        let positions = || account.positions.iter().filter_map(|position| Position::new(position).ok());
+        let digest = |flight| {
+            config_digest(self.config, self.installations, &flight, &positions().collect::<Vec<_>>())
+        };
         let settings = flight_of(account).map_or_else(|| self.unidentified.to_owned(), digest);
         if self.request.redo {
             Some(WorkReason::Asked)
@@ -340,8 +335,4 @@ impl Planner<'_> {
 fn is_silent(account: &LogRecord) -> bool {
     let sound = account.outcome.is_success() || account.error_code.as_deref() == Some("duplicate_flight");
     sound && account.estimated + account.refused == 0
-}
-
-fn positions_of(account: &LogRecord) -> Vec<Position> {
-    account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
 }

@@ -5,7 +5,7 @@ mod flight_ownership;
 mod memory_budget;
 pub mod scheduler;
 pub mod summary;
-pub mod time_limit;
+pub(crate) mod time_limit;
 mod worker_pool;
 
 use records::Diagnostic;

@@ -27,7 +27,7 @@ use crate::fleet::bookkeeping::{inspections, maintenance_log};
 use crate::logs::discover;
 use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
-use crate::run::memory_budget::MemoryBudget;
+use crate::run::memory_budget::{BYTES_PER_SAMPLE, MemoryBudget};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::{PoolSettings, StepCount, WorkerPool};
 use crate::{Error, Event};
@@ -163,14 +163,8 @@ pub(crate) fn execute_run(
         }
         Ok(())
     })?;
-    let waited = ledger.resolve_waiting(&writer, &mut report)?;
-    if !waited.is_empty() {
-        writer.commit(&waited)?;
-    }
-    let moved = ledger.moved_samples(&writer)?;
-    if !moved.is_empty() {
-        writer.commit(&moved)?;
-    }
+    writer.commit(&ledger.resolve_waiting(&writer, &mut report)?)?;
+    writer.commit(&ledger.moved_samples(&writer)?)?;
     report.not_reached_logs = ledger.not_reached(&inputs.run_id);
     report.not_reached = report.not_reached_logs.len();
     ledger.add_up(&mut report);
@@ -365,7 +359,7 @@ impl WorkerContext<'_> {
             ..Provenance::default()
         };
         let actuators: Vec<_> = opened.actuators().collect();
-        let bytes = MemoryBudget::actuator_bytes(opened.log.rows());
+        let bytes = (opened.log.rows() as u64).saturating_mul(BYTES_PER_SAMPLE);
         let process_log = |at: &&Actuator| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();

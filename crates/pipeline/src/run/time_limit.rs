@@ -13,7 +13,7 @@ use records::Diagnostic;
 ///
 /// # Errors
 /// The error of the work, `panic` when it panics, `log_timeout` when it takes too long.
-pub fn within_time_limit<T: Send + 'static>(
+pub(crate) fn within_time_limit<T: Send + 'static>(
     display_name: &str,
     config: &Config,
     work: impl FnOnce() -> Result<T, Diagnostic> + Send + 'static,

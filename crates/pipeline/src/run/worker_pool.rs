@@ -183,7 +183,8 @@ impl<'a> WorkerPool<'a> {
                 let limit_s = self.settings.limit.as_secs_f64();
                 let mut outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s));
                 outcome.account.duration_s = limit_s;
-                return Ok(Some(self.finished(log, Box::new(outcome))));
+                (self.settings.watch)(outcome.event(work));
+                return Ok(Some(Box::new(outcome)));
             }
             let now = Instant::now();
             if self.settings.stop.load(Ordering::Relaxed) {
@@ -199,7 +200,8 @@ impl<'a> WorkerPool<'a> {
                 Ok(Message::Finished { log, outcome }) => {
                     if self.in_progress.remove(&log).is_some() {
                         self.abandoned_in_a_row = 0;
-                        return Ok(Some(self.finished(log, outcome)));
+                        (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
+                        return Ok(Some(outcome));
                     }
                 }
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),
@@ -219,11 +221,6 @@ impl<'a> WorkerPool<'a> {
     fn stop(&mut self) {
         self.stop_seen.get_or_insert_with(Instant::now);
         self.workers.shared.stop();
-    }
-
-    fn finished(&self, log: usize, outcome: Box<ProcessedLog>) -> Box<ProcessedLog> {
-        (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
-        outcome
     }
 
     /// Looks for logs that have passed their limit, when all messages are read, and replaces their workers. A log that

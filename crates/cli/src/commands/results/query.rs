@@ -150,14 +150,10 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
 
 /// One line per rejection code of these records, with its remedy.
 fn remedies(records: &[GapRecord]) -> String {
-    let codes: BTreeSet<&str> = records.iter().filter_map(|r| rejection_code(&r.estimate)).collect();
-    let line = |code: &str| Some(format!("{code}: {}\n", job::rejection::remedy(code)?));
-    let lines: String = codes.into_iter().filter_map(line).collect();
-    if lines.is_empty() { lines } else { format!("\n{lines}") }
-}
-
-fn rejection_code(e: &GapEstimate) -> Option<&str> {
-    e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
+    let line = |e: &GapEstimate| Some(format!("{}: {}\n", e.reason.as_deref()?, remedy(e)?));
+    let lines: BTreeSet<String> = records.iter().filter_map(|r| line(&r.estimate)).collect();
+    let above = if lines.is_empty() { "" } else { "\n" };
+    lines.iter().fold(above.to_owned(), |text, line| text + line)
 }
 
 /// The rows with the remedy of each rejection as last column.
