@@ -112,7 +112,6 @@ fn is_there(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
-/// One command, the place of its output in the page, and its expected exit code.
 struct Step {
     script: String,
     shown: Option<Range<usize>>,

@@ -16,7 +16,6 @@ use crate::args::{Global, LogFormat};
 use crate::exit::{Code, Failure};
 use crate::json_log;
 
-/// Maximum number of diagnostics of one code that are shown in full.
 const SHOWN_WHOLE: usize = 3;
 
 /// Whether all three streams are terminals: only then are progress bars and colour used.

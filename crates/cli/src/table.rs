@@ -12,14 +12,12 @@ const GAP: usize = 2;
 const LEAST_TEXT: usize = 6;
 /// Width of the last text column below which its text stands below the row.
 const LEAST_BESIDE: usize = 60;
-/// Indent of text below its row.
 const INDENT: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     /// Heading, with the unit in brackets.
     pub heading: &'static str,
-    /// Whether the column is right-aligned.
     pub right: bool,
     /// Rank: 0 is never hidden, the others from the highest down.
     pub rank: u8,

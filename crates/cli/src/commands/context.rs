@@ -77,7 +77,6 @@ const NAMES: [(&str, &str); 5] = [
     ("part_number", "part number"),
 ];
 
-/// Names of tails, units, positions and flights, from where a command reads them.
 pub(crate) enum KnownNames {
     /// A store, if there is one, and the installations table.
     Store(Option<Box<Store>>, Installations),
@@ -178,7 +177,6 @@ impl KnownNames {
         }
     }
 
-    /// Where the departures are, as text.
     fn place(&self) -> String {
         match self {
             Self::Store(..) => "the store".to_owned(),

@@ -211,7 +211,6 @@ fn change_message(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -> S
     message.to_string()
 }
 
-/// Summary of the states that are known when alerts begin.
 fn baseline_message(id: &str, known: &[&Finding], selected: &[&Finding], run_id: &str) -> String {
     let mut states = BTreeMap::<&str, usize>::new();
     known.iter().for_each(|finding| *states.entry(word(finding.state)).or_default() += 1);

@@ -54,12 +54,11 @@ pub struct EstimateRequest {
 
 /// Estimates of a log.
 #[derive(Debug, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct LogEstimates {
-    /// One row for each actuator that could be estimated.
     pub rows: Vec<EstimateRow>,
     /// Inputs and outputs of the filters, one actuator after the other.
     pub trace: Trace,
-    /// One plot for each actuator.
     pub plots: Vec<EstimatePlot>,
     /// Errors of the log, or of single actuators: also where an estimate has no trace or no plot.
     pub diagnostics: Vec<Diagnostic>,

@@ -57,7 +57,6 @@ pub fn normalize(
     Ok(all)
 }
 
-/// How logs are normalized, and which log each file is of.
 struct Normalization<'a> {
     config: &'a Config,
     installations: &'a Installations,

@@ -184,7 +184,6 @@ fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
     }
 }
 
-/// A table of CSV, a line for each row.
 fn csv<R>(columns: &str, rows: &[R], line: impl Fn(&R) -> String) -> String {
     rows.iter().fold(format!("{columns}\n"), |table, row| table + &line(row) + "\n")
 }
@@ -282,7 +281,6 @@ fn configuration(spec: &Spec, tables: &[&str]) -> Result<String, Error> {
     ))
 }
 
-/// How the logs of a part name and measure its channels.
 fn channel_tables(part: &simulator::Part) -> Value {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };

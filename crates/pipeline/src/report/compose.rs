@@ -125,7 +125,6 @@ fn by_unit<R>(rows: impl IntoIterator<Item = R>, unit: impl Fn(&R) -> Name) -> B
     units
 }
 
-/// The followed quantities other than the gap, with the values of the flights.
 fn quantities(
     rows: &[QuantityRow],
     histories: &Histories,

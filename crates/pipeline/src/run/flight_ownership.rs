@@ -113,7 +113,6 @@ impl<'a> OwnershipLedger<'a> {
         ledger
     }
 
-    /// Status of all logs, after this run.
     pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> + Clone {
         let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
         self.accounts.values().chain(unchanged.into_iter().flatten())

@@ -254,7 +254,6 @@ impl RunInputs {
     }
 }
 
-/// Processes all logs by workers of this machine.
 fn process_all(
     inputs: &Arc<RunInputs>,
     context: &Context<'_>,

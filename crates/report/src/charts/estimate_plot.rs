@@ -112,7 +112,6 @@ fn stacked(plot: &EstimatePlot, top: f64) -> String {
     heading.finish(&format!(r#"y="{top}""#))
 }
 
-/// Draws positions and load, one above the other.
 fn over_time(plot: &EstimatePlot) -> String {
     let height = SIZE[1] - HEADING;
     let end_s = plot.time_s(plot.s_m.len() as f64).max(1.0);

@@ -62,7 +62,6 @@ pub(crate) fn what(row: &TrendRow) -> String {
     format!("{}{between} {position}", capital(&verb))
 }
 
-/// A text that begins with a capital.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()

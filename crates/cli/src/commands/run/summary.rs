@@ -20,9 +20,7 @@ use crate::output::escape;
 use crate::progress::span;
 use crate::table::{self, count, unit_name};
 
-/// Findings of a kind that are printed.
 const MAX_SHOWN: usize = 5;
-/// Failed logs, recorder and quantity changes that are printed.
 const MAX_FAILURES: usize = 10;
 const MAX_CHANGED: usize = 20;
 const IN_JSON: &str = "`freeplay run --json`";
@@ -283,7 +281,6 @@ fn change_text(unit: &UnitChange, report: &RunSummary) -> String {
     changes.join("; ")
 }
 
-/// What exit code 1 means, and how to go on.
 fn exit_text(report: &RunSummary, code: Code) -> String {
     if code != Code::LogsInError {
         return String::new();
@@ -304,7 +301,6 @@ fn exit_text(report: &RunSummary, code: Code) -> String {
     table::labelled("Exit code 1: ", &text)
 }
 
-/// Requests listed in each line.
 const MAX_REQUESTS: usize = 5;
 
 /// Work requests and alerts; empty without both.

@@ -201,7 +201,6 @@ pub(crate) struct Proposal {
     logs: usize,
     folders: usize,
     looked_at: usize,
-    /// The usual layout.
     main: Variant,
     /// Pattern of the main logs, relative to the folder of all logs.
     files: String,
@@ -211,7 +210,6 @@ pub(crate) struct Proposal {
 }
 
 impl Proposal {
-    /// Looks at a sample of the logs.
     pub(crate) fn of(folder: &Path, logs: &[PathBuf]) -> Result<Self, Failure> {
         let found = variants(sampled(logs))?;
         let looked_at = found.iter().map(|variant| variant.logs).sum();
@@ -357,7 +355,6 @@ struct Configuration<'p> {
     has_tail: bool,
     has_departure: bool,
     lacks_departure: bool,
-    /// Columns that were not understood.
     others: String,
     folder: PathBuf,
 }

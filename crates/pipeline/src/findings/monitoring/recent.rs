@@ -49,7 +49,6 @@ pub(crate) struct PositionKey<'a> {
     pub(crate) serial_number: &'a str,
 }
 
-/// Flights of a unit at one position, by departure.
 pub(crate) type RecentFlights<'a> = BTreeMap<PositionKey<'a>, Vec<RecentFlight<'a>>>;
 
 /// The flights of the last months before a time, without their values.

@@ -187,7 +187,6 @@ const USUAL_FACTORS: [(f64, &str); 7] = [
     (1e6, "as m against µm: check the lead and the units of both positions"),
 ];
 
-/// The usual mistake that makes such a ratio of the positions.
 fn cause_of(slope: f64) -> Option<(f64, &'static str)> {
     if (slope + 1.0).abs() < SLOPE_TOLERANCE {
         return Some((-1.0, "one position has the other sign: set `sign = -1` in its channel"));
