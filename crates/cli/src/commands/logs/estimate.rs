@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use job::Config;
-use job::flight_log::part_of;
 use job::trace::Trace;
 use pipeline::inspect::estimate::{self, EstimateRequest, EstimateRow};
 use pipeline::logs::discover;
@@ -60,20 +59,15 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
-    let name =
-        PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &configured_parts(config)))?;
-    match part_of(config, &name) {
-        Ok(_) => Ok(name),
-        Err(_) => {
-            let what = format!("part number {number} is not configured");
-            Err(Failure::usage("part_unknown", what, &configured_parts(config)))
-        }
-    }
-}
-
-fn configured_parts(config: &Config) -> String {
     let parts: Vec<String> = config.parts.keys().map(ToString::to_string).collect();
-    format!("configured parts: {}", parts.join(", "))
+    let hint = format!("configured parts: {}", parts.join(", "));
+    let name = PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &hint))?;
+    let unknown = || format!("part number {number} is not configured");
+    if config.parts.contains_key(&name) {
+        Ok(name)
+    } else {
+        Err(Failure::usage("part_unknown", unknown(), &hint))
+    }
 }
 
 fn page(found: &[EstimateRow]) -> String {

@@ -322,20 +322,17 @@ fn work_section(work: &WorkSummary) -> String {
     }
     let counts: Vec<String> = counts.iter().map(|(n, status)| format!("{n} {status}")).collect();
     let _ = writeln!(page, "work requests: {} (`freeplay work list`)", counts.join(", "));
-    for (some, what) in changes.iter().filter(|(some, _)| !some.is_empty()) {
-        let more = some.len().saturating_sub(MAX_REQUESTS);
-        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        page.push_str(&table::labelled(&format!("  {what:<11} "), &(listed(some) + &more)));
-    }
-    page
-}
-
-fn listed(some: &[WorkRequest]) -> String {
     let name = |request: &WorkRequest| {
         let unit = unit_name(request.part_number.as_deref(), &request.serial_number);
         format!("{} {}", request.request_id, escape(&unit))
     };
-    some.iter().take(MAX_REQUESTS).map(name).collect::<Vec<_>>().join(", ")
+    for (some, what) in changes.iter().filter(|(some, _)| !some.is_empty()) {
+        let more = some.len().saturating_sub(MAX_REQUESTS);
+        let more = (more > 0).then(|| format!("and {more} more"));
+        let listed: Vec<String> = some.iter().take(MAX_REQUESTS).map(name).chain(more).collect();
+        page.push_str(&table::labelled(&format!("  {what:<11} "), &listed.join(", ")));
+    }
+    page
 }
 
 fn alerts_text(alerts: &AlertSummary) -> String {
