@@ -127,7 +127,6 @@ impl TestFleet {
         CommandResult::of(&mut self.command(args))
     }
 
-    /// Runs a command that must end well.
     pub(crate) fn run_ok(&self, args: &[&str]) -> String {
         let result = self.freeplay(args);
         assert_eq!(result.code, Some(0), "{args:?}: {result:?}");
@@ -219,7 +218,6 @@ impl TestFleet {
         }
     }
 
-    /// Paths that fit a pattern, by name.
     pub(crate) fn glob(&self, pattern: &str) -> Vec<PathBuf> {
         glob::glob(self.path(pattern).to_str().unwrap()).unwrap().flatten().collect()
     }
@@ -296,7 +294,6 @@ pub(crate) fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Key-value pairs of a footer.
 pub(crate) type Facts = Vec<(String, String)>;
 
 /// The identity of a log from the metadata of its footer.
@@ -321,7 +318,6 @@ pub(crate) fn rewrite(from: &Path, to: &Path, facts: &Facts, rows: impl Fn(usize
     write_log(to, kept, facts);
 }
 
-/// Writes a log of columns of doubles.
 pub(crate) fn write_log(to: &Path, columns: Vec<(String, Vec<f64>)>, facts: &[(String, String)]) {
     use ingest::parquet::writer::{Column, write_parquet};
     let columns: Vec<_> = columns.into_iter().map(|(name, values)| (name, Column::Real(values))).collect();

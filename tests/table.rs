@@ -43,7 +43,6 @@ impl Table {
         self.names().into_iter().map(|name| (name.clone(), self.numbers(&name))).collect()
     }
 
-    /// One number for each flight and position.
     pub(crate) fn by_flight(&self, column: &str) -> BTreeMap<(String, String, String), f64> {
         let keys =
             self.texts("tail_number").into_iter().zip(self.texts("flight_id")).zip(self.texts("position"));

@@ -108,12 +108,10 @@ fn runs(block: &Block) -> bool {
     block.language == "console" || (block.language == "sh" && block.text.lines().any(ours))
 }
 
-/// Whether a program is installed; the gate installs all of them.
 fn is_there(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
-/// One command, the place of its output in the page, and its expected exit code.
 struct Step {
     script: String,
     shown: Option<Range<usize>>,
@@ -130,7 +128,6 @@ struct Try<'p> {
 }
 
 impl<'p> Try<'p> {
-    /// Runs a page from its first block to its last.
     fn of(page: &'p Page) -> Vec<String> {
         let mut tried = Self::new(page, TestFleet::sample_data());
         let mut output = String::new();
@@ -258,7 +255,6 @@ fn steps(block: &Block) -> Vec<Step> {
     steps
 }
 
-/// Lines without trailing spaces, each with its line end.
 fn trimmed(output: &str) -> String {
     output.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }

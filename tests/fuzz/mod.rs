@@ -16,7 +16,6 @@ use crate::harness::top;
 
 mod edits;
 
-/// Bytes of one change to a channel.
 const EDIT: usize = 13;
 
 fn files(paths: &[&str]) -> Vec<Vec<u8>> {

@@ -1,7 +1,9 @@
 //! Logs in shapes that are made row by row give the numbers of the plain ones. The other shapes are in
-//! `tests/data/logs.md`.
+//! `tests/data/logs.md`. A log far wider than any fleet's costs time in proportion to its size.
 
-use crate::harness::{Table, TestFleet, facts, rewrite, without};
+use std::time::{Duration, Instant};
+
+use crate::harness::{Table, TestFleet, facts, rewrite, without, write_log};
 
 /// Every number of every record, without what names the log and the settings it was read by.
 fn numbers(fleet: &TestFleet) -> Vec<String> {
@@ -98,4 +100,16 @@ fn a_log_delivered_again_with_another_departure_counts_once() {
         assert!(numbers(&fleet).len() > records, "name {is_in_name}");
         assert_eq!(estimates(), counted, "name {is_in_name}");
     }
+}
+
+/// Thirty thousand columns of ten thousand positions, none of which is installed.
+#[test]
+fn a_log_of_ten_thousand_positions_costs_seconds() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    let columns = (0..10_000).map(|k| (format!("p{k}_motor_deg"), vec![0.0, 1.0])).collect();
+    write_log(log, columns, &facts(log));
+    let begun = Instant::now();
+    assert_eq!(fleet.freeplay(&["check", &log.display().to_string()]).code, Some(1));
+    assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
 }

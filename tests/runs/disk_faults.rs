@@ -36,7 +36,6 @@ impl Drop for Mounted {
     }
 }
 
-/// Runs a command that must succeed, or returns its output.
 fn done(command: &mut Command) -> Result<(), String> {
     let result = command.stdin(Stdio::null()).output().map_err(|e| format!("{command:?}: {e}"))?;
     let errors = String::from_utf8_lossy(&result.stderr);

@@ -104,7 +104,6 @@ impl Injector {
         self.run(fleet, &["run", "--jobs", "1", "-q"], &Fault::at("results", "both", "EIO", at.max(1)));
     }
 
-    /// How many calls a command makes.
     fn count(&self, fleet: &TestFleet, args: &[&str], under: &'static str, kind: &'static str) -> usize {
         let file = fleet.path("calls.txt");
         let fault = Fault::at(under, kind, "EIO", 0);
@@ -192,7 +191,6 @@ struct Struck {
 
 const RUN: &[&str] = &["run", "--jobs", "1"];
 
-/// Names of the files of a report.
 fn pages(fleet: &TestFleet) -> Vec<String> {
     let name = |path: PathBuf| path.strip_prefix(fleet.path("")).unwrap().to_string_lossy().into_owned();
     fleet.glob("pages/**/*").into_iter().map(name).collect()
@@ -210,7 +208,6 @@ impl Struck {
         command
     }
 
-    /// How many calls the command makes.
     fn count(&self, under: &'static str, kind: &'static str) -> usize {
         let count = self.injector.count(&self.before.copied(), self.args, under, kind);
         assert!(count > 0, "no call of {:?} on {under} was seen", self.args);
@@ -271,7 +268,6 @@ fn print_row(
     ));
 }
 
-/// Tries a fault at calls of a command.
 fn strike(injector: &'static Injector, &(args, (make, store), under, kind, mode, is_lasting): &Row) {
     let command = Struck::new(injector, make(), args);
     let count = command.count(under, kind);

@@ -5,6 +5,5 @@ mod disk_faults;
 #[cfg(target_os = "linux")]
 mod injected_faults;
 mod interruption;
-mod large_inputs;
 #[cfg(target_os = "linux")]
 mod soak;

@@ -13,7 +13,6 @@ use store::Store;
 
 use crate::args::CONFIG;
 
-/// Maximum number of names that are offered at once.
 const MAX_CANDIDATES: usize = 200;
 
 /// The words by which `query` selects records, each with its column.

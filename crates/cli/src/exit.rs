@@ -29,7 +29,6 @@ impl From<Code> for ExitCode {
     }
 }
 
-/// Why a command failed.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.

@@ -8,7 +8,6 @@ use records::Diagnostic;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// One line: time, level, event and its fields.
 #[derive(Serialize)]
 struct LogLine<'a> {
     time_utc: Timestamp,

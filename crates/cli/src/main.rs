@@ -22,8 +22,8 @@ use clap::{CommandFactory, Parser};
 use clap_complete::CompleteEnv;
 
 use args::{Args, Command};
-use exit::{Code, Failure};
-use output::Output;
+pub(crate) use exit::{Code, Failure};
+pub(crate) use output::Output;
 use records::Diagnostic;
 
 fn main() -> ExitCode {

@@ -16,7 +16,6 @@ use crate::args::{Global, LogFormat};
 use crate::exit::{Code, Failure};
 use crate::json_log;
 
-/// Maximum number of diagnostics of one code that are shown in full.
 const SHOWN_WHOLE: usize = 3;
 
 /// Whether all three streams are terminals: only then are progress bars and colour used.
@@ -24,7 +23,6 @@ pub(crate) fn is_attended() -> bool {
     io::stdin().is_terminal() && io::stdout().is_terminal() && io::stderr().is_terminal()
 }
 
-/// Console output with its verbosity, colour and format.
 #[derive(Debug, Clone)]
 pub(crate) struct Output {
     quiet: bool,
@@ -32,7 +30,6 @@ pub(crate) struct Output {
     progress: bool,
     color: bool,
     form: LogFormat,
-    /// Configuration files of this call.
     configs: Vec<PathBuf>,
 }
 

@@ -74,7 +74,6 @@ impl<'t> Progress<'t> {
         }
     }
 
-    /// Shows the bar for a number of logs.
     fn begin(&self, logs: usize) {
         self.bar.reset_elapsed();
         self.bar.set_length(logs as u64);
@@ -99,7 +98,6 @@ impl<'t> Progress<'t> {
         self.bar.set_message(message);
     }
 
-    /// Removes the bar before the result is printed.
     pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }

@@ -74,7 +74,6 @@ pub(crate) fn check_file(file: &std::path::Path, output: &Output) -> Result<(), 
     Err(not_written(file, &kind.into()))
 }
 
-/// Refuses a file where a folder is to be written.
 pub(crate) fn check_folder(folder: &std::path::Path) -> Result<(), Failure> {
     if !folder.is_file() {
         return Ok(());
@@ -177,7 +176,6 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
     Ok(Arc::new(StringArray::from(rows)))
 }
 
-/// Rows as a batch, every column nullable.
 pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
     to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
 }

@@ -1,8 +1,6 @@
 //! Sparkline: a series of numbers as `▁▂▃▅▇`.
 
-/// Characters by height.
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-/// Maximum length, characters.
 const WIDTH: usize = 12;
 /// Least full scale as a share of the limit, or of the largest value, so that noise does not look like growth.
 const LEAST_SHARE: f64 = 0.2;

@@ -7,20 +7,17 @@ use report::StateBadge;
 
 use crate::output::escape;
 
-/// Blanks between two columns.
 const GAP: usize = 2;
 /// Minimum width to which text is cut.
 const LEAST_TEXT: usize = 6;
 /// Width of the last text column below which its text stands below the row.
 const LEAST_BESIDE: usize = 60;
-/// Indent of text below its row.
 const INDENT: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     /// Heading, with the unit in brackets.
     pub heading: &'static str,
-    /// Whether the column is right-aligned.
     pub right: bool,
     /// Rank: 0 is never hidden, the others from the highest down.
     pub rank: u8,
@@ -217,7 +214,6 @@ pub(crate) fn gap(gap_m: Option<f64>, half_width_m: Option<f64>) -> String {
     }
 }
 
-/// Whole hours, or a dash.
 pub(crate) fn hours(h: Option<f64>) -> String {
     h.map_or_else(empty_cell, |h| format!("{h:.0}"))
 }
@@ -226,12 +222,10 @@ pub(crate) fn empty_cell() -> String {
     "–".to_owned()
 }
 
-/// A text, or a dash.
 pub(crate) fn or_dash(text: Option<&str>) -> String {
     text.map_or_else(empty_cell, str::to_owned)
 }
 
-/// Part and serial number of a unit.
 pub(crate) fn unit_name(part: Option<&str>, serial: &str) -> String {
     format!("{} / {serial}", part.unwrap_or("–"))
 }

@@ -148,7 +148,6 @@ pub fn plot_data(channels: &ActuatorChannels, part: &Part) -> Result<Option<Cont
         .map_err(|e| Diagnostic::new("estimate_failed", e))
 }
 
-/// The channels as input of the estimator.
 pub(crate) fn samples(channels: &ActuatorChannels) -> Samples<'_> {
     Samples {
         step_s: channels.step_s,

@@ -16,9 +16,7 @@ use records::{
     Diagnostic, Flight, GapEstimate, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
 };
 
-use crate::config::Config;
-use crate::config::part::Part;
-use crate::{estimate, panic};
+use crate::{Config, Part, estimate, panic};
 
 /// Time zones and clocks that drift explain no more than this.
 const MAX_AHEAD: SignedDuration = SignedDuration::from_hours(24);
@@ -107,8 +105,7 @@ impl<'c> FlightLog<'c> {
         })
     }
 
-    /// Estimates one actuator of the log; `of_run` is the provenance of the records of a run, but for the log. Its error
-    /// says nothing of the others of the log.
+    /// Estimates one actuator of the log; `of_run` is the provenance of the records of a run, but for the log.
     ///
     /// # Errors
     /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
@@ -356,7 +353,6 @@ fn check_tail(identity: &Identity, display_name: &str, config: &Config) -> Resul
     Err(Diagnostic::new("tail_not_allowed", what).in_file(display_name).hint(hint))
 }
 
-/// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
     let (path, _) = flight_rows::split_path(path, &config.document.identity);

@@ -10,7 +10,6 @@ use crate::config::part::{NoiseModel, Part};
 /// Friction below this share of the load is not distinguishable from none.
 const MIN_FRICTION_SHARE: f64 = 0.01;
 
-/// A value, and its standard uncertainty where it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Identified {
     value: f64,

@@ -5,8 +5,7 @@ use ingest::ActuatorChannels;
 use ingest::parquet::writer::Column;
 use records::Diagnostic;
 
-use crate::config::part::Part;
-use crate::estimate;
+use crate::{Part, estimate};
 
 const COLUMNS: [&str; 11] = [
     "time_s",

@@ -12,28 +12,20 @@ pub enum Error {
     /// The store cannot be read or written: what was stored before is intact.
     #[error(transparent)]
     Store(#[from] store::Error),
-    /// An object store is not reachable.
     #[error(transparent)]
     Objects(#[from] object_io::Error),
-    /// A history or a limit is invalid.
     #[error("a trend cannot be stated: {0}")]
     Trend(#[from] trend::Error),
-    /// A page cannot be made.
     #[error(transparent)]
     Page(#[from] ::report::Error),
-    /// A page cannot be written.
     #[error("the report cannot be written to {}: {source}", .path.display())]
     Pages { path: std::path::PathBuf, source: std::io::Error },
-    /// Rows cannot be made.
     #[error("rows cannot be made: {0}")]
     Rows(#[from] arrow::error::ArrowError),
-    /// The engine of a distributed run failed, or its result cannot be read.
     #[error("the engine that does the logs failed: {0}")]
     Engine(String),
-    /// Workers cannot be started.
     #[error("the workers cannot be started: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),
-    /// The system allows no further thread.
     #[error("a worker cannot be started: {0}")]
     Thread(std::io::Error),
 }

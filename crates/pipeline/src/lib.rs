@@ -20,8 +20,8 @@ pub mod run;
 
 pub use error::Error;
 pub use fleet::bookkeeping::join::open_store;
-pub use logs::plan::{Plan, Request, WorkReason};
-pub use run::event::Event;
+pub use logs::plan::{Plan, Request};
+pub use run::Event;
 pub use run::scheduler::run;
 pub use run::summary::{RunEnd, RunSummary};
 pub use trend::State;

@@ -4,7 +4,6 @@
 //! number is in the page as text; scripts only magnify. Templates escape every external string.
 
 mod charts;
-mod file_names;
 mod format;
 mod model;
 mod page;
@@ -15,7 +14,7 @@ mod state_badge;
 
 pub use charts::estimate_plot::{EstimatePlot, estimate_plot_html, estimate_plot_svg, min_max_buckets};
 pub use charts::frame::Frame;
-pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
+pub use model::{Event, FleetPriorView, Quality, QuantityView, Report, UnitView};
 pub use page::{Error, Page, assets, flight_path, unit_path};
 pub use pages::fleet::fleet_pages;
 pub use pages::part::part_pages;

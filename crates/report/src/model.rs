@@ -9,6 +9,7 @@ use records::report_rows::{
 use records::{Installation, QuantityChange, QuantityRow, TrendRow, WorkRequest};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
+use trend::Interval;
 
 use crate::charts::frame::day;
 use crate::format::or_no_data;
@@ -49,7 +50,6 @@ pub struct Report {
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct FleetPriorView {
     pub part_number: Option<String>,
-    /// Training cut-off.
     pub learned_until_utc: Timestamp,
     pub axis: String,
     pub new_m: f64,
@@ -57,16 +57,6 @@ pub struct FleetPriorView {
     pub life_p05_hours: f64,
     pub life_p50_hours: f64,
     pub life_p95_hours: f64,
-}
-
-/// Gap and its 90 % interval at a time.
-#[derive(Debug, Clone, Copy)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct TimedInterval {
-    pub at_utc: Timestamp,
-    pub p05_m: f64,
-    pub m: f64,
-    pub p95_m: f64,
 }
 
 /// One unit: its assessment and the data behind it.
@@ -92,10 +82,10 @@ pub struct UnitView {
     pub quantities: Vec<QuantityView>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
-    pub level: Vec<TimedInterval>,
+    pub level: Vec<(Timestamp, Interval)>,
     /// Forecast from the report date on; plotted, not part of `report.json`.
     #[serde(skip)]
-    pub forecast: Vec<TimedInterval>,
+    pub forecast: Vec<(Timestamp, Interval)>,
     /// Shown on the page and in the store, not part of `report.json`.
     #[serde(skip)]
     pub flights: Vec<ReportFlight>,
@@ -220,7 +210,6 @@ impl UnitView {
         self.flights.iter().filter_map(gap).collect()
     }
 
-    /// Gap divided by limit, as text.
     pub(crate) fn share_text(&self) -> String {
         let share = self.row.gap_m.zip(self.row.limit_m).map(|(gap_m, limit_m)| gap_m / limit_m);
         or_no_data(share, |share| format!("{:.0} %", 100.0 * share))

@@ -20,7 +20,6 @@ pub struct Peers<'a>(BTreeMap<Option<&'a str>, PartUnits<'a>>);
 struct PartUnits<'a> {
     /// Ascending wear rates of installed units, m/h.
     rates: Vec<f64>,
-    /// Day and gap, µm, of some units.
     curves: Vec<(&'a str, Vec<[f64; 2]>)>,
 }
 

@@ -15,7 +15,6 @@ global_asm!(
     run = sym crate::run,
 );
 
-/// Ends the process.
 pub fn exit(code: i32) -> ! {
     // SAFETY: system call 60 takes the code and does not come back.
     unsafe { asm!("syscall", in("rax") 60, in("edi") code, options(noreturn, nostack)) }

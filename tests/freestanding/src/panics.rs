@@ -4,7 +4,6 @@
 //! that the linker does not find; code that cannot loses both.
 
 unsafe extern "C" {
-    /// Exists nowhere.
     safe fn a_path_of_this_program_can_panic() -> !;
 }
 

@@ -7,7 +7,6 @@ use ingest::parquet::writer::Encoding;
 
 use super::shared::{RowFormatArgs, encoding_parser, parse_workers};
 
-/// `init`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct InitArgs {
     /// Write to this folder.
@@ -21,7 +20,6 @@ pub(crate) struct InitArgs {
     pub sample: bool,
 }
 
-/// `check`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct CheckArgs {
     /// Logs to read; default: those of the configuration.
@@ -33,7 +31,6 @@ pub(crate) struct CheckArgs {
     pub rows: RowFormatArgs,
 }
 
-/// `estimate`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct EstimateArgs {
     /// Logs to estimate.
@@ -52,7 +49,6 @@ pub(crate) struct EstimateArgs {
     pub rows: RowFormatArgs,
 }
 
-/// `normalize`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct NormalizeArgs {
     /// Logs to read; default: those of the configuration.
@@ -68,7 +64,6 @@ pub(crate) struct NormalizeArgs {
     pub jobs: Option<u16>,
 }
 
-/// `simulate`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct SimulateArgs {
     /// Simulation spec; default: the sample fleet.

@@ -180,7 +180,6 @@ pub(crate) enum Command {
     Man,
 }
 
-/// `completions`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct CompletionsArgs {
     /// Shell to generate completions for.

@@ -9,7 +9,6 @@ use jiff::Timestamp;
 use super::shared::{DepartureArgs, RowFormatArgs, UnitFilterArgs, parse_count, parse_limit, parse_utc};
 use crate::completion;
 
-/// `query`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct QueryArgs {
     /// `tail`, `serial`, `flight` or `position`; or the value alone, if it is known.
@@ -42,7 +41,6 @@ pub(crate) struct QueryArgs {
     pub rows: RowFormatArgs,
 }
 
-/// `trend`.
 #[derive(Debug, ClapArgs)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct TrendArgs {
@@ -84,7 +82,6 @@ pub(crate) struct ExternalEstimatesArgs {
     pub limit_m: Option<f64>,
 }
 
-/// `explain`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ExplainArgs {
     /// Flight to trace.
@@ -103,7 +100,6 @@ pub(crate) struct ExplainArgs {
     pub json: bool,
 }
 
-/// `diff`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct DiffArgs {
     /// First store.
@@ -117,7 +113,6 @@ pub(crate) struct DiffArgs {
     pub rows: RowFormatArgs,
 }
 
-/// `backtest`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BacktestArgs {
     #[command(flatten)]
@@ -126,7 +121,6 @@ pub(crate) struct BacktestArgs {
     pub rows: RowFormatArgs,
 }
 
-/// `report`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ReportArgs {
     /// Write to this folder, in place of a report in it; its other files stay.

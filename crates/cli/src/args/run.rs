@@ -8,7 +8,6 @@ use pipeline::State;
 use super::shared::{DepartureArgs, parse_count, parse_span, parse_workers, state_parser};
 use crate::completion;
 
-/// `run`.
 #[derive(Debug, ClapArgs)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct RunArgs {

@@ -5,7 +5,6 @@ use clap::{Args as ClapArgs, Subcommand};
 use super::shared::{DepartureArgs, RowFormatArgs, parse_count, parse_span};
 use crate::completion;
 
-/// `store`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct StoreArgs {
     #[command(subcommand)]

@@ -5,7 +5,6 @@ use jiff::Timestamp;
 
 use super::shared::{RowFormatArgs, UnitFilterArgs, parse_utc};
 
-/// `work`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct WorkArgs {
     #[command(subcommand)]
@@ -46,7 +45,6 @@ pub(crate) enum WorkCommand {
     },
 }
 
-/// `work list`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct WorkListArgs {
     #[command(flatten)]

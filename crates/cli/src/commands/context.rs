@@ -12,10 +12,8 @@ use records::Installations;
 use store::Store;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
-use crate::exit::Failure;
-use crate::output::Output;
+use crate::{Failure, Output};
 
-/// Version written into every record.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub(crate) fn load_config(global: &Global) -> Result<Config, Failure> {
@@ -79,7 +77,6 @@ const NAMES: [(&str, &str); 5] = [
     ("part_number", "part number"),
 ];
 
-/// Names of tails, units, positions and flights, from where a command reads them.
 pub(crate) enum KnownNames {
     /// A store, if there is one, and the installations table.
     Store(Option<Box<Store>>, Installations),
@@ -180,7 +177,6 @@ impl KnownNames {
         }
     }
 
-    /// Where the departures are, as text.
     fn place(&self) -> String {
         match self {
             Self::Store(..) => "the store".to_owned(),
@@ -206,7 +202,6 @@ impl KnownNames {
 }
 
 impl UnitFilterArgs {
-    /// The selected units, for an assessment at a date.
     pub(crate) fn selection(&self, as_of_utc: Option<Timestamp>) -> UnitSelection {
         UnitSelection {
             tail_number: self.tail.clone(),

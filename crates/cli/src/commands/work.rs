@@ -13,10 +13,9 @@ use store::Store;
 
 use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 use crate::commands::context::{KnownNames, load_config};
-use crate::exit::{Code, Failure};
-use crate::output::{Output, escape};
-use crate::row_output;
+use crate::output::escape;
 use crate::table::{self, count, or_dash, state_mark, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
 /// Longest wait for a run that writes into the store.
 const WAIT: Duration = Duration::from_mins(1);

@@ -64,7 +64,6 @@ pub struct AlertChannel {
     pub enabled: bool,
 }
 
-/// Every state that a person should know of.
 fn default_states() -> Vec<String> {
     ["watch", "unassessed", "plan", "act"].into_iter().chain(QUANTITY_STATES).map(str::to_owned).collect()
 }
@@ -121,7 +120,6 @@ impl AlertChannel {
     }
 }
 
-/// Whether a name fits one of the patterns, or there is none.
 fn is_among(patterns: &[String], name: Option<&str>) -> bool {
     patterns.is_empty() || name.is_some_and(|name| patterns.iter().any(|pattern| fits(pattern, name)))
 }

@@ -37,7 +37,6 @@ impl ConfigLayer {
     }
 }
 
-/// Texts and their table with spans.
 pub(super) struct Source<'t> {
     pub(super) layers: &'t [ConfigLayer],
     table: Spanned<DeTable<'t>>,

@@ -98,7 +98,7 @@ pub(super) fn implausible(key: &str, value: f64) -> Option<Diagnostic> {
 /// Smallest and largest plausible limit of free play, m: one beyond them was given in another unit.
 pub const PLAUSIBLE_LIMIT_M: (f64, f64) = (1e-6, 0.01);
 
-/// A limit that an aircraft may be grounded by, m; an error, in words, if it was probably meant in another unit.
+/// A limit that an aircraft may be grounded by, m.
 ///
 /// # Errors
 /// In words, when it is so small or so large that it was meant in another unit.

@@ -77,8 +77,7 @@ impl Config {
     }
 
     /// Reads files, each of which overrides those before it, and checks the result, without any table that it names.
-    /// Relative paths start from the first file's folder. Diagnostics come all at once: an unreadable file or broken TOML
-    /// alone, else every unknown key, else the first key of a wrong type, else every value that makes no sense.
+    /// Relative paths start from the first file's folder.
     ///
     /// # Errors
     /// All diagnostics at once: an unreadable file or broken TOML alone, else every unknown key, else

@@ -11,15 +11,11 @@ use super::document::{Document, Override, check_clock};
 use super::layers::Faults;
 use super::validate_channels;
 
-/// The checked overrides of a configuration, and the mappings that were derived from them.
 #[derive(Debug, Default)]
 pub(super) struct Overrides {
     /// The mapping without overrides.
     pub(super) base: Arc<Mapping>,
     overrides: Vec<ValidatedOverride>,
-    /// By the numbers of the overrides that apply.
-    mappings: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
-    /// Cached mappings, by the numbers of the overrides and the part.
     cached: Mutex<MappingCache>,
 }
 
@@ -68,12 +64,18 @@ impl Overrides {
     /// How the logs of an aircraft are read, or the channels of a part on it.
     pub(super) fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
         let numbers = self.numbers(tail, part);
-        if numbers.is_empty() {
-            return Arc::clone(&self.base);
+        let mut mapping = Arc::clone(&self.base);
+        for one in numbers.iter().map(|&number| &self.overrides[number]) {
+            // Each was tried alone; two that only clash together leave what was before.
+            let changed = Arc::make_mut(&mut mapping);
+            if let Ok(clock) = merge_into(&changed.clock, &one.clock) {
+                changed.clock = clock;
+            }
+            if let Ok(channels) = merge_into(&changed.channels, &one.channel) {
+                changed.channels = channels;
+            }
         }
-        let mut mappings = self.mappings.lock().unwrap_or_else(PoisonError::into_inner);
-        let make = || Arc::new(self.merged_mapping(&numbers));
-        Arc::clone(mappings.entry(numbers.clone()).or_insert_with(make))
+        mapping
     }
 
     /// The text for the same key, made once: a run needs it once per log.
@@ -100,20 +102,6 @@ impl Overrides {
 
     pub(super) fn applies_to_part(&self, part: &PartNumber) -> bool {
         self.overrides.iter().any(|one| one.names_part(part))
-    }
-
-    fn merged_mapping(&self, numbers: &[usize]) -> Mapping {
-        let mut mapping = Mapping::clone(&self.base);
-        for one in numbers.iter().map(|&number| &self.overrides[number]) {
-            // Each was tried alone; two that only clash together leave what was before.
-            if let Ok(clock) = merge_into(&mapping.clock, &one.clock) {
-                mapping.clock = clock;
-            }
-            if let Ok(channels) = merge_into(&mapping.channels, &one.channel) {
-                mapping.channels = channels;
-            }
-        }
-        mapping
     }
 }
 

@@ -114,7 +114,6 @@ fn subject(row: &AlertRecord) -> Subject {
     (row.channel.clone(), row.part_number.clone(), name.cloned(), row.quantity.clone())
 }
 
-/// Whether a message waits to be sent.
 fn is_due(row: &AlertRecord, channel: &AlertChannel) -> bool {
     match row.status {
         AlertStatus::Pending => true,

@@ -31,7 +31,6 @@ pub struct Finding {
     /// First flight of a change that a tail or a part made; none for a unit's state.
     pub since_utc: Option<Timestamp>,
     pub as_of_utc: Timestamp,
-    /// Departure of the unit's latest flight.
     pub latest_flight_utc: Option<Timestamp>,
     /// Whether the unit wears and its earliest crossing is beyond the planning horizon by a tenth at most: a `plan` that
     /// was sent stands, or it would come and go with the scatter of the forecast.
@@ -76,7 +75,6 @@ impl Finding {
         })
     }
 
-    /// Serial number of a unit.
     pub(crate) fn serial_number(&self) -> Option<&str> {
         Some(self.unit.1.as_str()).filter(|_| self.since_utc.is_none())
     }

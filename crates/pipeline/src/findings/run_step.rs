@@ -55,8 +55,7 @@ impl FollowUp<'_> {
         }
         let alerts = summary.alerts.insert(AlertSummary::default());
         let rows = self.detect(&findings, channels, writer, alerts, now)?;
-        let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
-        let failed = delivery::deliver(rows, channels, self.run_id, &mut courier, alerts)?;
+        let failed = delivery::deliver(rows, channels, self.run_id, &mut (self, writer), alerts)?;
         summary.errors.extend(diagnostics(&failed));
         Ok(())
     }
@@ -151,25 +150,19 @@ fn diagnostics(failed: &[AlertRecord]) -> Vec<Diagnostic> {
     of_channels.into_iter().map(diagnostic).collect()
 }
 
-/// Courier of a run: rows go to the store, messages to the configured channels.
-struct StoreCourier<'a> {
-    config: &'a Config,
-    writer: &'a mut Writer,
-    stop: &'a AtomicBool,
-}
-
-impl Courier for StoreCourier<'_> {
+/// Rows go to the store, messages to the configured channels.
+impl Courier for (&FollowUp<'_>, &mut Writer) {
     type Error = store::Error;
 
     fn write(&mut self, rows: &[AlertRecord]) -> Result<(), store::Error> {
-        self.writer.write_alerts(rows)
+        self.1.write_alerts(rows)
     }
 
     fn send(&mut self, channel: &AlertChannel, row: &AlertRecord) -> Attempt {
-        channel::send(self.config, channel, row)
+        channel::send(self.0.config, channel, row)
     }
 
     fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.0.stop.load(Ordering::Relaxed)
     }
 }

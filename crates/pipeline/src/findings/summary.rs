@@ -44,12 +44,10 @@ impl AlertSummary {
 
 /// Work requests after a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct WorkSummary {
-    /// Requests that wait for a decision.
     pub open: usize,
-    /// Requests that a person has seen.
     pub acknowledged: usize,
-    /// Requests that a person postponed.
     pub deferred: usize,
     /// Requests that this run opened, or opened again.
     pub new: Vec<WorkRequest>,
@@ -57,18 +55,15 @@ pub struct WorkSummary {
     pub returned: Vec<WorkRequest>,
     /// Requests whose unit is installed in another place.
     pub moved: Vec<WorkRequest>,
-    /// Requests that this run closed.
     pub closed: Vec<WorkRequest>,
 }
 
 /// What follows from a run's findings.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct FollowUpSummary {
-    /// Alerts; `None` without a channel.
     pub alerts: Option<AlertSummary>,
-    /// Work requests.
     pub work_requests: WorkSummary,
-    /// Alerts and work requests that failed.
     #[serde(rename = "follow_up_errors")]
     pub errors: Vec<Diagnostic>,
 }

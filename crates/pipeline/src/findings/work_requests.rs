@@ -75,14 +75,12 @@ fn apply(request: &mut WorkRequest, event: &WorkEvent) {
 
 /// What a person decides about a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Decision {
     /// Acknowledged, deferred or closed.
     pub kind: WorkEventKind,
-    /// The person.
     pub by: String,
-    /// Their reason.
     pub reason: Option<String>,
-    /// Of a deferral: until when.
     pub until_utc: Option<Timestamp>,
 }
 

@@ -13,10 +13,9 @@ use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day};
 use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// What the tables of the operator hold about units.
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Tables<'a> {
-    /// Where units are and were.
     pub installations: &'a Installations,
-    /// The work that was done on units.
     pub maintenance: &'a MaintenanceLog,
     /// The date that counts: today, or that of the newest flight where it is later.
     pub at: Timestamp,
@@ -177,7 +176,6 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
     })
 }
 
-/// Whether a state opens a request.
 fn wants_work(state: Option<&str>) -> bool {
     rank(state) >= State::Plan
 }

@@ -40,29 +40,25 @@ records::row! {
 
 /// How logs are estimated.
 #[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct EstimateRequest {
-    /// The configuration.
     pub config: Arc<Config>,
     /// The part in each position; not needed with a `part`.
     pub installations: Arc<Installations>,
     /// The part as which every actuator is taken. The logs need no identity then.
     pub part: Option<PartNumber>,
-    /// Version written into every row.
     pub program_version: &'static str,
-    /// Whether the filter is traced sample by sample.
     pub has_trace: bool,
-    /// Whether each estimate is drawn.
     pub has_plots: bool,
 }
 
 /// Estimates of a log.
 #[derive(Debug, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct LogEstimates {
-    /// One row for each actuator that could be estimated.
     pub rows: Vec<EstimateRow>,
     /// Inputs and outputs of the filters, one actuator after the other.
     pub trace: Trace,
-    /// One plot for each actuator.
     pub plots: Vec<EstimatePlot>,
     /// Errors of the log, or of single actuators: also where an estimate has no trace or no plot.
     pub diagnostics: Vec<Diagnostic>,
@@ -227,7 +223,6 @@ pub(crate) fn plot(
     })
 }
 
-/// The estimate in one line.
 fn summary(e: &GapEstimate) -> String {
     let mut words = Vec::new();
     let mut say = |name: &str, value: Option<f64>, unit: &str| {

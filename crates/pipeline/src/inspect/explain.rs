@@ -12,12 +12,11 @@ use crate::logs::discover;
 
 /// A record, and its recomputation.
 #[derive(Debug)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Explanation {
-    /// The stored record.
     pub record: GapRecord,
     /// The recomputation, or why there is none.
     pub replayed: Result<Recomputation, Diagnostic>,
-    /// Whether the record is reproduced.
     pub verdict: ReplayVerdict,
     config_digest: String,
 }
@@ -128,16 +127,13 @@ fn replay(
 /// Whether a record is reproduced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
+#[expect(missing_docs, reason = "each variant's text is below")]
 pub enum ReplayVerdict {
-    /// The estimate is the same, bitwise.
     Same,
-    /// The settings differ from those of the record.
     OtherSettings,
-    /// The log has changed since.
     OtherLog,
     /// Same log and settings, but another number.
     OtherNumber,
-    /// The recomputation failed.
     NotReplayed,
 }
 

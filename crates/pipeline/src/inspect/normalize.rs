@@ -11,16 +11,15 @@ use job::flight_log::{Actuator, FlightLog, catch_panic};
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
-use crate::error::Error;
 use crate::logs::discover::{NamedLog, SelectedLogs};
-use crate::run::event::Event;
+use crate::{Error, Event};
 
 /// What became of the logs.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Normalized {
     /// The files written, in order of the logs.
     pub written: Vec<PathBuf>,
-    /// What could not be.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -58,7 +57,6 @@ pub fn normalize(
     Ok(all)
 }
 
-/// How logs are normalized, and which log each file is of.
 struct Normalization<'a> {
     config: &'a Config,
     installations: &'a Installations,

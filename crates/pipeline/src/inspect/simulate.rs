@@ -12,8 +12,7 @@ use simulator::{
     Spec,
 };
 
-use crate::error::Error;
-use crate::run::event::Event;
+use crate::{Error, Event};
 
 /// Reads a spec, or takes the sample fleet's.
 ///
@@ -128,7 +127,6 @@ fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Erro
     Ok(name)
 }
 
-/// A second file with the same content.
 fn copy(file: &Path) -> Result<(), Error> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let second = file.with_file_name(format!("{name}_copy.parquet"));
@@ -186,7 +184,6 @@ fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
     }
 }
 
-/// A table of CSV, a line for each row.
 fn csv<R>(columns: &str, rows: &[R], line: impl Fn(&R) -> String) -> String {
     rows.iter().fold(format!("{columns}\n"), |table, row| table + &line(row) + "\n")
 }
@@ -202,7 +199,6 @@ fn installations(plan: &Plan) -> String {
     })
 }
 
-/// Every flight, with and without a log.
 fn flights(plan: &Plan) -> String {
     csv("tail_number,flight_id,departure_utc,flight_hours,tail_hours_end", &plan.flights, |of| {
         let (names, departure) = (format!("{},{}", of.tail_number, of.flight_id), instant(of.departure_us));
@@ -285,7 +281,6 @@ fn configuration(spec: &Spec, tables: &[&str]) -> Result<String, Error> {
     ))
 }
 
-/// How the logs of a part name and measure its channels.
 fn channel_tables(part: &simulator::Part) -> Value {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };

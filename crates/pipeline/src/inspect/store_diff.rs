@@ -29,23 +29,21 @@ records::row! {
 
 /// Records of a store, and those of them with a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct RecordCounts {
-    /// Records.
     pub records: usize,
-    /// Records with a gap.
     pub with_gap: usize,
 }
 
 /// Actuator-flights that differ between two stores.
 #[derive(Debug)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct StoreDiff {
     /// Those that differ, by departure, tail and position.
     pub rows: Vec<DiffRow>,
     /// Number of actuator-flights in either store.
     pub compared: usize,
-    /// Counts of the first store.
     pub before: RecordCounts,
-    /// Counts of the second store.
     pub after: RecordCounts,
 }
 

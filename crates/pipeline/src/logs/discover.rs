@@ -17,18 +17,16 @@ use crate::error::{Error, is_passing};
 use crate::logs::discover_remote;
 use crate::logs::file_stat::{FileStat, SeenObjects};
 use crate::logs::local_files;
+use crate::logs::local_files::is_temporary;
 use crate::logs::table_folders::{TableFault, TableFolders};
-use crate::logs::temporary_files::is_temporary;
 
 /// The logs that fit the patterns.
 #[derive(Debug, Clone, Default)]
 pub struct DiscoveredLogs {
-    /// Their files, by the name of the first.
-    pub logs: BTreeMap<String, LogFiles>,
-    /// Files of groups that cannot be read, and why.
-    pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
+    /// Their files, by the name of the first, and why they cannot be read.
+    pub(crate) logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)>,
     /// Files of groups whose flight has no main log.
-    pub strays: Vec<String>,
+    strays: Vec<String>,
     /// File status of objects from listings, by address.
     pub(crate) seen: SeenObjects,
 }
@@ -52,7 +50,7 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
         companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
     if companions.is_empty() && !config.document.logs.has_pieces() {
-        found.logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
+        found.logs.extend(main.into_iter().map(|(log_path, path)| (log_path, (LogFiles::one(path), None))));
     } else {
         group_files(config, main, companions, &mut found);
     }
@@ -77,7 +75,7 @@ fn flights_of(
         match flights {
             Ok(paths) => named.extend(paths.into_iter().map(|path| (log_path(config, &path), path))),
             Err(diagnostic) if is_passing(&diagnostic.code) => {
-                found.faulty.insert(name, (path, diagnostic));
+                found.logs.insert(name, (LogFiles::one(path), Some(diagnostic)));
             }
             Err(_) => named.push((name, path)),
         }
@@ -95,12 +93,11 @@ pub fn flight_paths(config: &Config, paths: &[PathBuf]) -> Vec<PathBuf> {
 
 /// Logs to inspect.
 #[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct SelectedLogs {
     /// The logs, each with its name.
     pub logs: Vec<NamedLog>,
-    /// Files that cannot be read.
     pub faults: Vec<Diagnostic>,
-    /// What is left out, in words.
     pub notes: Vec<String>,
 }
 
@@ -115,10 +112,12 @@ pub fn select(config: &Config, paths: Option<&[PathBuf]>, most: usize) -> Result
         return Ok(SelectedLogs { logs, ..SelectedLogs::default() });
     }
     let found = discover(config)?;
-    let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
     let stray = |file| format!("{file}: no matching main log for this flight; not used");
     let mut notes: Vec<String> = found.strays.into_iter().map(stray).collect();
-    let mut logs: Vec<NamedLog> = found.logs.into_iter().collect();
+    let (mut logs, mut faults) = (Vec::<NamedLog>::new(), Vec::new());
+    for (name, (files, fault)) in found.logs {
+        fault.map_or_else(|| logs.push((name, files)), |fault| faults.push(fault));
+    }
     let all = logs.len();
     if all > most {
         logs = sampled(config, logs, most.max(1));
@@ -145,7 +144,7 @@ fn sampled(config: &Config, logs: Vec<NamedLog>, most: usize) -> Vec<NamedLog> {
 ///
 /// # Errors
 /// As [`discover`], where groups or pieces must be searched.
-pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
+pub(crate) fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     if config.document.group.is_empty() && !config.document.logs.has_pieces() {
         return Ok(LogFiles::one(path));
     }
@@ -155,8 +154,8 @@ pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     };
     let same =
         |other: &PathBuf| other == path || whole(other).is_some_and(|other| Some(other) == whole(path));
-    let found = discover(config)?.logs.into_values().find(|files| files.all().any(same));
-    Ok(found.unwrap_or_else(|| LogFiles::one(path)))
+    let found = discover(config)?.logs.into_values().find(|(files, _)| files.all().any(same));
+    Ok(found.map_or_else(|| LogFiles::one(path), |(files, _)| files))
 }
 
 /// The whole log of a stored record; its first file alone where the search for the others fails.
@@ -213,11 +212,11 @@ fn group_files(
             Ok(who) => who,
             // Without its companions it would be an error of another kind, which no run would try again.
             Err(diagnostic) if is_passing(&diagnostic.code) => {
-                found.faulty.insert(log_path, (path, diagnostic));
+                found.logs.insert(log_path, (LogFiles::one(path), Some(diagnostic)));
                 continue;
             }
             Err(_) => {
-                found.logs.insert(log_path, LogFiles::one(path));
+                found.logs.insert(log_path, (LogFiles::one(path), None));
                 continue;
             }
         };
@@ -225,10 +224,10 @@ fn group_files(
         let is_piece =
             |(other, _): &&(FlightIdentity, String)| config.document.logs.has_pieces() && *other == who;
         match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
-            Some(files) => files.main.push(path),
+            Some((files, _)) => files.main.push(path),
             None => {
                 on_tail.push((who, log_path.clone()));
-                found.logs.insert(log_path, LogFiles::one(path));
+                found.logs.insert(log_path, (LogFiles::one(path), None));
             }
         }
     }
@@ -243,7 +242,7 @@ fn group_files(
             who.and_then(|who| attach_companion(config, found, &whose, &who, (group, &log_path, &path)));
         if let Err(diagnostic) = attached {
             let diagnostic = diagnostic.in_file(&log_path);
-            found.faulty.insert(log_path, (path, diagnostic));
+            found.logs.insert(log_path, (LogFiles::one(path), Some(diagnostic)));
         }
     }
 }
@@ -272,7 +271,7 @@ fn attach_companion(
     let is_own = |main: &Flight| if is_known { departs(main) } else { is_near(main) };
     let mut is_stray = true;
     for ((_, main), first) in placed().filter(|((main, _), _)| is_own(main)) {
-        let Some(files) = found.logs.get_mut(first) else { continue };
+        let Some((files, _)) = found.logs.get_mut(first) else { continue };
         if let (Some(position), None) = (position, main) {
             let what =
                 format!("this file of group `{group}` is of {position} alone, and {first} names no position");
@@ -343,7 +342,8 @@ fn matching(
                 }
                 Err((path, diagnostic)) => {
                     let shown = log_path(config, &path);
-                    found.faulty.insert(shown.clone(), (path, diagnostic.in_file(&shown)));
+                    let diagnostic = diagnostic.in_file(&shown);
+                    found.logs.insert(shown, (LogFiles::one(path), Some(diagnostic)));
                 }
             }
         }

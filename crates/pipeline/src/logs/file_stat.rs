@@ -12,10 +12,9 @@ pub(crate) type SeenObjects = HashMap<PathBuf, FileStat>;
 
 /// Identity and version of a file without opening it.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct FileStat {
-    /// Bytes.
     pub size_bytes: i64,
-    /// Nanoseconds since 1970 UTC.
     pub modified_utc_ns: i64,
     /// Device and inode where the system has them; an object's e-tag.
     pub file_id: String,

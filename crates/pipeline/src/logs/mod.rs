@@ -4,7 +4,6 @@
 pub mod discover;
 mod discover_remote;
 pub mod file_stat;
-mod local_files;
+pub mod local_files;
 pub mod plan;
 mod table_folders;
-pub mod temporary_files;

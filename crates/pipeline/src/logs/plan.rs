@@ -1,7 +1,6 @@
 //! Plan of a run: the logs found, those already processed, and the reason to process each of the others.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::PathBuf;
 
 use ingest::LogFiles;
 use jiff::Timestamp;
@@ -18,22 +17,18 @@ use crate::logs::file_stat::{FileStat, SeenObjects};
 
 /// Options of a run.
 #[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Request {
     /// Departures at or after this time.
     pub since_utc: Option<Timestamp>,
     /// Departures before this time.
     pub until_utc: Option<Timestamp>,
-    /// One aircraft only.
     pub tail_number: Option<TailNumber>,
-    /// This unit only.
     pub serial_number: Option<SerialNumber>,
-    /// Process at most this number of logs.
     pub limit: Option<usize>,
     /// Number of workers; one per core when not given.
     pub jobs: Option<usize>,
-    /// Process failed logs again.
     pub retry: bool,
-    /// Process every log again.
     pub redo: bool,
     /// Compare the content of known logs, even if their files have not changed.
     pub verify_content: bool,
@@ -62,50 +57,36 @@ impl Request {
     }
 }
 
-/// Reason to process a log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// Reason to process a log; its text is that of `run --dry-run`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "each variant has its text")]
 pub enum WorkReason {
-    /// The log is new.
+    #[strum(serialize = "new")]
     New,
-    /// The file has changed.
+    #[strum(serialize = "content changed")]
     ContentChanged,
-    /// A setting that affects it, or an installation, has changed.
+    /// So may an installation be.
+    #[strum(serialize = "setting changed")]
     SettingChanged,
-    /// The log it had yielded its flight to no longer owns it.
+    #[strum(serialize = "its flight has no other log now")]
     OwnerGone,
-    /// It failed before, and `--retry` is set.
+    #[strum(serialize = "in error, asked again")]
     Retry,
-    /// It failed in an earlier run for a cause that may pass: a read, a time limit, a wrong clock.
+    /// A read, a time limit, a wrong clock.
+    #[strum(serialize = "failed before for a passing cause")]
     Unfetched,
-    /// It cannot be listed.
+    #[strum(serialize = "cannot be listed")]
     Unlisted,
-    /// `--redo` is set.
+    #[strum(serialize = "asked again")]
     Asked,
-    /// `--verify-content` is set.
+    #[strum(serialize = "content to be compared")]
     Verify,
-}
-
-impl WorkReason {
-    /// Reason as text.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::New => "new",
-            Self::ContentChanged => "content changed",
-            Self::SettingChanged => "setting changed",
-            Self::OwnerGone => "its flight has no other log now",
-            Self::Retry => "in error, asked again",
-            Self::Unfetched => "failed before for a passing cause",
-            Self::Unlisted => "cannot be listed",
-            Self::Asked => "asked again",
-            Self::Verify => "content to be compared",
-        }
-    }
 }
 
 /// One log to be processed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct WorkItem {
-    /// Its files.
     pub files: LogFiles,
     /// Error that is known already, e.g. an unreadable folder.
     pub fault: Option<Diagnostic>,
@@ -113,7 +94,6 @@ pub struct WorkItem {
     pub log_path: String,
     /// File status; none when the file vanished since it was found.
     pub stat: Option<FileStat>,
-    /// Reason to process it.
     pub why: WorkReason,
     /// Status of an earlier log of this path.
     pub before: Option<LogRecord>,
@@ -128,10 +108,9 @@ impl WorkItem {
 
 /// Plan of a run.
 #[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Plan {
-    /// Number of logs that match the patterns.
     pub found: usize,
-    /// Number of logs already processed.
     pub known: usize,
     /// Logs to be processed, largest first; those that failed before come last.
     pub work: Vec<WorkItem>,
@@ -141,7 +120,6 @@ pub struct Plan {
     pub gone: HashMap<String, Vec<LogRecord>>,
     /// Number of logs with stored records that were deleted, or that no pattern matches any more, and that lie nowhere else.
     pub absent: usize,
-    /// Number of logs excluded by the selection.
     pub not_asked: usize,
     /// Logs left for later by `--limit`.
     pub left: usize,
@@ -153,14 +131,12 @@ pub struct Plan {
 
 /// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct StandingError {
-    /// The log.
     pub log: String,
     /// Code of its first error.
     pub code: String,
-    /// All errors as text.
     pub detail: String,
-    /// The run in which it failed.
     pub run_id: String,
     /// Whether `logs.acknowledged_errors` names the log, so that it no longer makes the exit code 1.
     pub is_acknowledged: bool,
@@ -186,14 +162,7 @@ pub fn plan(
     accounts: Vec<LogRecord>,
     request: &Request,
 ) -> Plan {
-    let seen = found.seen;
-    let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
-        found.logs.into_iter().map(|(log_path, files)| (log_path, (files, None))).collect();
-    let faulty = |(log_path, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
-        (log_path, (LogFiles::one(path), Some(diagnostic)))
-    };
-    logs.extend(found.faulty.into_iter().map(faulty));
-    let found = logs;
+    let DiscoveredLogs { logs: found, seen, .. } = found;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let contents: HashSet<&String> = here.iter().filter_map(|a| a.log_digest.as_ref()).collect();
     let lies_elsewhere =
@@ -279,16 +248,12 @@ pub(crate) fn flight_of(account: &LogRecord) -> Option<Flight> {
     })
 }
 
-/// Why a log is not processed in this run.
 #[derive(Debug, PartialEq)]
 enum Skipped {
-    /// It is up to date.
     Known,
-    /// The request selects other flights.
     NotAsked,
 }
 
-/// Inputs of the decision about a log.
 struct Planner<'a> {
     config: &'a Config,
     installations: &'a Installations,
@@ -325,7 +290,10 @@ impl Planner<'_> {
     /// Why this log is processed in this run, or nothing when it is up to date.
     fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
         let Some(account) = account else { return Some(WorkReason::New) };
-        let digest = |flight| config_digest(self.config, self.installations, &flight, &positions_of(account));
+        let positions = || account.positions.iter().filter_map(|position| Position::new(position).ok());
+        let digest = |flight| {
+            config_digest(self.config, self.installations, &flight, &positions().collect::<Vec<_>>())
+        };
         let settings = flight_of(account).map_or_else(|| self.unidentified.to_owned(), digest);
         if self.request.redo {
             Some(WorkReason::Asked)
@@ -367,8 +335,4 @@ impl Planner<'_> {
 fn is_silent(account: &LogRecord) -> bool {
     let sound = account.outcome.is_success() || account.error_code.as_deref() == Some("duplicate_flight");
     sound && account.estimated + account.refused == 0
-}
-
-fn positions_of(account: &LogRecord) -> Vec<Position> {
-    account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
 }

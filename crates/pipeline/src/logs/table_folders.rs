@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
 
-use crate::logs::temporary_files::parts_written_out;
+use crate::logs::local_files::parts_written_out;
 
 /// The format of a table, by the files in its folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, TimedInterval, UnitView};
+use ::report::{Event, FleetPriorView, Quality, QuantityView, Report, UnitView};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use records::report_rows::{
@@ -16,7 +16,7 @@ use records::{
     ChangePoint, Flight, Installation, Installations, PartNumber, QuantityRow, TrendRow, WorkRequest,
 };
 use store::{ColumnScan, LogOutcome, LogRecord, Query, Store};
-use trend::Forecast;
+use trend::{Forecast, Interval};
 
 use crate::assess::quantities::values::{self, READ};
 use crate::assess::trends::{self, EarlierAssessments, ReportAssessments, StoreAssessment, UnitSelection};
@@ -125,7 +125,6 @@ fn by_unit<R>(rows: impl IntoIterator<Item = R>, unit: impl Fn(&R) -> Name) -> B
     units
 }
 
-/// The followed quantities other than the gap, with the values of the flights.
 fn quantities(
     rows: &[QuantityRow],
     histories: &Histories,
@@ -151,13 +150,11 @@ fn scope(ask: &UnitSelection) -> Option<String> {
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-/// What all units' pages are composed from.
 struct ReportComposer<'a> {
     config: &'a Config,
     earlier: &'a EarlierAssessments,
     checks: &'a [InspectionRow],
     installations: &'a Installations,
-    /// Parts whose gap is the largest along the stroke.
     by_largest: BTreeSet<String>,
 }
 
@@ -180,7 +177,7 @@ impl ReportComposer<'_> {
             level: drawn
                 .past
                 .iter()
-                .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
+                .filter_map(|(us, band)| Some((Timestamp::from_microsecond(*us).ok()?, *band)))
                 .collect(),
             forecast: forecast(drawn, &row),
             watch_m: part.and_then(|part| self.config.parts.get(&part)?.settings.watch_m),
@@ -220,16 +217,12 @@ impl ReportComposer<'_> {
 }
 
 /// The fan on the calendar, at this unit's utilisation; nothing where that is not known or the unit was removed.
-fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<TimedInterval> {
+fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<(Timestamp, Interval)> {
     let Some(hours_per_day) = row.hours_per_day.filter(|_| row.removed_utc.is_none()) else {
         return Vec::new();
     };
     let at = |hours: f64| days_after(row.as_of_utc, (hours - row.elapsed_hours.0) / hours_per_day);
-    drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
-}
-
-fn timed_interval(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<TimedInterval> {
-    Some(TimedInterval { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
+    drawn.ahead.iter().filter_map(|(hours, band)| Some((at(*hours)?, *band))).collect()
 }
 
 fn prior(

@@ -1,9 +1,11 @@
 //! Tables of what the pages of a report show, as Parquet files.
 
-use ::report::{Page, Report, TimedInterval, UnitView, removal_forecast};
+use ::report::{Page, Report, UnitView, removal_forecast};
+use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
 use records::report_rows::{ReportFlightRow, ReportGapRow};
 use records::row_schema::{Row, to_nullable_batch};
+use trend::Interval;
 
 use crate::error::Error;
 
@@ -55,14 +57,14 @@ fn flights(unit: &UnitView) -> impl Iterator<Item = ReportFlightRow> {
 
 fn gaps(unit: &UnitView) -> impl Iterator<Item = ReportGapRow> {
     let row = move |kind| {
-        move |at: &TimedInterval| ReportGapRow {
+        move |(at_utc, gap): &(Timestamp, Interval)| ReportGapRow {
             part_number: unit.row.part_number.clone(),
             serial_number: unit.row.serial_number.clone(),
             kind,
-            at_utc: at.at_utc,
-            gap_m: at.m,
-            gap_p05_m: at.p05_m,
-            gap_p95_m: at.p95_m,
+            at_utc: *at_utc,
+            gap_m: gap.m,
+            gap_p05_m: gap.p05_m,
+            gap_p95_m: gap.p95_m,
         }
     };
     unit.level.iter().map(row("level")).chain(unit.forecast.iter().map(row("forecast")))

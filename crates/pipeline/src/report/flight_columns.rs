@@ -20,7 +20,6 @@ const NUMBERS: [&str; 9] = [
     "load_reversals",
 ];
 
-/// Columns of the gap along the stroke.
 const PROFILE: [&str; 3] = ["gap_profile_at_m", "gap_profile_m", "gap_profile_se_m"];
 
 /// What a page shows of a flight in addition to the columns of its history.
@@ -34,7 +33,6 @@ pub(super) struct FlightDetails {
     pub(super) flags: Box<[Box<str>]>,
 }
 
-/// What a page shows of each row of the store.
 pub(super) fn flight_details(stored: &ColumnScan) -> Result<Vec<FlightDetails>, Error> {
     // The unit's hours are joined from those of its tail.
     let others = ["reason", "flags", "tail_hours_end"];

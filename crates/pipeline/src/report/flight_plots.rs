@@ -22,10 +22,9 @@ pub const MAX_PLOTS: usize = 200;
 
 /// What was drawn.
 #[derive(Debug, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct FlightPlots {
-    /// One page per actuator and flight.
     pub pages: Vec<Page>,
-    /// Logs that could not be read.
     pub diagnostics: Vec<Diagnostic>,
     /// Flights that are not drawn because of [`MAX_PLOTS`].
     pub left_out: usize,
@@ -92,7 +91,6 @@ pub fn draw(
     Ok(plots)
 }
 
-/// Indices of the units whose flights are drawn, the most urgent first.
 fn by_urgency(report: &Report) -> Vec<usize> {
     let units = &report.units;
     let is_wanted = |k: &usize| report.scope.is_some() || units[*k].row.action.is_some();

@@ -13,8 +13,7 @@ use records::sanitize::escape_cell;
 use report::{Page, Report};
 use tempfile::TempDir;
 
-use crate::error::Error;
-use crate::run::event::Event;
+use crate::{Error, Event};
 
 /// Age at which a temporary folder is one of a report that was killed.
 const LEFTOVER_AGE: Duration = Duration::from_hours(24);
@@ -24,10 +23,9 @@ const MANIFEST: &str = ".freeplay-report";
 
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct PublishSummary {
-    /// Files.
     pub files: u64,
-    /// Their bytes.
     pub bytes: u64,
 }
 
@@ -144,7 +142,6 @@ fn write_json(report: &Report, path: &Path) -> Result<u64, Error> {
     write().map_err(|e| failed(path, e))
 }
 
-/// Start of the names of temporary folders of a report.
 fn prefix(dir: &Path) -> String {
     let name = dir.file_name().map_or_else(|| "report".to_owned(), |n| n.to_string_lossy().into_owned());
     format!(".{name}.new-")

@@ -12,14 +12,13 @@ use job::Config;
 use records::Installations;
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
 use crate::logs::plan::{Plan, Request, WorkItem};
-use crate::run::event::Event;
 use crate::run::flight_ownership::ProcessedLog;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::scheduler::{Context, RunInputs, WorkerContext, execute_run};
 use crate::run::summary::RunSummary;
 use crate::run::worker_pool::StepCount;
+use crate::{Error, Event};
 
 /// One log to be processed by the engine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

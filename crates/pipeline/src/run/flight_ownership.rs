@@ -17,16 +17,14 @@ use records::{Diagnostic, GapRecord, Status};
 use serde::{Deserialize, Serialize};
 use store::{HeldRecord, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
-use crate::error::Error;
 use crate::fleet::histories::UnitKey;
 use crate::logs::plan::{self, Plan, WorkItem};
-use crate::run::event::Event;
 use crate::run::summary::{self, DuplicateLog, LogError, Refusals, RunSummary};
+use crate::{Error, Event};
 
 /// By how much a corrected departure may differ from the one before, µs: a month is easily mistaken.
 const MOST_CORRECTED_US: i64 = 40 * 24 * 3_600 * 1_000_000;
 
-/// Outcome of one log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ProcessedLog {
     /// Its status: `known` where its content and settings are those of stored records, so that only its name or its date is
@@ -64,15 +62,12 @@ pub(crate) struct OwnershipLedger<'a> {
     config: &'a Config,
     plan: &'a Plan,
     accounts: HashMap<String, LogRecord>,
-    /// Records of this run.
     own: HashMap<RecordKey, OwnRecord>,
-    /// Errors of each log that this run has processed.
     errors: BTreeMap<String, Vec<Diagnostic>>,
     /// Logs that contradict the record of one which this run has not processed yet: it may be of another flight now.
     waiting: BTreeMap<String, ProcessedLog>,
     /// Logs by the hash of their tail and flight id, unless the configuration declares whether they are pieces.
     same_id: HashMap<u64, Vec<String>>,
-    /// Units whose records changed.
     pub(crate) touched: BTreeSet<UnitKey>,
     /// New paths of logs that were renamed, by their old ones.
     pub(crate) renamed: BTreeMap<String, String>,
@@ -118,7 +113,6 @@ impl<'a> OwnershipLedger<'a> {
         ledger
     }
 
-    /// Status of all logs, after this run.
     pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> + Clone {
         let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
         self.accounts.values().chain(unchanged.into_iter().flatten())
@@ -318,7 +312,6 @@ impl<'a> OwnershipLedger<'a> {
         }
     }
 
-    /// Whether this run is still to process a log.
     fn is_awaited(&self, log: &str, run_id: &str) -> bool {
         self.accounts.get(log).is_none_or(|account| account.run_id != run_id)
             && self.plan.work.iter().any(|work| work.log_path == log)
@@ -514,7 +507,6 @@ fn left_of<'l>(
     left.into_values().collect()
 }
 
-/// Hash of the tail and the flight id of a log that was identified.
 fn hash_of_id(account: &LogRecord) -> Option<u64> {
     let id = account.tail_number.as_ref().zip(account.flight_id.as_ref())?;
     let mut hash = DefaultHasher::new();
@@ -522,7 +514,6 @@ fn hash_of_id(account: &LogRecord) -> Option<u64> {
     Some(hash.finish())
 }
 
-/// Outcome of a log whose flight belongs to another log.
 fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> ProcessedLog {
     account.outcome = LogOutcome::Done;
     if is_same {

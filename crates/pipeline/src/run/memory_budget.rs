@@ -4,9 +4,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 
 /// Bytes of one sample while an actuator is estimated, measured as the peak of a resident set: 1.24 GiB at
 /// 36 million samples, rounded up.
-const BYTES_PER_SAMPLE: u64 = 40;
+pub(crate) const BYTES_PER_SAMPLE: u64 = 40;
 
-/// Budget of bytes in use at a time.
 #[derive(Debug)]
 pub(crate) struct MemoryBudget {
     limit_bytes: u64,
@@ -26,11 +25,6 @@ impl MemoryBudget {
     pub(crate) fn new(limit_mib: Option<u64>) -> Self {
         let limit_bytes = limit_mib.map_or(u64::MAX, |mib| mib.saturating_mul(1 << 20));
         Self { limit_bytes, in_use_bytes: Mutex::new(0), freed: Condvar::new() }
-    }
-
-    /// What the channels of one actuator will need.
-    pub(crate) fn actuator_bytes(samples: usize) -> u64 {
-        (samples as u64).saturating_mul(BYTES_PER_SAMPLE)
     }
 
     /// Waits until these bytes fit in addition to those in use, or nothing is in use.

@@ -18,7 +18,6 @@ use records::{Diagnostic, GapRecord, Installations, PartNumber, Provenance};
 use store::{LogOutcome, LogRecord, LogResult, Store};
 
 use crate::assess::trends;
-use crate::error::Error;
 use crate::findings::FollowUp;
 use crate::fleet::bookkeeping::dates_ahead::dates_ahead;
 use crate::fleet::bookkeeping::inspections::InspectionRow;
@@ -27,11 +26,11 @@ use crate::fleet::bookkeeping::maintenance_log::unknown_units;
 use crate::fleet::bookkeeping::{inspections, maintenance_log};
 use crate::logs::discover;
 use crate::logs::plan::{self, Plan, Request, WorkItem, WorkReason};
-use crate::run::event::Event;
 use crate::run::flight_ownership::{OwnershipLedger, ProcessedLog};
-use crate::run::memory_budget::MemoryBudget;
+use crate::run::memory_budget::{BYTES_PER_SAMPLE, MemoryBudget};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::{PoolSettings, StepCount, WorkerPool};
+use crate::{Error, Event};
 
 /// Longest wait of a finished flight for others of the same commit: each commit is a file and a log entry.
 const BATCH_WAIT: Duration = Duration::from_millis(500);
@@ -41,14 +40,13 @@ const READ_AGAIN_AFTER: [Duration; 2] = [Duration::from_millis(300), Duration::f
 const BATCH_LOGS: usize = 256;
 
 /// Inputs of a run in addition to its configuration.
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Context<'a> {
-    /// Version written into every record.
     pub program_version: &'a str,
     /// Longest wait for another run that holds it.
     pub wait: Option<Duration>,
     /// Set from outside to end the run after the flights in progress.
     pub stop: &'a AtomicBool,
-    /// Receives every event.
     pub watch: &'a (dyn Fn(Event) + Sync),
 }
 
@@ -165,14 +163,8 @@ pub(crate) fn execute_run(
         }
         Ok(())
     })?;
-    let waited = ledger.resolve_waiting(&writer, &mut report)?;
-    if !waited.is_empty() {
-        writer.commit(&waited)?;
-    }
-    let moved = ledger.moved_samples(&writer)?;
-    if !moved.is_empty() {
-        writer.commit(&moved)?;
-    }
+    writer.commit(&ledger.resolve_waiting(&writer, &mut report)?)?;
+    writer.commit(&ledger.moved_samples(&writer)?)?;
     report.not_reached_logs = ledger.not_reached(&inputs.run_id);
     report.not_reached = report.not_reached_logs.len();
     ledger.add_up(&mut report);
@@ -262,7 +254,6 @@ impl RunInputs {
     }
 }
 
-/// Processes all logs by workers of this machine.
 fn process_all(
     inputs: &Arc<RunInputs>,
     context: &Context<'_>,
@@ -299,7 +290,6 @@ fn process_all(
     Ok(())
 }
 
-/// Input of a worker, shared by all.
 #[derive(Clone, Copy)]
 pub(crate) struct WorkerContext<'a> {
     pub(crate) inputs: &'a RunInputs,
@@ -368,7 +358,7 @@ impl WorkerContext<'_> {
             ..Provenance::default()
         };
         let actuators: Vec<_> = opened.actuators().collect();
-        let bytes = MemoryBudget::actuator_bytes(opened.log.rows());
+        let bytes = (opened.log.rows() as u64).saturating_mul(BYTES_PER_SAMPLE);
         let process_log = |at: &&Actuator| {
             let _held = self.budget.take(bytes);
             let _step = self.steps.begin();

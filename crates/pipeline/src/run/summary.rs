@@ -35,12 +35,10 @@ pub struct LogError {
 
 /// Records without a gap for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Refusals {
-    /// Rejection code.
     pub reason: String,
-    /// Number of records.
     pub count: usize,
-    /// What to do about it.
     pub remedy: Option<&'static str>,
 }
 
@@ -55,8 +53,8 @@ pub struct DuplicateLog {
 
 /// An aircraft without data while others have some.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct SilentTail {
-    /// The aircraft.
     pub tail_number: String,
     /// Its newest departure in the store, or when its first unit was installed.
     pub since_utc: Timestamp,
@@ -87,16 +85,13 @@ fn quiet<'a>(
 
 /// Summary of a run.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct RunSummary {
-    /// Identifier of the run.
     pub run_id: String,
-    /// When it began.
     pub started_utc: Timestamp,
     /// Earlier runs without an end: they were killed, or their disk failed.
     pub cut_short: Vec<RunRecord>,
-    /// Logs that match the patterns.
     pub found: usize,
-    /// Logs that were processed before.
     pub known: usize,
     /// Logs excluded by the selection.
     pub not_asked: usize,
@@ -104,9 +99,7 @@ pub struct RunSummary {
     pub left: usize,
     /// Logs processed, failed ones included.
     pub done: usize,
-    /// Flights whose records were stored.
     pub flights: usize,
-    /// Records with a gap.
     pub estimated: usize,
     /// Records of rejected flights, by reason.
     pub refused: BTreeMap<String, usize>,
@@ -132,11 +125,8 @@ pub struct RunSummary {
     pub notes: Vec<String>,
     /// Logs of earlier runs that no pattern matches any more; their records stay.
     pub absent: usize,
-    /// Failed logs, by path.
     pub errors: Vec<LogError>,
-    /// Logs that the run has not processed.
     pub not_reached: usize,
-    /// Their names.
     pub not_reached_logs: Vec<String>,
     /// Aircraft whose newest departure is older than the fleet's by more than `stale_after_days`.
     pub quiet: Vec<SilentTail>,
@@ -146,7 +136,6 @@ pub struct RunSummary {
     /// Number of installed units whose newest gap is older than `trend.stale_after_days` before now.
     #[serde(skip)]
     pub stale_now: usize,
-    /// Newest departure of all logs.
     #[serde(skip)]
     pub newest_departure_utc: Option<Timestamp>,
     /// Skews, and stiffnesses of complete aircraft, that moved within the last month, on the aircraft of this run.
@@ -157,9 +146,7 @@ pub struct RunSummary {
     pub samples_repeated: Vec<RepeatedSamples>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
-    /// Duration of the run, s.
     pub took_s: f64,
-    /// Workers.
     pub workers: usize,
     /// Assessments of the units whose records changed.
     pub trends: Vec<TrendRow>,
@@ -169,10 +156,8 @@ pub struct RunSummary {
     pub standing_errors: Vec<StandingError>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, also when the run had nothing new.
     pub work_list: Vec<TrendRow>,
-    /// Alerts and work requests that follow from the findings.
     #[serde(flatten)]
     pub follow_up: FollowUpSummary,
-    /// Number of units of the fleet by state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
     /// Logs in error whose other actuators are stored.
@@ -334,7 +319,6 @@ pub(crate) fn of_log(work: &WorkItem, run_id: &str) -> LogRecord {
     }
 }
 
-/// Status of a log that a run has planned.
 pub(crate) fn not_reached(work: &WorkItem, run_id: &str) -> LogRecord {
     LogRecord { outcome: LogOutcome::NotReached, ..of_log(work, run_id) }
 }

@@ -13,7 +13,7 @@ use records::Diagnostic;
 ///
 /// # Errors
 /// The error of the work, `panic` when it panics, `log_timeout` when it takes too long.
-pub fn within_time_limit<T: Send + 'static>(
+pub(crate) fn within_time_limit<T: Send + 'static>(
     display_name: &str,
     config: &Config,
     work: impl FnOnce() -> Result<T, Diagnostic> + Send + 'static,
@@ -38,7 +38,6 @@ pub fn within_time_limit<T: Send + 'static>(
     })
 }
 
-/// The error of a log that was not finished within its limit.
 pub(crate) fn log_timeout(display_name: &str, limit_s: f64) -> Diagnostic {
     let what = format!("the log was not finished within {limit_s} s");
     Diagnostic::new("log_timeout", what).in_file(display_name).hint(

@@ -14,12 +14,11 @@ use std::time::{Duration, Instant};
 
 use records::Diagnostic;
 
-use crate::error::Error;
 use crate::logs::plan::{Plan, WorkItem};
-use crate::run::event::Event;
 use crate::run::flight_ownership::ProcessedLog;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::time_limit::log_timeout;
+use crate::{Error, Event};
 
 /// Interval at which the time limits are checked while no worker reports.
 const TURN: Duration = Duration::from_millis(100);
@@ -33,7 +32,6 @@ const MAX_ABANDONED_IN_A_ROW: usize = 16;
 /// Logs that pass their limit in one run at most: what their threads hold is free only when the process ends.
 const MAX_LATE: usize = 256;
 
-/// Processes one log, by its index in the plan.
 pub(crate) type ProcessLog = dyn Fn(usize, &MemoryBudget, &StepCount) -> ProcessedLog + Send + Sync;
 
 /// How many steps of a log (its opening, an actuator) threads are at just now.
@@ -102,7 +100,6 @@ impl Shared {
     }
 }
 
-/// Workers with threads and a memory budget of their own.
 struct Workers {
     shared: Arc<Shared>,
     /// Closed when every worker has ended.
@@ -135,12 +132,10 @@ impl Workers {
     }
 }
 
-/// What the workers of a run are started for.
 pub(crate) struct PoolSettings<'a> {
     pub(crate) process_log: Arc<ProcessLog>,
     pub(crate) plan: &'a Plan,
     pub(crate) workers: usize,
-    /// Time limit of one log.
     pub(crate) limit: Duration,
     pub(crate) memory_mib: Option<u64>,
     pub(crate) stop: &'a AtomicBool,
@@ -188,7 +183,8 @@ impl<'a> WorkerPool<'a> {
                 let limit_s = self.settings.limit.as_secs_f64();
                 let mut outcome = (self.settings.fail)(work, log_timeout(&work.log_path, limit_s));
                 outcome.account.duration_s = limit_s;
-                return Ok(Some(self.finished(log, Box::new(outcome))));
+                (self.settings.watch)(outcome.event(work));
+                return Ok(Some(Box::new(outcome)));
             }
             let now = Instant::now();
             if self.settings.stop.load(Ordering::Relaxed) {
@@ -204,7 +200,8 @@ impl<'a> WorkerPool<'a> {
                 Ok(Message::Finished { log, outcome }) => {
                     if self.in_progress.remove(&log).is_some() {
                         self.abandoned_in_a_row = 0;
-                        return Ok(Some(self.finished(log, outcome)));
+                        (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
+                        return Ok(Some(outcome));
                     }
                 }
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),
@@ -221,15 +218,9 @@ impl<'a> WorkerPool<'a> {
         }
     }
 
-    /// Begins no further log.
     fn stop(&mut self) {
         self.stop_seen.get_or_insert_with(Instant::now);
         self.workers.shared.stop();
-    }
-
-    fn finished(&self, log: usize, outcome: Box<ProcessedLog>) -> Box<ProcessedLog> {
-        (self.settings.watch)(outcome.event(&self.settings.plan.work[log]));
-        outcome
     }
 
     /// Looks for logs that have passed their limit, when all messages are read, and replaces their workers. A log that

@@ -42,7 +42,6 @@ fn channels() -> Channels {
     [("command", command), ("folder", folder), ("url", url)].map(|(name, of)| (name.to_owned(), of)).into()
 }
 
-/// The run was killed.
 #[derive(Debug, PartialEq)]
 struct Killed;
 

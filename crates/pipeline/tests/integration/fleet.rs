@@ -28,7 +28,6 @@ pub(crate) fn config() -> Config {
     config_with("[logs]", "[logs]")
 }
 
-/// A configuration with a flights table.
 pub(crate) fn with_flights(mut config: Config, table: &str) -> Config {
     let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
     std::fs::write(file.path(), table).unwrap();
@@ -37,7 +36,6 @@ pub(crate) fn with_flights(mut config: Config, table: &str) -> Config {
     config
 }
 
-/// An installation of a tail, position, part number and serial number.
 pub(crate) fn installation(
     [tail, position, part, serial]: [&str; 4],
     installed_utc: Timestamp,
@@ -67,7 +65,6 @@ pub(crate) fn estimated(gap_um: f64) -> GapEstimate {
     }
 }
 
-/// A store with the results of some logs, below a folder.
 pub(crate) fn store(folder: &Path, results: &[LogResult]) -> Store {
     let store = Store::create_or_open(folder.join("results")).unwrap();
     store.lock(None).unwrap().commit(results).unwrap();

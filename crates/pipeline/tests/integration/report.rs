@@ -37,7 +37,6 @@ fn close(a: f64, b: f64, share: f64) -> bool {
     (a - b).abs() <= share * b.abs()
 }
 
-/// A store with the records of all units.
 fn store(folder: &Path) -> Store {
     let flown =
         (0..UNITS).flat_map(|unit| (0..DAYS).step_by(DAYS_A_LOG as usize).map(move |at| record(unit, at)));
@@ -68,11 +67,11 @@ fn every_number_of_the_report_is_that_of_the_assessments() {
 /// The drawn median meets the limit on the likely date, the upper bound on the earliest date, the lower on the latest.
 fn chart_is_that_of_the_row(unit: &UnitView, row: &TrendRow, as_of: Timestamp) {
     let days = |at: Timestamp| at.duration_since(as_of).as_secs_f64() / 86_400.0;
-    let meets = |gap_m: fn(&report::TimedInterval) -> f64| {
-        let crossing = unit.forecast.windows(2).find(|pair| gap_m(&pair[1]) >= LIMIT_M).unwrap();
-        let [from, to] = [&crossing[0], &crossing[1]];
+    let meets = |gap_m: fn(&trend::Interval) -> f64| {
+        let crossing = unit.forecast.windows(2).find(|pair| gap_m(&pair[1].1) >= LIMIT_M).unwrap();
+        let [(from_utc, from), (to_utc, to)] = [&crossing[0], &crossing[1]];
         let share = (LIMIT_M - gap_m(from)) / (gap_m(to) - gap_m(from));
-        days(from.at_utc) + share * (days(to.at_utc) - days(from.at_utc))
+        days(*from_utc) + share * (days(*to_utc) - days(*from_utc))
     };
     for (drawn, stated) in [
         (meets(|band| band.p95_m), row.not_before_utc),
@@ -83,7 +82,7 @@ fn chart_is_that_of_the_row(unit: &UnitView, row: &TrendRow, as_of: Timestamp) {
         assert!(close(drawn, stated, 0.1), "{}: {drawn} days drawn, {stated} stated", row.serial_number);
     }
     // The smoothed level ends at the level that is stated.
-    let last = unit.level.last().unwrap();
+    let (_, last) = unit.level.last().unwrap();
     assert!((last.m - row.gap_m.unwrap()).abs() < 2e-6, "{last:?}, {row:?}");
 }
 

@@ -16,7 +16,6 @@ use crate::fleet::{self, config, day};
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
 
-/// A store of some records, below a folder.
 fn store(folder: &Path, rows: &[GapRecord]) -> Store {
     let results: Vec<_> = rows.iter().map(|row| fleet::result(vec![row.clone()])).collect();
     fleet::store(folder, &results)
@@ -36,7 +35,6 @@ fn installation(unit: i32, removed_utc: Option<Timestamp>) -> Installation {
     fleet::installation(names, day(-1), removed_utc)
 }
 
-/// The number of the unit that a record of [`flown`] is of.
 fn unit(record: &GapRecord) -> i32 {
     record.serial_number.as_str()[1..].parse().unwrap()
 }

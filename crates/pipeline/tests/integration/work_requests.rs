@@ -28,7 +28,6 @@ struct Desk {
 }
 
 impl Desk {
-    /// What comes of a line of a story.
     fn step(&mut self, line: &str) -> Vec<String> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {

@@ -11,11 +11,8 @@ const UPPER: &str = "#C85200";
 const LOWER: &str = "#1F6FB2";
 const GAP: &str = r##"fill="none" stroke="#222222" stroke-width="2""##;
 
-/// Size of one actuator's plot, pixels.
 const SIZE: [f64; 2] = [1280.0, 640.0];
-/// Height of its heading, pixels.
 const HEADING: f64 = 46.0;
-/// Width of the plots against time, pixels.
 const TIME_PLOTS_WIDTH: f64 = 800.0;
 /// Maximum number of points of a curve over time: two per pixel.
 const MAX_POINTS: usize = 1400;
@@ -24,18 +21,14 @@ const MAX_CONTACTS: usize = 3000;
 
 /// Data behind one estimate.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct EstimatePlot {
-    /// Which actuator of which log.
     pub title: String,
-    /// Result as text.
     pub summary: String,
-    /// Time between samples, s.
     pub step_s: f64,
     /// The first sample after each break of the clock, and its time, s.
     pub breaks: Vec<(usize, f64)>,
-    /// δX, m; NaN where missing.
     pub dx_m: Vec<f64>,
-    /// Load, N; NaN where missing.
     pub load_n: Vec<f64>,
     /// S(t), m; NaN outside the segments.
     pub s_m: Vec<f64>,
@@ -119,7 +112,6 @@ fn stacked(plot: &EstimatePlot, top: f64) -> String {
     heading.finish(&format!(r#"y="{top}""#))
 }
 
-/// Draws positions and load, one above the other.
 fn over_time(plot: &EstimatePlot) -> String {
     let height = SIZE[1] - HEADING;
     let end_s = plot.time_s(plot.s_m.len() as f64).max(1.0);

@@ -202,7 +202,6 @@ fn dates(range: &Range<f64>, most: usize) -> Vec<(f64, String)> {
     all.filter(is_tick).map(|t| (day(t), name(t))).collect()
 }
 
-/// Days since 1970.
 pub(crate) fn day(t: Timestamp) -> f64 {
     t.as_second() as f64 / DAY_S
 }

@@ -3,10 +3,11 @@
 use jiff::{SignedDuration, Timestamp};
 use records::report_rows::ReportFlight;
 use records::time::DAY_S;
+use trend::Interval;
 
 use crate::charts::frame::{BAR, DATA, Frame, GRID, INK, LIMIT, PEER, PLAN, THIN, WATCH, day, thinned};
 use crate::format::{date, micrometres};
-use crate::model::{TimedInterval, UnitView};
+use crate::model::UnitView;
 use crate::peers::Peers;
 
 /// Maximum number of points in the chart; above it, each point is the mean of neighbouring flights.
@@ -17,7 +18,7 @@ const LABEL_SHARE: f64 = 0.14;
 /// Until when the forecast is drawn: the latest date on which the limit is reached, where it is at most three times as far
 /// away as the likely one; else a fifth more than the likely one.
 pub(crate) fn forecast_end(unit: &UnitView) -> Option<Timestamp> {
-    let (start, whole) = (unit.forecast.first()?.at_utc, unit.forecast.last()?.at_utc);
+    let (start, whole) = (unit.forecast.first()?.0, unit.forecast.last()?.0);
     let ahead_s = |at: Timestamp| at.duration_since(start).as_secs_f64();
     let Some(likely_s) = unit.row.likely_utc.map(ahead_s).filter(|ahead_s| *ahead_s > 0.0) else {
         return Some(whole);
@@ -33,9 +34,9 @@ pub(crate) fn shows_crossing(unit: &UnitView) -> bool {
     is_ahead && unit.row.not_before_utc.is_some_and(|from| Some(from) <= forecast_end(unit))
 }
 
-pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<TimedInterval> {
+pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<(Timestamp, Interval)> {
     let end = forecast_end(unit);
-    unit.forecast.iter().filter(|f| end.is_none_or(|end| f.at_utc <= end)).copied().collect()
+    unit.forecast.iter().filter(|(at, _)| end.is_none_or(|end| *at <= end)).copied().collect()
 }
 
 /// Draws gap against date as an SVG picture; an empty string for a unit without an estimate.
@@ -76,7 +77,7 @@ fn frame(unit: &UnitView, peers: &Peers<'_>, points: &[[f64; 4]], first: f64, la
     let end = forecast_end(unit).map_or(today, day).max(last).max(today);
     let span = (end - first).max(14.0);
     let limit = unit.row.limit_m.map(|limit_m| limit_m * 1e6);
-    let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6).fold(0.0, f64::max);
+    let ahead = unit.forecast.iter().map(|(_, f)| f.p95_m * 1e6).fold(0.0, f64::max);
     let ahead = ahead.min(limit.map_or(f64::INFINITY, |limit| 1.1 * limit));
     let shown = unit.inspections.iter().map(|check| check.play_m * 1e6);
     let highest =
@@ -89,12 +90,12 @@ fn frame(unit: &UnitView, peers: &Peers<'_>, points: &[[f64; 4]], first: f64, la
     Frame::new([900.0, 440.0], [26.0, 6.0, 34.0, 6.0], x, y)
 }
 
-fn draw_band(frame: &mut Frame, band: &[TimedInterval], fill: &str, pen: &str) {
+fn draw_band(frame: &mut Frame, band: &[(Timestamp, Interval)], fill: &str, pen: &str) {
     let um = |m: f64| m * 1e6;
-    let edges: Vec<[f64; 3]> = band.iter().map(|b| [day(b.at_utc), um(b.p05_m), um(b.p95_m)]).collect();
+    let edges: Vec<[f64; 3]> = band.iter().map(|(at, b)| [day(*at), um(b.p05_m), um(b.p95_m)]).collect();
     if !edges.is_empty() {
         frame.band(&edges, fill);
-        frame.line(band.iter().map(|b| (day(b.at_utc), um(b.m))), pen);
+        frame.line(band.iter().map(|(at, b)| (day(*at), um(b.m))), pen);
     }
 }
 

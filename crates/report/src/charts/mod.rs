@@ -4,4 +4,3 @@ pub(crate) mod estimate_plot;
 pub(crate) mod frame;
 pub(crate) mod history;
 pub(crate) mod quantities;
-pub(crate) mod sparkline;

@@ -1,4 +1,4 @@
-//! Small charts: a followed quantity that changed, and the gap along the stroke.
+//! Small charts: a followed quantity that changed, the gap along the stroke, and the gaps of a unit without labels.
 
 use jiff::Timestamp;
 use records::Quantity;
@@ -66,4 +66,25 @@ pub(crate) fn stroke_profile(flight: &ReportFlight, limit_m: Option<f64>) -> Opt
     limit.into_iter().for_each(|limit| frame.horizontal(limit, LIMIT));
     frame.dot((*at, *gap), 3.5, DATA, &largest);
     Some((format!("{}: largest {largest}", date(flight.departure_utc)), frame.finish("")))
+}
+
+/// Draws points, µm, and a dashed limit, µm, on shared axes as an SVG picture; empty for fewer than two points.
+pub(crate) fn sparkline(
+    size: [f64; 2],
+    x: [f64; 2],
+    full: f64,
+    points: &[[f64; 2]],
+    limit: Option<f64>,
+) -> String {
+    if points.len() < 2 {
+        return String::new();
+    }
+    let mut frame = Frame::new(size, [2.0; 4], x[0]..x[1], 0.0..full);
+    if let Some(limit) = limit {
+        frame.horizontal(limit, &format!(r#"{} stroke-dasharray="4 3""#, LIMIT.replace("\"2\"", "\"1\"")));
+    }
+    let area: Vec<[f64; 3]> = points.iter().map(|[at, gap]| [*at, 0.0, *gap]).collect();
+    frame.band(&area, DATA);
+    frame.line(points.iter().map(|[at, gap]| (*at, *gap)), INK);
+    frame.finish(r#"class="spark" aria-hidden="true""#)
 }

@@ -17,9 +17,7 @@ use crate::peers::Peers;
 use crate::removal_forecast::removal_forecast;
 use crate::state_badge::StateBadge;
 
-/// Maximum number of rows on one page of the work list or of tails.
 const ROWS: usize = 100;
-/// Maximum number of entries on the fleet page itself.
 const FEW: usize = 40;
 /// A month is shown only with at least this expected number of removals.
 const LEAST_REMOVALS: f64 = 0.05;

@@ -4,7 +4,7 @@ use askama::Template;
 use jiff::Timestamp;
 
 use crate::charts::frame::{day, thinned};
-use crate::charts::sparkline::sparkline;
+use crate::charts::quantities::sparkline;
 use crate::format::{date, micrometres};
 use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};

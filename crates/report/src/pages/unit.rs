@@ -3,6 +3,7 @@
 use askama::Template;
 use jiff::Timestamp;
 use records::uncertainty::NORMAL_95;
+use trend::Interval;
 
 use crate::charts::history::{drawn_forecast, history, shows_crossing};
 use crate::charts::quantities::stroke_profile;
@@ -10,7 +11,7 @@ use crate::format::{
     NO_DATA, count, counted, date, hours, level, micrometres, micrometres_cell, micrometres_or, minute, rate,
     unbroken, whole_dates,
 };
-use crate::model::{Head, Report, TimedInterval, UnitView};
+use crate::model::{Head, Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::quantities::{self, Change, Chart, Level};
 use crate::pages::work_list::{capital, what};
@@ -34,7 +35,7 @@ struct View<'a> {
     quantity_changes: Vec<Change<'a>>,
     charts: Vec<Chart>,
     levels: Vec<Level>,
-    drawn_forecast: Vec<TimedInterval>,
+    drawn_forecast: Vec<(Timestamp, Interval)>,
 }
 
 /// Renders the page of a unit.

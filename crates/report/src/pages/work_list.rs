@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use records::TrendRow;
 
-use crate::charts::sparkline::sparkline;
+use crate::charts::quantities::sparkline;
 use crate::model::{Report, UnitView};
 
 /// Name of the group of units that are on no known aircraft.
@@ -62,7 +62,6 @@ pub(crate) fn what(row: &TrendRow) -> String {
     format!("{}{between} {position}", capital(&verb))
 }
 
-/// A text that begins with a capital.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()

@@ -12,14 +12,11 @@ use records::uncertainty::NORMAL_95;
 use records::{Diagnostic, PartNumber};
 
 use crate::args::{CheckArgs, Global};
-use crate::exit::{Code, Failure};
-use crate::output::{Output, escape};
-use crate::row_output;
-use crate::table::{self, number, text};
-
 use crate::commands::context::load_with_installations;
+use crate::output::escape;
+use crate::table::{self, number, text};
+use crate::{Code, Failure, Output, row_output};
 
-/// More logs than these are summarised, one line each.
 const MOST_WHOLE_LOGS: usize = 3;
 
 /// Why page checksums matter, and how to write them.
@@ -57,7 +54,6 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
 }
 
-/// One line for each layout of the logs, and each note once.
 fn overview(logs: &[LogCheck], channels: &[ChannelCheck]) -> String {
     let columns = [
         text("logs of one layout", 0),

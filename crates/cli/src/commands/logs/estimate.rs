@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use job::Config;
-use job::flight_log::part_of;
 use job::trace::Trace;
 use pipeline::inspect::estimate::{self, EstimateRequest, EstimateRow};
 use pipeline::logs::discover;
@@ -12,13 +11,10 @@ use records::{Diagnostic, Installations, PartNumber};
 use report::{EstimatePlot, estimate_plot_html, estimate_plot_svg};
 
 use crate::args::{EstimateArgs, Global};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
-use crate::table::{self, count, number, or_dash, text, unit_name};
-
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
 use crate::commands::results::query::{flags_text, load};
+use crate::table::{self, count, number, or_dash, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
 /// Estimates the given logs.
 ///
@@ -63,20 +59,15 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
-    let name =
-        PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &configured_parts(config)))?;
-    match part_of(config, &name) {
-        Ok(_) => Ok(name),
-        Err(_) => {
-            let what = format!("part number {number} is not configured");
-            Err(Failure::usage("part_unknown", what, &configured_parts(config)))
-        }
-    }
-}
-
-fn configured_parts(config: &Config) -> String {
     let parts: Vec<String> = config.parts.keys().map(ToString::to_string).collect();
-    format!("configured parts: {}", parts.join(", "))
+    let hint = format!("configured parts: {}", parts.join(", "));
+    let name = PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &hint))?;
+    let unknown = || format!("part number {number} is not configured");
+    if config.parts.contains_key(&name) {
+        Ok(name)
+    } else {
+        Err(Failure::usage("part_unknown", unknown(), &hint))
+    }
 }
 
 fn page(found: &[EstimateRow]) -> String {
@@ -96,7 +87,6 @@ fn page(found: &[EstimateRow]) -> String {
     format!("{}; nothing was stored\n", count(found.len(), "estimate")) + &table::of(found, columns)
 }
 
-/// Writes per-sample filter output of every actuator of the logs.
 fn write_trace(file: &Path, trace: &Trace, output: &Output) -> Result<(), Failure> {
     if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         let what = format!("{}: a trace is written as Parquet", display_path(file));

@@ -3,13 +3,9 @@
 use pipeline::logs::discover;
 
 use crate::args::{Global, NormalizeArgs};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::{display_path, load_with_installations};
+use crate::table::count;
+use crate::{Code, Failure, Output, progress, row_output};
 
 /// Writes normalized logs and prints their number.
 ///

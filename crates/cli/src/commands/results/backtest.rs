@@ -4,14 +4,10 @@ use pipeline::assess::backtest::{self, BacktestRow};
 use pipeline::assess::trends;
 
 use crate::args::{BacktestArgs, Global};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
-use crate::table::{self, number, text};
-
 use crate::commands::context::load_trend_context;
+use crate::table::{self, number, text};
+use crate::{Code, Failure, Output, row_output};
 
-/// Bounds and labels of the shares of life used.
 const SHARES: [(f64, f64, &str); 4] = [
     (0.0, 0.35, "below 35 %"),
     (0.35, 0.65, "35 to 65 %"),

@@ -5,10 +5,8 @@ use std::fmt::Write as _;
 use pipeline::inspect::store_diff::{DiffRow, RecordCounts, StoreDiff, compare_stores};
 
 use crate::args::DiffArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
 use crate::table::{self, count, number, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
 /// Compares two stores.
 ///

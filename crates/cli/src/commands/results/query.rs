@@ -12,14 +12,11 @@ use records::{GapEstimate, GapRecord, Installations};
 use store::{Query, Store};
 
 use crate::args::{Format, Global, QueryArgs};
-use crate::completion::QUERY_KEYS;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
-use crate::table::{self, count, number, text};
-
 use crate::commands::context::{KnownNames, called, check_range, load_with_installations};
 use crate::commands::results::trend;
+use crate::completion::QUERY_KEYS;
+use crate::table::{self, count, number, text};
+use crate::{Code, Failure, Output, row_output};
 
 /// Prints the matching records, oldest first.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
@@ -73,7 +70,6 @@ fn verdict(
     Ok(if found.now.is_empty() { String::new() } else { trend::page(&found, is_one_unit, MAX_RANK) + "\n" })
 }
 
-/// Part number and dates of a search, as text.
 fn restrictions(args: &QueryArgs) -> String {
     let part = args.part.as_ref().map(|part| format!(" with part number {part}"));
     let since = args.departures.since.map(|since| format!(" from {since}"));
@@ -81,7 +77,6 @@ fn restrictions(args: &QueryArgs) -> String {
     [part, since, until].into_iter().flatten().collect()
 }
 
-/// The selected names, by column.
 fn selected(query: &Query) -> [(&'static str, &Option<String>); 4] {
     [
         ("tail_number", &query.tail_number),
@@ -155,14 +150,10 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
 
 /// One line per rejection code of these records, with its remedy.
 fn remedies(records: &[GapRecord]) -> String {
-    let codes: BTreeSet<&str> = records.iter().filter_map(|r| rejection_code(&r.estimate)).collect();
-    let line = |code: &str| Some(format!("{code}: {}\n", job::rejection::remedy(code)?));
-    let lines: String = codes.into_iter().filter_map(line).collect();
-    if lines.is_empty() { lines } else { format!("\n{lines}") }
-}
-
-fn rejection_code(e: &GapEstimate) -> Option<&str> {
-    e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
+    let line = |e: &GapEstimate| Some(format!("{}: {}\n", e.reason.as_deref()?, remedy(e)?));
+    let lines: BTreeSet<String> = records.iter().filter_map(|r| line(&r.estimate)).collect();
+    let above = if lines.is_empty() { "" } else { "\n" };
+    lines.iter().fold(above.to_owned(), |text, line| text + line)
 }
 
 /// The rows with the remedy of each rejection as last column.
@@ -173,12 +164,10 @@ fn with_remedies(records: &[GapRecord]) -> Result<RecordBatch, Failure> {
     row_output::columns(&batch, &names.chain(["remedy"]).collect::<Vec<_>>(), &[("remedy", remedies)])
 }
 
-/// Load band of an estimate, N.
 pub(crate) fn load(e: &GapEstimate) -> String {
     e.load_p05_n.zip(e.load_p95_n).map_or_else(table::empty_cell, |(low, high)| format!("{low:.0}…{high:.0}"))
 }
 
-/// Rejection reason or quality flags.
 pub(crate) fn flags_text(e: &GapEstimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
         records::Status::Refused => format!("refused: {reason}"),

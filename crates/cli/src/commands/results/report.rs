@@ -7,13 +7,9 @@ use jiff::Timestamp;
 use pipeline::report::{compose, data, flight_plots, publish};
 
 use crate::args::{Global, ReportArgs};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, note_future};
+use crate::table::count;
+use crate::{Code, Failure, Output, progress, row_output};
 
 /// Writes the pages; prints the path of the first one, their number and size.
 ///

@@ -13,15 +13,11 @@ use records::uncertainty::NORMAL_95;
 use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow, significant};
 
 use crate::args::{Global, TrendArgs};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
+use crate::commands::context::{KnownNames, load_trend_context, note_future};
 use crate::sparkline::{SCALE, sparkline};
 use crate::table::{self, Column, count, number, or_dash, state_mark, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
-use crate::commands::context::{KnownNames, load_trend_context, note_future};
-
-/// Prints one row per unit, or per query.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     note_future(args.as_of, output);
     let (config, installations) = load_trend_context(&args.external, global, output)?;
@@ -53,7 +49,6 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     Ok(Code::Success)
 }
 
-/// Prints the followed quantities of the units, or what changed.
 fn quantities(
     args: &TrendArgs,
     ask: &UnitSelection,

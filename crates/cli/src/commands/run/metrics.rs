@@ -42,7 +42,6 @@ fn gauge(text: &mut String, name: &str, help: &str, value: f64) {
     );
 }
 
-/// Start, end and exit code of a run.
 fn run_gauges(text: &mut String, started_utc: Timestamp, code: Code) {
     let seconds = |at: Timestamp| at.as_millisecond() as f64 / 1e3;
     gauge(text, "run_started_timestamp_seconds", "When the last run began.", seconds(started_utc));

@@ -1,6 +1,5 @@
 //! `run`: processes new and changed logs, updates trends and prints the run summary.
 
-mod follow_up;
 mod metrics;
 mod summary;
 
@@ -15,13 +14,10 @@ use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::{SerialNumber, TailNumber};
 
 use crate::args::{Global, RunArgs, UnitFilterArgs};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress::Progress;
-use crate::row_output;
-use crate::table::{self, count, number, text};
-
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
+use crate::progress::Progress;
+use crate::table::{self, count, number, text};
+use crate::{Code, Failure, Output, row_output};
 
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let started_utc = Timestamp::now();
@@ -127,7 +123,6 @@ fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
 enum Phase {
     /// It lists logs, or waits for another run: nothing is stored.
     Searching,
-    /// It processes logs and stores their results.
     Processing,
     Ended,
 }
@@ -196,7 +191,7 @@ fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<C
     let size = |work: &WorkItem| work.stat.as_ref().map(|stat| stat.size_bytes as f64 / 1e6);
     let columns: &table::Columns<'_, WorkItem> = &[
         (text("log", 0), &|w| w.log_path.clone()),
-        (text("reason", 0), &|w| w.why.as_str().to_owned()),
+        (text("reason", 0), &|w| w.why.to_string()),
         (number("size [MB]", 1), &|w| size(w).map_or_else(table::empty_cell, |size| format!("{size:.2}"))),
     ];
     output.write_result(&(head + &table::of(&work, columns)))?;

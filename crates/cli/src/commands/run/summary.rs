@@ -7,12 +7,12 @@ use std::time::Duration;
 use jiff::Timestamp;
 use pipeline::assess::changes::{Cause, UnitChange};
 use pipeline::findings::monitoring::recorder_change::RecorderChange;
+use pipeline::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use pipeline::fleet::bookkeeping::maintenance_log::UnknownUnit;
 use pipeline::run::summary::LogError;
 use pipeline::{RunSummary, State};
-use records::Quantity;
+use records::{Quantity, WorkRequest};
 
-use super::follow_up;
 use crate::commands::context::VERSION;
 use crate::commands::results::trend::unit_table;
 use crate::exit::Code;
@@ -20,13 +20,9 @@ use crate::output::escape;
 use crate::progress::span;
 use crate::table::{self, count, unit_name};
 
-/// Findings of a kind that are printed.
 const MAX_SHOWN: usize = 5;
-/// Failed logs, recorder and quantity changes that are printed.
 const MAX_FAILURES: usize = 10;
-/// Changed units that are printed.
 const MAX_CHANGED: usize = 20;
-/// Command that prints all findings.
 const IN_JSON: &str = "`freeplay run --json`";
 /// Command that prints every log of the latest run with its error.
 const LOGS_OF_RUN: &str = "`freeplay store runs --run last`";
@@ -78,12 +74,11 @@ pub(super) fn text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     fleet(report, &mut page.0);
     changes(&report.changed, report, &mut page.0);
-    page.0.push_str(&follow_up::section(&report.follow_up));
+    page.0.push_str(&follow_up_section(&report.follow_up));
     page.0.push_str(&exit_text(report, code));
     page.0
 }
 
-/// Logs found, records stored and rejected.
 fn counts(report: &RunSummary, page: &mut Page) {
     for run in &report.cut_short {
         let started = run.started_utc.strftime("previous run %Y-%m-%dT%H:%M:%SZ");
@@ -251,7 +246,6 @@ fn fleet(report: &RunSummary, page: &mut String) {
     page.push_str(&unit_table(report.work_list.iter().collect(), u8::MAX));
 }
 
-/// State changes of this run, unit by unit.
 fn changes(changed: &[UnitChange], report: &RunSummary, page: &mut String) {
     if changed.is_empty() {
         return;
@@ -267,7 +261,6 @@ fn changes(changed: &[UnitChange], report: &RunSummary, page: &mut String) {
     }
 }
 
-/// State and event changes of a unit as text.
 fn change_text(unit: &UnitChange, report: &RunSummary) -> String {
     let word = |state: Option<&str>| state.unwrap_or("no state").to_owned();
     let mut changes = Vec::new();
@@ -288,7 +281,6 @@ fn change_text(unit: &UnitChange, report: &RunSummary) -> String {
     changes.join("; ")
 }
 
-/// What exit code 1 means, and how to go on.
 fn exit_text(report: &RunSummary, code: Code) -> String {
     if code != Code::LogsInError {
         return String::new();
@@ -307,4 +299,66 @@ fn exit_text(report: &RunSummary, code: Code) -> String {
             .to_owned()
     };
     table::labelled("Exit code 1: ", &text)
+}
+
+const MAX_REQUESTS: usize = 5;
+
+/// Work requests and alerts; empty without both.
+fn follow_up_section(follow_up: &FollowUpSummary) -> String {
+    let mut page = work_section(&follow_up.work_requests);
+    if let Some(alerts) = &follow_up.alerts {
+        page.push_str(&table::labelled("alerts: ", &alerts_text(alerts)));
+    }
+    if page.is_empty() { page } else { format!("\n{page}") }
+}
+
+fn work_section(work: &WorkSummary) -> String {
+    let mut page = String::new();
+    let counts = [(work.open, "open"), (work.acknowledged, "acknowledged"), (work.deferred, "deferred")];
+    let changes =
+        [(&work.new, "new"), (&work.returned, "back"), (&work.moved, "moved"), (&work.closed, "closed")];
+    if counts.iter().all(|(n, _)| *n == 0) && changes.iter().all(|(some, _)| some.is_empty()) {
+        return page;
+    }
+    let counts: Vec<String> = counts.iter().map(|(n, status)| format!("{n} {status}")).collect();
+    let _ = writeln!(page, "work requests: {} (`freeplay work list`)", counts.join(", "));
+    let name = |request: &WorkRequest| {
+        let unit = unit_name(request.part_number.as_deref(), &request.serial_number);
+        format!("{} {}", request.request_id, escape(&unit))
+    };
+    for (some, what) in changes.iter().filter(|(some, _)| !some.is_empty()) {
+        let more = some.len().saturating_sub(MAX_REQUESTS);
+        let more = (more > 0).then(|| format!("and {more} more"));
+        let listed: Vec<String> = some.iter().take(MAX_REQUESTS).map(name).chain(more).collect();
+        page.push_str(&table::labelled(&format!("  {what:<11} "), &listed.join(", ")));
+    }
+    page
+}
+
+fn alerts_text(alerts: &AlertSummary) -> String {
+    let mut parts = Vec::new();
+    if alerts.is_baseline {
+        parts.push("the present states are the baseline; changes are sent from now on".to_owned());
+    } else if alerts.is_held {
+        parts.push("changes wait for a run that processes every log".to_owned());
+    } else {
+        parts.push(count(alerts.changes, "state change"));
+    }
+    for (n, what) in [
+        (alerts.sent, "sent"),
+        (alerts.failed, "not sent, the next run sends again"),
+        (alerts.waiting, "left for the next run"),
+        (alerts.unconfirmed + alerts.unconfirmed_before, "unconfirmed (`freeplay store alerts --unsent`)"),
+    ] {
+        if n > 0 {
+            parts.push(format!("{} {what}", count(n, "message")));
+        }
+    }
+    for (channel, n) in &alerts.without_channel {
+        let (messages, channel) = (count(*n, "message"), escape(channel));
+        parts.push(format!(
+            "{messages} for `[alerts.{channel}]`, which is no longer configured (`freeplay store alerts --drop {channel}`)"
+        ));
+    }
+    parts.join("; ")
 }

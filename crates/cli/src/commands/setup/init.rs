@@ -6,19 +6,13 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use pipeline::inspect::simulate::{SAMPLE_FOLDER, write_sample};
-use pipeline::logs::temporary_files::is_temporary;
+use pipeline::logs::local_files::is_temporary;
 
 use crate::args::InitArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::display_path;
-use crate::commands::setup::proposal::Proposal;
-
-const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
+use crate::commands::setup::proposal::{Proposal, TEMPLATE};
+use crate::table::count;
+use crate::{Code, Failure, Output, progress, row_output};
 
 const FILES: [(&str, &str); 2] = [
     ("pipeline.toml", TEMPLATE),
@@ -54,7 +48,7 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     if let Some(folder) = &args.from {
         let logs = logs(folder)?;
         let proposal = Proposal::of(folder, &logs)?;
-        (toml, table) = (proposal.configuration(TEMPLATE, folder, &args.dir)?, proposal.installations(&logs));
+        (toml, table) = (proposal.configuration(folder, &args.dir)?, proposal.installations(&logs));
         output.note(&proposal.coverage());
     }
     fs::create_dir_all(&args.dir)?;
@@ -66,7 +60,6 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-/// Writes the sample fleet with its configuration.
 fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
     let there = ["pipeline.toml", SAMPLE_FOLDER].map(|name| dir.join(name)).into_iter().find(|p| p.exists());
     if let Some(path) = there {
@@ -86,7 +79,6 @@ fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-/// Writes a new file.
 fn write(path: &Path, text: &str, output: &Output) -> Result<(), Failure> {
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file =

@@ -18,7 +18,6 @@ use crate::exit::Failure;
 use crate::output::escape;
 use crate::table::count;
 
-/// Maximum number of logs from which a mapping is inferred.
 const MOST_SAMPLES: usize = 60;
 
 /// Maximum number of logs that are searched for tails and positions.
@@ -27,10 +26,12 @@ const MOST_LOGS: usize = 5000;
 /// Maximum number of channel groups: more kinds of files are tails or days.
 const MOST_GROUPS: usize = 6;
 
+/// The configuration that `init` writes without logs.
+pub(crate) const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
+
 /// Placeholder for the part number, which no log contains.
 const PART: &str = "PART-NUMBER";
 
-/// Head of a proposed installations table.
 const INSTALLATIONS_HEAD: &str = "\
 # Proposed: one row per tail and position found, each with a placeholder unit.
 # Enter the real part and serial numbers and dates: a trend belongs to the unit and follows it to other positions.
@@ -41,9 +42,7 @@ tail_number,position,part_number,serial_number,installed_utc,removed_utc
 /// Logs from which the same mapping is inferred.
 struct Variant {
     offer: InferredMapping,
-    /// The first of these logs.
     log: PathBuf,
-    /// Number of these logs in the sample.
     logs: usize,
 }
 
@@ -76,7 +75,6 @@ impl Variant {
         }
     }
 
-    /// Its tails as elements of a list.
     fn tails(&self) -> String {
         self.offer.tails.iter().map(|tail| quoted(tail)).collect::<Vec<_>>().join(", ")
     }
@@ -203,19 +201,15 @@ pub(crate) struct Proposal {
     logs: usize,
     folders: usize,
     looked_at: usize,
-    /// The usual layout.
     main: Variant,
     /// Pattern of the main logs, relative to the folder of all logs.
     files: String,
     groups: BTreeMap<String, Group>,
-    /// Layouts of single tails.
     overrides: Vec<Variant>,
-    /// Layouts that the proposal does not cover.
     uncovered: Vec<Variant>,
 }
 
 impl Proposal {
-    /// Looks at a sample of the logs.
     pub(crate) fn of(folder: &Path, logs: &[PathBuf]) -> Result<Self, Failure> {
         let found = variants(sampled(logs))?;
         let looked_at = found.iter().map(|variant| variant.logs).sum();
@@ -300,13 +294,7 @@ impl Proposal {
     }
 
     /// Template with the mapping of the logs below a folder, to be verified with `check`.
-    pub(crate) fn configuration(&self, template: &str, folder: &Path, dir: &Path) -> Result<String, Failure> {
-        let mut trend = template;
-        let [head, tables, _, estimate, _, part] = MARKERS.map(|marker| {
-            let (before, after) = trend.split_once(marker).unwrap_or((trend, ""));
-            trend = after;
-            before
-        });
+    pub(crate) fn configuration(&self, folder: &Path, dir: &Path) -> Result<String, Failure> {
         let (offer, log) = (&self.main.offer, &self.main.log);
         let names = |names: Vec<&str>| escape(&names.join(", "));
         let positions = names(offer.positions.iter().map(String::as_str).collect());
@@ -318,8 +306,6 @@ impl Proposal {
         let lacks_format = identity_path.as_ref().map_or(has_tail, |(_, format)| format.is_none());
         let text = Configuration {
             proposal: self,
-            head,
-            tables,
             positions: if positions.is_empty() { "none".to_owned() } else { positions },
             position_path: position_path.map(|(_, path)| path),
             identity_path,
@@ -327,12 +313,6 @@ impl Proposal {
             has_departure,
             lacks_departure: lacks_format && !has_departure,
             others: names(offer.others.iter().take(12).map(String::as_str).collect()),
-            estimate,
-            linear_part: part
-                .replace("EMA-27-1040", PART)
-                .replace("\nlimit_m", "\n# limit_m")
-                .replace("\nwatch_m", "\n# watch_m"),
-            trend,
             folder: relative(folder, dir)?,
         };
         text.render().map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
@@ -355,15 +335,11 @@ impl Proposal {
     }
 }
 
-/// Where the proposal takes over from the common template, and where it gives back.
-const MARKERS: [&str; 6] = [
-    "files = [\"logs/**/*.parquet\"]\n",
-    "\n# Which flight a log is.",
-    "[estimate]\n",
-    "\n# One table per part number",
-    "[part.\"EMA-27-1040\"]\n",
-    "[trend]\n",
-];
+/// What the common template has after a text and before another one, or its end.
+fn common(from: &str, to: &str) -> &'static str {
+    let (_, rest) = TEMPLATE.split_once(from).unwrap_or_default();
+    rest.split_once(to).map_or(rest, |(text, _)| text)
+}
 
 /// A proposed `pipeline.toml`: the common template with the mapping of some logs, and placeholders of a part without limits,
 /// which a run refuses. Keys that could not be inferred are left to fill in.
@@ -371,8 +347,6 @@ const MARKERS: [&str; 6] = [
 #[template(path = "proposal.toml", escape = "none")]
 struct Configuration<'p> {
     proposal: &'p Proposal,
-    head: &'p str,
-    tables: &'p str,
     positions: String,
     /// The expression that finds the position in the path, where the path holds nothing else of the identity.
     position_path: Option<String>,
@@ -381,11 +355,7 @@ struct Configuration<'p> {
     has_tail: bool,
     has_departure: bool,
     lacks_departure: bool,
-    /// Columns that were not understood.
     others: String,
-    estimate: &'p str,
-    linear_part: String,
-    trend: &'p str,
     folder: PathBuf,
 }
 
@@ -413,7 +383,6 @@ impl Configuration<'_> {
     }
 }
 
-/// Channels by the names of their tables.
 const CHANNELS: [(Role, &str); 4] = [
     (Role::Motor, "motor_position"),
     (Role::Screw, "screw_position"),
@@ -421,7 +390,6 @@ const CHANNELS: [(Role, &str); 4] = [
     (Role::Temperature, "temperature"),
 ];
 
-/// The usual unit of a channel.
 fn usual(role: Role) -> Unit {
     let units = [(Role::Motor, Unit::Degree), (Role::Screw, Unit::Millimetre), (Role::Load, Unit::Newton)];
     units.iter().find(|(of, _)| *of == role).map_or(Unit::Celsius, |(_, unit)| *unit)
@@ -463,7 +431,6 @@ fn unite(offer: &mut InferredMapping, other: &InferredMapping) {
     offer.by_row |= other.by_row;
 }
 
-/// Every pair of a tail and a position.
 fn pairs(tails: &BTreeSet<String>, positions: &BTreeSet<String>) -> Vec<(String, String)> {
     tails.iter().flat_map(|tail| positions.iter().map(|own| (tail.clone(), own.clone()))).collect()
 }

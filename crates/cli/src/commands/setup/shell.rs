@@ -4,8 +4,7 @@ use clap::CommandFactory;
 use clap_complete::env::Shells;
 
 use crate::args::{Args, CompletionsArgs};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
+use crate::{Code, Failure, Output};
 
 /// Writes the script by which a shell asks this program for completions.
 pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Code, Failure> {

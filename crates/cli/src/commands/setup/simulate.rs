@@ -3,13 +3,9 @@
 use pipeline::inspect::simulate as fleet;
 
 use crate::args::SimulateArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::display_path;
+use crate::table::count;
+use crate::{Code, Failure, Output, progress, row_output};
 
 /// Simulates the fleet and prints the folder.
 ///

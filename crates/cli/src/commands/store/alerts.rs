@@ -8,10 +8,8 @@ use records::{AlertRecord, AlertStatus};
 use store::Store;
 
 use crate::args::RowFormatArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::row_output;
 use crate::table::{self, count, number, or_dash, text, unit_name};
+use crate::{Code, Failure, Output, row_output};
 
 pub(crate) fn alerts(
     store: &Store,
@@ -74,7 +72,6 @@ pub(crate) fn drop_unsent(
     Ok(Code::Success)
 }
 
-/// Makes an unconfirmed alert due again.
 pub(crate) fn resend(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
     let mut writer = store.lock(None)?;
     let mut rows = store.alerts()?;

@@ -14,14 +14,11 @@ use serde_json::json;
 use store::{Info, Query, RunRecord, Store, Withdrawal};
 
 use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand};
-use crate::exit::{Code, Failure};
-use crate::output::Output;
-use crate::progress::span;
-use crate::row_output;
-use crate::table::count;
-
 use crate::commands::context::load_config;
 use crate::commands::results::query;
+use crate::progress::span;
+use crate::table::count;
+use crate::{Code, Failure, Output, row_output};
 
 pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let config = load_config(global)?;
@@ -77,7 +74,6 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output
     Ok(Code::LogsInError)
 }
 
-/// Time since a run ended.
 fn age(run: &RunRecord) -> Option<Duration> {
     Timestamp::now().duration_since(run.finished_utc?).try_into().ok()
 }

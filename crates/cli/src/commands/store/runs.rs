@@ -7,11 +7,9 @@ use records::Status;
 use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
 
 use crate::args::RowFormatArgs;
-use crate::exit::{Code, Failure};
-use crate::output::Output;
 use crate::progress::span;
-use crate::row_output;
 use crate::table::{self, count, number, or_dash, text};
+use crate::{Code, Failure, Output, row_output};
 
 /// Columns of a run; `ended` is its status.
 const RUN: [&str; 14] = [

@@ -116,7 +116,6 @@ fn flights_table(config: &Config) -> &str {
     config.document.logs.flights.as_deref().unwrap_or_default()
 }
 
-/// Tail, flight id and departure of a log that was identified.
 fn identity(account: &LogRecord) -> Option<(&str, &str, Timestamp)> {
     Some((account.tail_number.as_deref()?, account.flight_id.as_deref()?, account.departure_utc?))
 }
@@ -212,7 +211,6 @@ pub struct UnmappedPositions {
     pub tails: usize,
 }
 
-/// Positions and number of aircraft, with the remedy.
 impl std::fmt::Display for UnmappedPositions {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let tails = if self.tails == 1 { "1 tail".to_owned() } else { format!("{} tails", self.tails) };
@@ -267,7 +265,6 @@ pub struct UnknownTail {
     pub nearest: Option<String>,
 }
 
-/// Where it is named, and the nearest known tail.
 impl std::fmt::Display for UnknownTail {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: tail {} has neither an installation nor a log", self.named_in, self.tail_number)?;

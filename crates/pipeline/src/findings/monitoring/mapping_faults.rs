@@ -16,6 +16,7 @@ const MIN_FLIGHTS: usize = 3;
 
 /// A wrong mapping, sign, unit or rate, by its effect: most of the latest flights of a scope are rejected for it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct MappingFault {
     /// The part number, if all its actuators are affected.
     pub part_number: Option<String>,
@@ -23,15 +24,12 @@ pub struct MappingFault {
     pub tail_number: Option<String>,
     /// The position, if one only is affected.
     pub position: Option<String>,
-    /// Rejection code.
     pub reason: String,
     /// Rejected flights among the latest ones, and all of these, over the actuators of the scope.
     pub refused: usize,
     /// Latest flights of the scope.
     pub flights: usize,
-    /// What to change in the configuration.
     pub remedy: &'static str,
-    /// Units of the scope.
     #[serde(skip)]
     pub units: BTreeSet<UnitKey>,
 }
@@ -51,14 +49,12 @@ impl MappingFault {
     }
 }
 
-/// Scope, evidence and remedy.
 impl std::fmt::Display for MappingFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}; {}", self.scope(), self.evidence(), self.remedy)
     }
 }
 
-/// Rejections of the latest flights of some actuators.
 #[derive(Default)]
 struct Tally<'a> {
     codes: Vec<Option<&'a str>>,

@@ -41,7 +41,6 @@ impl RecentFlight<'_> {
     }
 }
 
-/// Where which unit sits; empty where its records have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PositionKey<'a> {
     pub(crate) tail_number: &'a str,
@@ -50,7 +49,6 @@ pub(crate) struct PositionKey<'a> {
     pub(crate) serial_number: &'a str,
 }
 
-/// Flights of a unit at one position, by departure.
 pub(crate) type RecentFlights<'a> = BTreeMap<PositionKey<'a>, Vec<RecentFlight<'a>>>;
 
 /// The flights of the last months before a time, without their values.

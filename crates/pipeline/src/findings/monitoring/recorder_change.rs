@@ -13,12 +13,10 @@ use crate::findings::monitoring::REPORTED_DAYS;
 
 /// A quantity that moved, on one aircraft.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct RecorderChange {
-    /// The aircraft.
     pub tail_number: String,
-    /// What moved, with its unit.
     pub quantity: Quantity,
-    /// The positions it moved in.
     pub positions: Vec<String>,
     /// Whether these are most of the positions of the aircraft that could show it, and two at least: a matter of
     /// what records them, not of any of them.
@@ -40,7 +38,6 @@ impl RecorderChange {
     }
 }
 
-/// Days within which changes of one aircraft are one change.
 const SAME_DAYS: f64 = 3.0;
 
 /// Quantities of a channel, and the stiffness: one unit's stiffness changes with the unit, that of a whole aircraft with

@@ -54,7 +54,6 @@ pub(crate) fn detect(recent: &RecentFlights<'_>) -> Vec<RepeatedSamples> {
     pairs.into_iter().map(repeated).collect()
 }
 
-/// Both flights with their positions.
 impl std::fmt::Display for RepeatedSamples {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(

@@ -59,7 +59,6 @@ impl ChannelCheck {
 /// unlike the configured one.
 pub(super) type Identified = (PartNumber, IdentifiedParams, Option<&'static str>);
 
-/// Findings of one actuator.
 #[derive(Default)]
 pub(super) struct ActuatorCheck {
     pub(super) found: Vec<ChannelCheck>,
@@ -67,7 +66,6 @@ pub(super) struct ActuatorCheck {
     pub(super) identified: Option<Identified>,
 }
 
-/// Time base of an actuator as text.
 fn clock(a: &ActuatorChannels) -> String {
     let segments = match a.segments.len() {
         1 => "no gaps".to_owned(),
@@ -165,7 +163,6 @@ fn tested_channel(code: &str) -> usize {
     }
 }
 
-/// Quality flags of one channel.
 fn channel_flags<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
     a.flags.iter().map(String::as_str).filter(|flag| flag.starts_with(channel)).collect()
 }
@@ -190,7 +187,6 @@ const USUAL_FACTORS: [(f64, &str); 7] = [
     (1e6, "as m against µm: check the lead and the units of both positions"),
 ];
 
-/// The usual mistake that makes such a ratio of the positions.
 fn cause_of(slope: f64) -> Option<(f64, &'static str)> {
     if (slope + 1.0).abs() < SLOPE_TOLERANCE {
         return Some((-1.0, "one position has the other sign: set `sign = -1` in its channel"));

@@ -41,15 +41,13 @@ pub struct LogCheck {
 
 /// What was found in logs.
 #[derive(Debug, Default)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct LogsCheck {
-    /// Logs that could be opened.
     pub logs: Vec<LogCheck>,
-    /// Errors of logs.
     pub diagnostics: Vec<Diagnostic>,
     /// One error for each part number most of whose actuator-flights would be refused for a wrong mapping, or fit
     /// another stiffness than the configured one.
     pub mapping_faults: Vec<Diagnostic>,
-    /// Identified parameters by part number.
     pub identified: BTreeMap<PartNumber, Vec<IdentifiedParams>>,
 }
 
