@@ -2,5 +2,4 @@
 
 pub(crate) mod byte_source;
 pub(crate) mod foreign_format;
-pub(crate) mod read_at;
-pub(crate) mod transient;
+pub(crate) mod retry;

@@ -12,7 +12,7 @@ use polars_parquet_format::thrift::protocol::{TCompactInputProtocol, TInputProto
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
 use crate::error::{Fault, encrypted, not_parquet};
-use crate::io::{foreign_format, read_at};
+use crate::io::{foreign_format, retry};
 
 /// The highest encoding that is read: byte stream split.
 const HIGHEST_ENCODING: i64 = 9;
@@ -34,11 +34,11 @@ pub(crate) struct Footer {
 /// Reads the footer of a file, after its claims were compared with what it holds, and its rows with the bytes of the file.
 /// `want` fetches bytes before they are read.
 pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Footer, Fault> {
-    let length = read_at::file_length(file)?;
+    let length = retry::file_length(file)?;
     want(length.saturating_sub(USUAL_FOOTER)..length)?;
     let end = length.saturating_sub(8);
     let mut trailer = [0; 8];
-    read_at::read_exact(file, &mut trailer[..length.min(8) as usize], end)?;
+    retry::read_exact(file, &mut trailer[..length.min(8) as usize], end)?;
     let [a, b, c, d, magic @ ..] = trailer;
     let bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
     let Some(start) = end.checked_sub(bytes).filter(|_| magic == *b"PAR1") else {
@@ -47,7 +47,7 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
     bounds::check("bytes of footer", bytes, FOOTER_BYTES)?;
     want(start..length)?;
     let mut footer = vec![0; bytes as usize];
-    read_at::read_exact(file, &mut footer, start)?;
+    retry::read_exact(file, &mut footer, start)?;
     let damaged = "its footer is damaged: it claims more than it holds, or an offset below zero";
     let mut walk = Walk::new(&footer);
     walk.fields().ok_or_else(|| not_parquet(damaged))?;
@@ -72,9 +72,9 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
 
 /// What a file is that does not end with a Parquet footer, by its first bytes.
 fn without_footer(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Fault, Fault> {
-    let mut head = vec![0; read_at::file_length(file)?.min(foreign_format::HEAD_BYTES) as usize];
+    let mut head = vec![0; retry::file_length(file)?.min(foreign_format::HEAD_BYTES) as usize];
     want(0..head.len() as u64)?;
-    read_at::read_exact(file, &mut head, 0)?;
+    retry::read_exact(file, &mut head, 0)?;
     Ok(match head[..] {
         [b'P', b'A', b'R', b'E', ..] => encrypted(None),
         [b'P', b'A', b'R', b'1', ..] => not_parquet("the file is truncated: it does not end with a footer"),

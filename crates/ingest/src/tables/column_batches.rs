@@ -27,7 +27,7 @@ use parquet::file::metadata::ParquetMetaData;
 use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, Fault, bad_table, column_type, not_parquet};
 use crate::io::byte_source::whole;
-use crate::io::transient;
+use crate::io::retry;
 use crate::parquet::log_file::with_codes;
 use crate::parquet::page_reader::BoundedGroups;
 use crate::parquet::raw_footer::{self, caught};
@@ -288,7 +288,7 @@ fn csv(file: &Path) -> Result<Rows, Fault> {
     let mut text = Vec::new();
     let opened = whole(file)?;
     let mut opened = opened.as_ref();
-    transient::with_retry(|| {
+    retry::with_retry(|| {
         text.clear();
         opened.rewind()?;
         opened.read_to_end(&mut text)
