@@ -22,7 +22,7 @@ pub(crate) struct ColumnBuilder {
 impl ColumnBuilder {
     /// An empty column with room for `values` values, which become SI or stay raw, with statistics of them or without.
     pub(crate) fn new(values: usize, to_si: Option<SiConversion>, has_stats: bool) -> Self {
-        let scanner = has_stats.then(StatsAccumulator::new);
+        let scanner = has_stats.then(StatsAccumulator::default);
         Self { to_si, values: acquire(values), scanner }
     }
 
