@@ -154,7 +154,7 @@ impl LogFile {
     }
 
     pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
-        self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
+        self.noted_field(name).map(FieldMetadata::of).unwrap_or_default()
     }
 
     /// A column's field in the Arrow schema; found by index, as a log may have ten thousand columns.
