@@ -8,7 +8,7 @@ use std::path::Path;
 
 use records::Diagnostic;
 
-use crate::io::transient;
+use crate::io::retry;
 use crate::mapping::column_pattern::{PLACEHOLDER, nearest};
 
 /// Code of a read that failed for a cause which may pass by itself.
@@ -104,12 +104,12 @@ impl From<io::Error> for Fault {
                 "this is a folder, not a file".into(),
                 "name the file, or the files in it: `FOLDER/*.parquet`",
             ),
-            _ if transient::is_file_limit(&source) => {
+            _ if retry::is_file_limit(&source) => {
                 (other(), "allow more open files (`ulimit -n 4096`); the next run tries again")
             }
             _ => (other(), "check the disk or share; the next run tries again"),
         };
-        Self::new(if transient::is_transient(&source) { READ_FAILED } else { UNREADABLE }, message, hint)
+        Self::new(if retry::is_transient(&source) { READ_FAILED } else { UNREADABLE }, message, hint)
     }
 }
 

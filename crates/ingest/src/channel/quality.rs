@@ -45,7 +45,7 @@ impl Quality {
         step_s: f64,
         excluded: usize,
     ) -> Self {
-        let seen = &seen.unwrap_or_else(|| StatsAccumulator::new().end(values));
+        let seen = &seen.unwrap_or_else(|| StatsAccumulator::default().end(values));
         let (samples, missing) = (values.len() - excluded, seen.missing - excluded);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);

@@ -5,6 +5,7 @@
 //! comparisons is as slow as its links.
 
 use multiversion::multiversion;
+use smart_default::SmartDefault;
 
 /// Samples in a group.
 const LANES: usize = 8;
@@ -26,11 +27,14 @@ pub(crate) struct ChannelStats {
 }
 
 /// Looks at a channel that grows, at what is new of it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, SmartDefault)]
 pub(crate) struct StatsAccumulator {
+    #[default([f64::INFINITY; LANES])]
     low: [f64; LANES],
+    #[default([f64::NEG_INFINITY; LANES])]
     high: [f64; LANES],
     missing: [u64; LANES],
+    #[default([f64::INFINITY; LANES])]
     min_step: [f64; LANES],
     max_second_difference: [f64; LANES],
     /// Repeats up to here, and most of them.
@@ -41,19 +45,6 @@ pub(crate) struct StatsAccumulator {
 }
 
 impl StatsAccumulator {
-    pub(crate) fn new() -> Self {
-        Self {
-            low: [f64::INFINITY; LANES],
-            high: [f64::NEG_INFINITY; LANES],
-            missing: [0; LANES],
-            min_step: [f64::INFINITY; LANES],
-            max_second_difference: [0.0; LANES],
-            repeats: 0,
-            most_repeats: 0,
-            done: 0,
-        }
-    }
-
     /// The channel as far as it is known by now, from its first sample on.
     pub(crate) fn advance(&mut self, values: &[f64]) {
         groups(self, values);
@@ -171,7 +162,7 @@ mod tests {
         /// However a channel with repeats and holes grows, one pass sees what a pass for each figure does.
         #[test]
         fn the_lanes_see_what_plain_passes_do(values in channel(), step in 1_usize..170) {
-            let mut scanner = StatsAccumulator::new();
+            let mut scanner = StatsAccumulator::default();
             (0..values.len()).step_by(step).for_each(|end| scanner.advance(&values[..end]));
             let seen = scanner.end(&values);
             let known = || values.iter().copied().filter(|v| !v.is_nan());

@@ -86,11 +86,6 @@ pub(super) fn folders(path: &Path) -> BTreeMap<IdentityField, String> {
     hive_folders(path).filter_map(|(name, value)| Some((fact(name, &value)?, name.to_owned()))).collect()
 }
 
-/// The value of the innermost folder called `name=value`.
-pub fn folder_value(path: &Path, name: &str) -> Option<String> {
-    hive_folders(path).filter(|(own, _)| *own == name).last().map(|(_, value)| value)
-}
-
 /// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
 const DEPARTURES: [(&str, &str); 21] = [
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", "%Y-%m-%dT%H:%M:%S"),

@@ -27,7 +27,8 @@ use crate::parquet::log_file::LogFile;
 use crate::time::clock::DAY_S;
 use crate::time::timestamps::EXCEL_ZERO;
 
-pub use identity_sources::{folder_value, is_piece, path_identity, path_position, path_tail};
+pub use crate::log::identity::folder_value;
+pub use identity_sources::{is_piece, path_identity, path_position, path_tail};
 
 /// The mapping that is inferred from a log.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use object_io::{Address, ObjectFile};
 
 use crate::error::Fault;
-use crate::io::transient;
+use crate::io::retry;
 
 #[derive(Debug)]
 pub(crate) struct ByteSource {
@@ -27,7 +27,7 @@ impl ByteSource {
         let address = Address::parse(path)?;
         let object = address.map(|address| ObjectFile::open(&address)).transpose()?;
         let file = match &object {
-            Some(object) => transient::with_retry(|| object.file().try_clone())?,
+            Some(object) => retry::with_retry(|| object.file().try_clone())?,
             None => open_local(path)?,
         };
         Ok(Self { file: Arc::new(file), object })
@@ -48,7 +48,7 @@ pub(crate) fn whole(path: &Path) -> Result<Arc<File>, Fault> {
 
 /// Opens a regular file; opening a named pipe would wait for its writer for ever.
 fn open_local(path: &Path) -> Result<File, Fault> {
-    Ok(transient::with_retry(|| match std::fs::metadata(path)?.file_type() {
+    Ok(retry::with_retry(|| match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
         kind if kind.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device")),

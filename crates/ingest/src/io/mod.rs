@@ -1,6 +1,4 @@
 //! Bytes of local files and objects: where they come from, and positional reads.
 
 pub(crate) mod byte_source;
-pub(crate) mod foreign_format;
-pub(crate) mod read_at;
-pub(crate) mod transient;
+pub(crate) mod retry;

@@ -170,11 +170,15 @@ pub(crate) fn hive_folders(path: &Path) -> impl Iterator<Item = (&str, String)> 
     named.map(|(name, value)| (name, percent_decode_str(value).decode_utf8_lossy().into_owned()))
 }
 
+/// The value of the innermost folder called `name=value`.
+pub fn folder_value(path: &Path, name: &str) -> Option<String> {
+    hive_folders(path).filter(|(own, _)| *own == name).last().map(|(_, value)| value)
+}
+
 /// The facts that those folders hold; the innermost wins.
 pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, String>) -> IdentityFields {
     let whole = absolute(path);
-    let named: BTreeMap<&str, String> = hive_folders(&whole).collect();
-    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name.as_str())?.clone()));
+    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, folder_value(&whole, name)?));
     // Hive's own word for a null.
     let is_value = |(_, value): &(IdentityField, String)| value != "__HIVE_DEFAULT_PARTITION__";
     folders.iter().filter_map(stated).filter(is_value).collect()
@@ -299,11 +303,7 @@ fn unambiguous(local: civil::DateTime, zone_name: &str) -> Result<Timestamp, Str
 /// # Errors
 /// When no zone is called so.
 pub fn zone(name: &str) -> Result<TimeZone, String> {
-    if name.eq_ignore_ascii_case("utc") {
-        Ok(TimeZone::UTC)
-    } else {
-        TimeZone::get(name).map_err(|e| e.to_string())
-    }
+    TimeZone::get(name).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

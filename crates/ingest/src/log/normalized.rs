@@ -13,7 +13,7 @@ use records::Position;
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::quality::Quality;
 use crate::channel::si_conversion::Geometry;
-use crate::channel::stats::{ChannelStats, StatsAccumulator};
+use crate::channel::stats::ChannelStats;
 use crate::error::{Error, Fault};
 use crate::log::identity::{Identity, IdentityFields};
 use crate::log::types::ActuatorChannels;
@@ -69,14 +69,14 @@ pub(crate) fn read_actuator(
     let excluded = noted(file, "apart").and_then(|text| text.parse().ok()).unwrap_or(0);
     let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
     let read = [motor?, dx?, load?];
-    if read.iter().any(|(_, seen)| seen.missing < excluded) {
+    if read.iter().any(|(_, seen)| seen.is_some_and(|seen| seen.missing < excluded)) {
         return Err(fail(format!("a channel lacks fewer than the {excluded} samples that are left out")));
     }
     if segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
         return Err(fail("a segment ends after the last row".into()));
     }
     let quality =
-        read.each_ref().map(|(values, seen)| Quality::of(values, &segments, Some(*seen), step_s, excluded));
+        read.each_ref().map(|(values, seen)| Quality::of(values, &segments, *seen, step_s, excluded));
     let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
     Ok(ActuatorChannels {
         position,
@@ -97,12 +97,10 @@ pub(crate) fn read_actuator(
     })
 }
 
-fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error> {
+fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, Option<ChannelStats>), Error> {
     let mut values = ColumnBuilder::new(file.rows().min(1 << 26), None, true);
     file.append_numbers(name, None, &mut values)?;
-    let (values, seen) = values.finish();
-    let seen = seen.unwrap_or_else(|| StatsAccumulator::new().end(&values));
-    Ok((values, seen))
+    Ok(values.finish())
 }
 
 /// Pairs such as `START..END` or `ROW:SECONDS`, separated by blanks.

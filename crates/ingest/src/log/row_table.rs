@@ -17,7 +17,6 @@ use crate::channel::stats::ChannelStats;
 use crate::error::{self, Error, Fault, STRUCT};
 pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{DistinctTexts, Partition};
-use crate::mapping::field_metadata::FieldMetadata;
 use crate::mapping::{ChannelMapping, ClockMapping, Layout, Mapping, RawValue};
 use crate::parquet::column_numbers::RowSelection;
 use crate::parquet::log_file::{LogFile, Scan};
@@ -172,7 +171,7 @@ impl RowTable {
             let own = file.field_metadata(leaf);
             own.check(leaf, noted.get_or_insert(own)).map_err(|fault| file.error(fault))?;
         }
-        noted.unwrap_or(FieldMetadata::NONE).line(leaf, map).map_err(|fault| self.error(fault))
+        noted.unwrap_or_default().line(leaf, map).map_err(|fault| self.error(fault))
     }
 
     /// Announces samples that will be read for a position, so that one pass over the files gathers them all.

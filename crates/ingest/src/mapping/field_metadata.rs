@@ -1,15 +1,17 @@
 //! Scale, offset and unit of a column in the metadata of its Arrow field, as pyarrow and others write them.
 
 use arrow::datatypes::Field;
+use smart_default::SmartDefault;
 
 use crate::error::Fault;
 use crate::mapping::ChannelMapping;
 use crate::mapping::units::{Unit, from_symbol};
 
 /// What a field notes of its column: `unit = raw · scale + offset`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, SmartDefault)]
 pub(crate) struct FieldMetadata {
     /// By the keys `scale` and `scale_factor` (the latter of the CF conventions 1.11, section 8.1); else 1.
+    #[default(1.0)]
     pub(crate) scale: f64,
     /// By the keys `offset` and `add_offset`; else 0.
     pub(crate) offset: f64,
@@ -18,9 +20,6 @@ pub(crate) struct FieldMetadata {
 }
 
 impl FieldMetadata {
-    /// A column of which nothing is noted.
-    pub(crate) const NONE: Self = Self { scale: 1.0, offset: 0.0, unit: None };
-
     pub(crate) fn of(field: &Field) -> Self {
         let text =
             |keys: [&str; 2]| keys.iter().find_map(|key| field.metadata().get(*key)).map(|text| text.trim());
@@ -36,7 +35,7 @@ impl FieldMetadata {
     /// Scale and offset of the channel: those of the mapping, or those that are noted where it leaves both open.
     pub(crate) fn line(&self, column: &str, map: &ChannelMapping) -> Result<(f64, f64), Fault> {
         let mapped = Self { scale: map.scale, offset: map.offset, unit: Some(map.unit) };
-        let is_open = |line: &Self| Self { unit: None, ..*line } == Self::NONE;
+        let is_open = |line: &Self| Self { unit: None, ..*line } == Self::default();
         let known =
             if is_open(&mapped) || is_open(self) { Self { unit: mapped.unit, ..*self } } else { mapped };
         self.check(column, &known)?;

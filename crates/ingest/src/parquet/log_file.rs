@@ -19,7 +19,7 @@ use parquet::file::metadata::{ColumnChunkMetaData, KeyValue};
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{self, Error, Fault, encrypted, not_parquet};
 use crate::io::byte_source::ByteSource;
-use crate::io::read_at;
+use crate::io::retry;
 use crate::mapping::column_pattern::composed;
 use crate::mapping::field_metadata::FieldMetadata;
 use crate::parquet::column_numbers::{self, RowSelection, intersects};
@@ -80,7 +80,7 @@ impl LogFile {
             let hint = "file is empty; delete it or ignore it. It is skipped until it changes";
             Fault::new("empty_log", "the log has no rows", hint)
         };
-        if read_at::file_length(&source.file)? == 0 {
+        if retry::file_length(&source.file)? == 0 {
             return Err(empty());
         }
         let Footer { metadata, start: footer_start, claims } =
@@ -154,7 +154,7 @@ impl LogFile {
     }
 
     pub(crate) fn field_metadata(&self, name: &str) -> FieldMetadata {
-        self.noted_field(name).map_or(FieldMetadata::NONE, FieldMetadata::of)
+        self.noted_field(name).map(FieldMetadata::of).unwrap_or_default()
     }
 
     /// A column's field in the Arrow schema; found by index, as a log may have ten thousand columns.
@@ -390,7 +390,7 @@ impl LogFile {
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], hash: &mut Hasher) -> Result<(), Error> {
         let unreadable = |source: std::io::Error| self.error(source.into());
-        let length = read_at::file_length(&self.source.file).map_err(unreadable)?;
+        let length = retry::file_length(&self.source.file).map_err(unreadable)?;
         let names: HashSet<Cow<'_, str>> = names.iter().map(|name| composed(name)).collect();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
@@ -401,7 +401,7 @@ impl LogFile {
         for stretch in pages.chain(once(self.footer_start..length)) {
             for at in stretch.clone().step_by(HASHED_BYTES) {
                 let bytes = &mut buffer[..HASHED_BYTES.min((stretch.end - at) as usize)];
-                read_at::read_exact(&self.source.file, bytes, at).map_err(unreadable)?;
+                retry::read_exact(&self.source.file, bytes, at).map_err(unreadable)?;
                 hash.update(bytes);
             }
         }

@@ -4,7 +4,6 @@ pub(crate) mod column_numbers;
 pub(crate) mod leaf_columns;
 pub(crate) mod log_file;
 pub(crate) mod numeric;
-pub(crate) mod page_crc;
 pub(crate) mod page_header;
 pub(crate) mod page_reader;
 pub(crate) mod raw_footer;

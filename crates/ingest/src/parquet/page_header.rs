@@ -13,7 +13,7 @@ use polars_parquet_format::thrift::protocol::TCompactInputProtocol;
 use polars_parquet_format::{Encoding, PageHeader, PageType};
 
 use crate::bounds::{self, PAGE_BYTES};
-use crate::io::read_at;
+use crate::io::retry;
 
 /// A header holds two statistics at most; this is far beyond any.
 const LARGEST_HEADER: u64 = 1 << 20;
@@ -44,7 +44,7 @@ fn read_header(file: &File, place: Range<u64>, buffer: &mut Vec<u8>) -> Result<(
     let mut wanted = USUAL_HEADER.min(left);
     loop {
         buffer.resize(wanted as usize, 0);
-        read_at::read_exact(file, buffer, place.start).map_err(|e| e.to_string())?;
+        retry::read_exact(file, buffer, place.start).map_err(|e| e.to_string())?;
         let mut rest = buffer.as_slice();
         let mut protocol = TCompactInputProtocol::new(&mut rest, LARGEST_HEADER as usize);
         match PageHeader::read_from_in_protocol(&mut protocol) {
@@ -58,7 +58,7 @@ fn read_header(file: &File, place: Range<u64>, buffer: &mut Vec<u8>) -> Result<(
 /// The pages of a chunk.
 pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<Vec<Page>, String> {
     let (start, bytes) = chunk.byte_range();
-    let length = read_at::file_length(file).map_err(|e| e.to_string())?;
+    let length = retry::file_length(file).map_err(|e| e.to_string())?;
     if start.checked_add(bytes).is_none_or(|end| end > length) {
         return Err(format!("its pages would end at byte {start} + {bytes} of a file of {length}"));
     }

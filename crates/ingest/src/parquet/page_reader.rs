@@ -21,7 +21,7 @@ use polars_parquet_format::{Encoding as RawEncoding, PageType};
 use zstd::bulk::Decompressor;
 
 use crate::bounds::BATCH_TEXT_BYTES;
-use crate::io::read_at::read_exact;
+use crate::io::retry::read_exact;
 use crate::parquet::page_header::{self, Page as RawPage};
 
 /// Fewest rows of a batch, however long its texts may be.

@@ -2,6 +2,7 @@
 //! reader sees a partial file.
 
 use std::fs::{self, File};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,12 +16,17 @@ use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{self, Compression, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{
+    ColumnChunkMetaData, KeyValue, ParquetMetaDataBuilder, ParquetMetaDataReader, ParquetMetaDataWriter,
+};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::TrackedWrite;
 use parquet::schema::types::ColumnPath;
+use polars_parquet_format::thrift::protocol::TCompactOutputProtocol;
 
 use crate::error::{Error, Fault, bad_table};
-use crate::parquet::page_crc;
+use crate::io::retry;
+use crate::parquet::page_header;
 
 /// Files that this process began.
 static WRITTEN: AtomicU64 = AtomicU64::new(0);
@@ -102,7 +108,7 @@ pub(crate) fn write_encoded(
         file.parent().map_or(Ok(()), fs::create_dir_all)?;
         write_batch(object_io::create_fresh(&bare)?, &batch, properties(&batch, metadata, encoding))?;
         let mut to = object_io::create_fresh(&beside)?;
-        page_crc::copy(&File::open(&bare)?, &mut to)?;
+        copy_with_checksums(&File::open(&bare)?, &mut to)?;
         to.sync_all()?;
         fs::remove_file(&bare)?;
         Ok(fs::rename(&beside, file)?)
@@ -153,4 +159,82 @@ fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Enco
         }
     }
     builder.build()
+}
+
+/// Copies a Parquet file page by page, each with its checksum (CRC-32 of its body, `PageHeader.crc`), which the Arrow
+/// library's writer leaves out. Headers grow by a few bytes, so the footer gets the new offsets.
+fn copy_with_checksums(from: &File, to: &mut File) -> Result<(), ParquetError> {
+    let footer = ParquetMetaDataReader::new().parse_and_finish(from)?;
+    let mut sink = TrackedWrite::new(BufWriter::with_capacity(1 << 20, to));
+    sink.write_all(b"PAR1")?;
+    let mut groups = Vec::with_capacity(footer.num_row_groups());
+    for group in footer.row_groups() {
+        let start = sink.bytes_written() as i64;
+        let columns =
+            group.columns().iter().map(|chunk| copy_chunk(from, &mut sink, chunk, group.num_rows()));
+        let columns = columns.collect::<Result<_, _>>()?;
+        groups
+            .push(group.clone().into_builder().set_column_metadata(columns).set_file_offset(start).build()?);
+    }
+    let footer = ParquetMetaDataBuilder::new(footer.file_metadata().clone()).set_row_groups(groups).build();
+    ParquetMetaDataWriter::new(&mut sink, &footer).finish()?;
+    Ok(sink.flush()?)
+}
+
+fn copy_chunk(
+    from: &File,
+    sink: &mut TrackedWrite<impl Write>,
+    chunk: &ColumnChunkMetaData,
+    rows: i64,
+) -> Result<ColumnChunkMetaData, ParquetError> {
+    let began = sink.bytes_written() as i64;
+    let mut first_data = None;
+    for mut page in page_header::bounded(from, chunk, rows).map_err(ParquetError::General)? {
+        let mut body = vec![0; page.header.compressed_page_size as usize];
+        retry::read_exact(from, &mut body, page.body_start)?;
+        if !page.is_dictionary() {
+            first_data.get_or_insert(sink.bytes_written() as i64);
+        }
+        page.header.crc = Some(crc32fast::hash(&body) as i32);
+        let mut protocol = TCompactOutputProtocol::new(&mut *sink);
+        page.header.write_to_out_protocol(&mut protocol).map_err(|e| ParquetError::General(e.to_string()))?;
+        sink.write_all(&body)?;
+    }
+    let bytes = sink.bytes_written() as i64 - began;
+    chunk
+        .clone()
+        .into_builder()
+        .set_data_page_offset(first_data.unwrap_or(began))
+        .set_dictionary_page_offset(chunk.dictionary_page_offset().map(|_| began))
+        .set_total_compressed_size(bytes)
+        // Both sizes count the headers, which alone have grown.
+        .set_total_uncompressed_size(chunk.uncompressed_size() + bytes - chunk.compressed_size())
+        .build()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parquet::log_file::{LogFile, Scan};
+
+    /// Every seventh byte of the pages, flipped: with checksums none of them gives a number.
+    #[test]
+    fn no_flipped_byte_under_a_checksum_gives_a_number() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("x.parquet");
+        let values = Column::Real((0..1000).map(f64::from).collect());
+        write_parquet(&file, &[("x".to_owned(), values)], &[]).unwrap();
+        let read = || -> Result<(), Error> { LogFile::open(&file)?.scan(&["x"], Scan::PLAIN, |_| Ok(())) };
+        read().unwrap();
+        assert!(LogFile::open(&file).unwrap().has_page_checksums(&["x"]).unwrap());
+        let bytes = fs::read(&file).unwrap();
+        let (_, trailer) = bytes.split_at(bytes.len() - 8);
+        let footer = u32::from_le_bytes(trailer[..4].try_into().unwrap()) as usize;
+        for at in (4..bytes.len() - 8 - footer).step_by(7) {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            fs::write(&file, damaged).unwrap();
+            assert!(read().is_err(), "byte {at} was flipped and read");
+        }
+    }
 }

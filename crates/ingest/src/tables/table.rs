@@ -80,9 +80,8 @@ impl TableBatch {
         column: usize,
         read: impl Fn(&str) -> Result<T, String>,
     ) -> Result<T, Error> {
-        let text =
-            self.text(row, column).ok_or_else(|| self.error(row, Some(column), "it is empty".into()))?;
-        read(text).map_err(|detail| self.error(row, Some(column), detail))
+        let found = self.optional(row, Some(column), read)?;
+        found.ok_or_else(|| self.error(row, Some(column), "it is empty".into()))
     }
 
     /// A cell of an optional column that may be empty.
