@@ -170,7 +170,26 @@ fn lag_of_load_and_speed(
 #[cfg(test)]
 #[expect(clippy::single_range_in_vec_init, reason = "one stretch is a list of one")]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        /// Wrapping loses only whole turns, and a resolver never moves half a turn in a sample.
+        #[test]
+        fn an_unwrapped_resolver_differs_from_the_truth_by_whole_turns(
+            steps in proptest::collection::vec(-170.0_f64..170.0, 1..200), start in 0.0_f64..360.0,
+        ) {
+            let truth: Vec<f64> = steps.iter().scan(start, |x, s| { *x += s; Some(*x) }).collect();
+            let mut values: Vec<f64> = truth.iter().map(|x| x.rem_euclid(360.0)).collect();
+            unwrap_turns(&mut values, 360.0);
+            let offset = values[0] - truth[0];
+            prop_assert!((offset / 360.0 - (offset / 360.0).round()).abs() < 1e-9);
+            for (v, t) in values.iter().zip(&truth) {
+                prop_assert!((v - t - offset).abs() < 1e-7);
+            }
+        }
+    }
 
     /// The other position jumps by 2 mm in the hole, as a sensor that was exchanged or reset: 0.4 turns of 5 mm.
     #[test]

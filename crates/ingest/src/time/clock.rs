@@ -469,6 +469,8 @@ fn split_at(count: usize, breaks: &[usize]) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn stamps(seconds: &[f64]) -> Timestamps {
@@ -613,6 +615,24 @@ mod tests {
             assert_eq!(base.segments, [0..rows / 2, rows / 2..rows]);
             assert!((base.step_s / step_s - 1.0).abs() < 0.01, "{} s", base.step_s);
             assert!((0..rows).all(|row| (found.seconds[row] - truth(row)).abs() < tolerance_s));
+        }
+    }
+
+    proptest! {
+        /// Whatever the order of the rows, time rises along the kept rows and no stamp is invented or lost.
+        #[test]
+        fn kept_rows_rise_and_hold_every_stamp(ticks in proptest::collection::vec(0_u32..50, 2..80)) {
+            let t: Vec<f64> = ticks.iter().map(|&k| f64::from(k) * 0.02).collect();
+            let mut distinct = ticks.clone();
+            distinct.sort_unstable();
+            distinct.dedup();
+            prop_assume!(distinct.len() > 1);
+            let base = base(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
+            let samples = base.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            let kept: Vec<u32> = samples.iter().copied().filter(|row| *row != LOST).collect();
+            prop_assert!(kept.windows(2).all(|w| t[w[0] as usize] < t[w[1] as usize]));
+            prop_assert_eq!(kept.len(), distinct.len());
+            prop_assert_eq!(base.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), samples.len());
         }
     }
 }
