@@ -18,7 +18,7 @@ pub(crate) const JUMP_ERRORS: f64 = 6.0;
 /// Records for which a jump is reported, however long they take.
 pub(crate) const JUMP_RECORDS: usize = 12;
 
-/// A level that was at the watch limit stays there until it is this share of it, or for this many records.
+/// A level that was at a limit keeps its state down to this share of the limit, for at most this many records.
 pub(crate) const HYSTERESIS: f64 = 0.97;
 pub(crate) const RECALLED: usize = 24;
 
