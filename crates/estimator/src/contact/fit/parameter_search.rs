@@ -1,5 +1,5 @@
-//! Search over the parameters that the regression cannot find by derivatives: where friction starts, the zero of the
-//! load cell, and the bristles.
+//! Search over the parameters that the regression cannot find by derivatives: the start values of friction, the load
+//! zero, and the bristles.
 //!
 //! Candidates are compared by their misfit over all complete blocks, in contact or within the gap. Which blocks are in
 //! contact depends on the candidate: over these alone, two candidates would be compared by different data.
