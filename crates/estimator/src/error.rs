@@ -1,6 +1,6 @@
 //! Why an estimate could not be made.
 
-/// One variant for each thing a caller would do differently.
+/// Error of the filter, the model or the gap statistic.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub enum Error {
@@ -16,7 +16,7 @@ pub enum Error {
     /// Channels of different length, or a segment outside them.
     #[error("channels hold {dx} positions and {load} loads, and a segment ends at {end}")]
     Lengths { dx: usize, load: usize, end: usize },
-    /// No sample of δX at all.
+    /// Every sample of δX is missing.
     #[error("no sample holds a relative position")]
     NothingMeasured,
     /// S does not move, so one mean of equation 29 is empty.

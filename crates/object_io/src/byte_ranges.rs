@@ -1,14 +1,14 @@
-//! Fetched blocks of an object, and the requests for those that are missing.
+//! Fetched blocks of an object, and the requests that fetch missing blocks.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Bytes that are fetched together. The last block of an object may be shorter.
 const BLOCK: u64 = 64 << 10;
-/// Most blocks between two missing ones that one request fetches as well: a further request would cost as much time as
-/// a mebibyte.
+/// Largest distance of missing blocks that one request fetches together with the blocks between them: a second request
+/// takes as long as a mebibyte.
 const MAX_GAP: u64 = (1 << 20) / BLOCK;
-/// Blocks of one request at most: a failed request is repeated, and several run in parallel.
+/// Most blocks of one request: a failed request is repeated whole, and several requests run in parallel.
 const MAX_REQUEST: u64 = (8 << 20) / BLOCK;
 
 #[derive(Debug, Default)]

@@ -32,7 +32,6 @@ impl ListEntry {
 }
 
 /// Passes the first `most` objects below a folder to `take`, by name; one page (1000 objects) is held in memory at a time.
-/// Entries that were passed before a request failed are valid.
 ///
 /// # Errors
 /// The error of the failed request; entries passed before it are valid.

@@ -1,11 +1,10 @@
-//! Local files: one that a program writes under a name of its own before it renames it, and errors of the system.
+//! Local files: creation of a temporary file that is renamed when it is complete, and errors of the operating system.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
-/// Creates a file, and replaces one that an earlier process left. A link of that name is replaced, not followed. Another
-/// process that creates the file at the same time makes it fail.
+/// Creates a file, and replaces one that an earlier process left. A link of that name is replaced, not followed.
 ///
 /// # Errors
 /// If an old file cannot be removed, or another process creates the file at the same time.
@@ -17,8 +16,8 @@ pub fn create_fresh(path: &Path) -> io::Result<File> {
     File::create_new(path)
 }
 
-/// The error of the system that the text of another error ends with, in the form of the standard library:
-/// `(os error 24)`. Libraries that read files keep the error below their own, or its text alone.
+/// The error of the operating system whose number a message contains, in the form of the standard library:
+/// `(os error 24)`. Libraries that read files wrap this error in their own, or keep only its text.
 pub fn system_error(text: &str) -> Option<io::Error> {
     let number = text.rsplit_once("(os error ")?.1.split_once(')')?.0.parse().ok()?;
     Some(io::Error::from_raw_os_error(number))

@@ -46,8 +46,7 @@ impl ObjectFile {
         &self.file
     }
 
-    /// Fetches the ranges that are not in the file yet; ranges are clipped to the object's length. An object that is no
-    /// longer the one that was opened is [`Error::Changed`].
+    /// Fetches the ranges that are not in the file yet; ranges are clipped to the object's length.
     ///
     /// # Errors
     /// [`Error::Changed`] when the object is no longer the one that was opened, [`Error::Unreachable`] when no
@@ -56,7 +55,7 @@ impl ObjectFile {
         let clip = |range: Range<u64>| range.start.min(self.meta.size)..range.end.min(self.meta.size);
         let wanted: Vec<Range<u64>> =
             ranges.into_iter().map(clip).filter(|range| !range.is_empty()).collect();
-        // Held while it is fetched: two actuators that want the same column fetch it once.
+        // The lock is held during the fetch, so that two actuators that need the same column fetch it once.
         let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
         let missing = had.missing(&wanted, self.meta.size);
         if missing.is_empty() {

@@ -1,7 +1,7 @@
-//! The Python module `freeplay_ema._freeplay`: the command's own rows, through Arrow's C interface.
+//! The Python module `freeplay_ema._freeplay`: the rows of the command `freeplay`, through Arrow's C interface.
 //!
 //! Nothing is computed here. Settings, logs and tables go to the lower layers, whose results become tables and
-//! whose diagnostics become exceptions; work is done without Python's lock.
+//! whose diagnostics become exceptions; the lower layers run without Python's global lock (GIL).
 
 mod arrow_capsule;
 mod config;

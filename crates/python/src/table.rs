@@ -14,7 +14,7 @@ use records::row_schema::{Row, to_nullable_batch};
 use crate::arrow_capsule::{self, arrow_error};
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
 
-/// Rows and columns that a notebook or a prompt shows.
+/// Rows, columns and characters of a cell that a notebook or a prompt shows.
 const SHOWN_ROWS: usize = 10;
 const SHOWN_COLUMNS: usize = 8;
 const SHOWN_CHARS: usize = 26;
@@ -61,12 +61,11 @@ impl Table {
         Self::with_errors(batch, Vec::new())
     }
 
-    /// A table, and the errors of logs that are not in it.
+    /// A table, with the errors of logs that gave no rows.
     pub(crate) fn with_errors(batch: RecordBatch, diagnostics: Vec<Diagnostic>) -> Self {
         Self { batch, diagnostics }
     }
 
-    /// A table of rows.
     pub(crate) fn of_rows<R: Row>(py: Python<'_>, rows: &[R]) -> PyResult<Self> {
         Ok(Self::of(to_nullable_batch(rows).map_err(|e| to_run_exception(py, e.into()))?))
     }
@@ -80,7 +79,7 @@ impl Table {
         format!("{} rows, {} columns{errors}", self.num_rows(), self.batch.num_columns())
     }
 
-    /// Names and cells of the first rows, of the first columns that have values there.
+    /// Names of the first columns that have a value in the first rows, and the cells of these rows.
     fn preview(&self) -> Result<(Vec<String>, Vec<Vec<String>>), ArrowError> {
         let some = self.batch.slice(0, self.batch.num_rows().min(SHOWN_ROWS));
         let has_values = |column: &usize| some.column(*column).null_count() < some.num_rows();

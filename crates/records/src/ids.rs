@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Maximum length of an identifier, bytes: every record, file name and message contains it.
 const ID_BYTES: usize = 256;
 
-/// A text that is no identifier: it is blank or too long.
+/// Error of a text that is blank or too long for an identifier.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a {0}")]
 pub struct IdError(String);
@@ -20,7 +20,7 @@ macro_rules! identifiers {
         pub struct $name(Box<str>);
 
         impl $name {
-            /// Creates the identifier from text without the white space around it; it has 1 to 256 bytes.
+            /// Creates the identifier from a text of 1 to 256 bytes; white space around the text is removed.
             ///
             /// # Errors
             /// [`IdError`] when the text is blank or longer than 256 bytes.

@@ -80,7 +80,7 @@ stored_row! {
 }
 
 impl LogRecord {
-    /// Keys of the records that its flight may have, one per position; none where the log was not identified.
+    /// Keys of the records that the log's flight may have, one per position; empty if the log was not identified.
     pub fn keys(&self) -> Vec<RecordKey> {
         let Some((tail, departure)) = self.tail_number.as_ref().zip(self.departure_utc) else {
             return Vec::new();

@@ -21,8 +21,8 @@ pub fn day_text(at: Timestamp, today: Timestamp) -> String {
     at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
 }
 
-/// Time of a position among the samples since the first one, s: the step within a segment, and at each of the `breaks`
-/// (first sample after it, its time in s) the log's own time.
+/// Time of a sample index, which may be fractional, s after the first sample: a constant step, restarted at each of the
+/// `breaks` (index of the first sample after the break, its time in s).
 ///
 /// ```
 /// # use records::sample_time_s;

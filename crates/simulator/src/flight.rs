@@ -59,7 +59,7 @@ pub fn check(plant: &Plant, profile: &Profile, sensors: &Sensors) -> Result<(), 
     ranges::check("sensors", sensors)
 }
 
-/// Steps between two looks at what changes slowly in a plant: 10 ms.
+/// Steps between two updates of the plant's slowly varying parameters: 10 ms.
 const SLOW_STEPS: u64 = 100;
 
 /// Motor position, screw position and load at each channel's own sample instants, and the mean gap.

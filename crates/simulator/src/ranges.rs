@@ -8,7 +8,7 @@ use toml::Value;
 
 use crate::error::Error;
 
-/// The table: ends of the paths of keys.
+/// Contents of `ranges.toml`: each key is the end of a path, and stands for all keys with that end.
 #[derive(Deserialize)]
 struct Ranges {
     positive: Vec<String>,
@@ -19,10 +19,10 @@ struct Ranges {
 static RANGES: LazyLock<Result<Ranges, toml::de::Error>> =
     LazyLock::new(|| toml::from_str(include_str!("ranges.toml")));
 
-/// Keys of one table of which the second is not below the first.
+/// Pairs of keys of one table; the second value must not be below the first.
 const ORDERED: [(&str, &str); 2] = [("low_hz", "high_hz"), ("from_flight", "to_flight")];
 
-/// Lists of a least and a greatest value.
+/// Keys whose value is a list of a least and a greatest value.
 const RANGE_LISTS: [&str; 2] = ["gap_m", "unit_hours"];
 
 /// Checks every number of a value; `path` is the key that holds it.
@@ -58,7 +58,7 @@ fn check_value(path: &str, value: &Value) -> Result<(), Error> {
 }
 
 fn check_number(path: &str, value: f64) -> Result<(), Error> {
-    // Without the places in lists.
+    // The path without the indices of lists.
     let names: String = path.split(['[', ']']).step_by(2).collect();
     let is = |key: &String| ends_with(path, key) || ends_with(&names, key);
     let ranges = RANGES.as_ref().map_err(|e| Error::Unwritable { problem: e.to_string() })?;
@@ -85,7 +85,7 @@ fn check_order(path: &str, low: Option<f64>, high: Option<f64>, must: &str) -> R
     }
 }
 
-/// Whether a path ends with the names of a key.
+/// Whether a path ends with a key, at the begin of a name.
 fn ends_with(path: &str, key: &str) -> bool {
     path.strip_suffix(key).is_some_and(|above| above.is_empty() || above.ends_with('.'))
 }
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
     use crate::Spec;
 
-    /// Paths of all numbers, without the places in lists.
+    /// Paths of all numbers, without the indices of lists.
     fn paths(above: &str, value: &Value, found: &mut BTreeSet<String>) {
         match value {
             Value::Table(table) => table.iter().for_each(|(k, v)| paths(&format!("{above}.{k}"), v, found)),

@@ -20,7 +20,7 @@ const FIRST_FORMAT: u64 = 1;
 pub(crate) const MARKER: &str = "store.json";
 
 impl Store {
-    /// Opens a store for reading; where there is none, the error is [`Error::Missing`].
+    /// Opens a store for reading.
     ///
     /// # Errors
     /// [`Error::Missing`] when there is no store, [`Error::Foreign`] when the folder holds other files,
@@ -80,10 +80,10 @@ impl Store {
     }
 }
 
-/// Rejects names that delta-rs cannot handle: it decodes a percent sign and two hexadecimal digits twice.
+/// Rejects names with a percent sign and two hexadecimal digits: delta-rs decodes them twice.
 fn check_name(dir: &Path) -> Result<&Path, Error> {
     let path = if object_io::is_address(dir) {
-        // Before any message prints the address: it may contain credentials.
+        // Parsed before any message prints the address, which may contain credentials.
         object_io::Address::parse(dir)?;
         dir.to_owned()
     } else {
@@ -130,7 +130,7 @@ fn is_there(dir: &Path) -> Result<bool, Error> {
 /// first format, so that the next writer writes the marker again.
 pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u64, Error> {
     let file = location.display_path(&location.dir().join(MARKER));
-    // A copy may have lost the marker alone. A bucket without it gets it where the store is opened for writing.
+    // A copied store may lack only the marker. In a bucket, opening the store for writing creates a missing marker.
     if !location.is_bucket() && !location.has(MARKER)? {
         let store = Store::at(location.clone());
         if store.tables().iter().try_fold(true, |all, table| Ok::<_, Error>(all && table.exists()?))? {

@@ -17,9 +17,9 @@ use crate::unit_fit::{Fit, UnitFit};
 
 /// Assesses a unit at a date from its flights until then.
 ///
-/// The state is the more urgent of two: the measured one, of the last records of the installation alone, and that of the
-/// forecast, a posterior of a bank of wear laws by Bayesian model averaging (Hoeting et al. 1999,
-/// <https://doi.org/10.1214/ss/1009212519>) where it agrees with these records, else the line through them.
+/// The state is the more urgent of two: that of the last records of the installation, and that of the forecast. The forecast
+/// is by a bank of wear laws with Bayesian model averaging (Hoeting et al. 1999,
+/// <https://doi.org/10.1214/ss/1009212519>) if it agrees with these records, else by the line through them.
 ///
 /// Dates are microseconds since 1970 UTC, gaps metres, usage flight hours; `docs/prognostics.md` describes the method.
 /// The crate page has an example.
@@ -61,7 +61,7 @@ pub fn assess(
         law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, found.wear == WearStatus::Wearing)),
         elapsed_hours,
         over_limit_probability: unit.measured.level.map(|level| {
-            // The installation adds to the error of a measured level.
+            // The level's standard error does not include the bias of the installation.
             let error_m = level.se_m.hypot(unit.prior.bias_sd_m).max(f64::MIN_POSITIVE);
             normal_cdf((level.gap_m - settings.limit_m) / error_m).max(by_forecast)
         }),
@@ -82,7 +82,7 @@ fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) ->
         (Some(fit), rise) => {
             let mut found = by_laws(fit, unit, settings, elapsed_hours);
             if let (Some(crossing), Some(rise)) = (&mut found.crossing, rise) {
-                // No earliest time lies after that of the line through the last records.
+                // The earliest time must not be after that of the line through the last records.
                 let by_line = rise.p05_hours;
                 crossing.p05_hours = Some(crossing.p05_hours.map_or(by_line, |hours| hours.min(by_line)));
             }
@@ -128,7 +128,7 @@ fn by_line(rise: &Rise, settings: &Settings, elapsed_hours: f64) -> Assessment {
 /// The part of an assessment that the mixture of wear laws gives.
 fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
     let ratio = fit.prior.hours_per_usage(unit.history.data.flights);
-    // The laws were fitted without the rise of a step; the unit still has that rise, so its limit is nearer.
+    // The laws are fitted to the gaps minus the rise of steps; the unit still has that rise, so its limit is nearer.
     let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
     let settings = &Settings { limit_m, ..*settings };
     let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);
@@ -150,7 +150,7 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
     }
 }
 
-/// Probability that the line meets the limit within some hours: log-normal through its early and middle time.
+/// Probability that the line reaches the limit within some hours: log-normal with the line's 5 % point and median.
 fn chance_by(hours: f64, rise: &Rise) -> f64 {
     if rise.p50_hours <= hours {
         return 1.0 - 0.5 * rise.p50_hours / hours.max(f64::MIN_POSITIVE);

@@ -73,11 +73,11 @@ impl UsageAxis {
 /// How units of one part number wear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FleetPrior {
-    /// What wear follows.
+    /// Usage axis that wear follows.
     pub axis: UsageAxis,
-    /// Hours that one unit of the axis is worth in the fleet's mean.
+    /// Mean flight hours of the fleet per unit of the axis.
     pub(crate) hours_per_unit: f64,
-    /// Growth that is a life: from new to the act limit, metres.
+    /// Growth of the gap over a life: from new to the act limit, metres.
     pub(crate) span_m: f64,
     /// Mean gap of a new unit, metres.
     pub new_m: f64,
@@ -90,13 +90,13 @@ pub struct FleetPrior {
     pub(crate) season: SeasonParams,
     /// Share of units first seen in service that were new then.
     pub(crate) fresh_share: f64,
-    /// Rate at which units that will begin to wear begin, per hour.
+    /// Rate of onsets among units with a pending onset, per hour.
     pub(crate) onsets_per_hour: f64,
     /// Variance of the wear per metre of wear, metres.
     pub(crate) wear_noise_m: f64,
     /// Variance of the level per hour that no law explains, m²/h.
     pub(crate) drift_m2_per_hour: f64,
-    /// Spread of what an installation adds to every gap measured in it, metres.
+    /// Standard deviation of the bias that an installation adds to all its gaps, metres.
     pub(crate) bias_sd_m: f64,
     /// Factor by which the distance of a 90 % bound from the median is larger than the mixture's own.
     ///

@@ -66,7 +66,7 @@ impl<'a> UnitFit<'a> {
         Ok(Self { prior, measured, history, changes, fit, ended })
     }
 
-    /// Departures of the outliers: records that later ones did not confirm.
+    /// Departures of the outliers, without those that the present level rests on.
     pub(crate) fn outliers_us(&self) -> Vec<i64> {
         let level = self.measured.level.map_or(0, |level| level.records.min(2));
         let kept = self.measured.sound.iter().rev().take(level).map(|r| r.flight).min().unwrap_or(usize::MAX);
@@ -74,7 +74,7 @@ impl<'a> UnitFit<'a> {
         outliers.map(|flight| self.history.data.flights[*flight].departure_us).collect()
     }
 
-    /// The rise of the last records, its hours counted from the last flight.
+    /// The rise of the last records, with its hours counted from the last flight instead of the last sound record.
     pub(crate) fn rise_now(&self) -> Option<Rise> {
         let (rise, record) = (self.measured.rise?, self.measured.sound.last()?);
         let flown = self.history.data.flights.last()?.hours - record.hours;
@@ -88,7 +88,9 @@ impl<'a> UnitFit<'a> {
     }
 }
 
-/// The wear laws of the last segment by the fleet's prior, or else by the unit's own, as the last records allow.
+/// Wear laws of the last segment that agree with the last records, by the fleet prior or by a prior without the fleet.
+///
+/// The prior without the fleet is tried first if the records rise fast, else second.
 fn consistent_fit(measured: &Measured, history: &History<'_>, fleet: &FleetPrior) -> Option<Fit> {
     if history.estimates.len() < MIN_ESTIMATES {
         return None;
@@ -113,7 +115,7 @@ fn consistent_fit(measured: &Measured, history: &History<'_>, fleet: &FleetPrior
     }
 }
 
-/// The jump of the level as a change point, unless the history has it already.
+/// The jump of the level as a change point; `None` if the history has a change near it.
 fn jump_event(jump: &Jump, known: &[ChangePoint], data: UnitData<'_>) -> Option<ChangePoint> {
     if near(jump.departure_us, known, data).next().is_some() {
         return None;

@@ -198,8 +198,8 @@ impl BlockMeans {
         self.in_range_n.start.is_finite() || self.in_range_n.end.is_finite()
     }
 
-    /// Reading of the load where δX passes the middle between its 5 % and 95 % quantiles, N, if that is far from zero: there the
-    /// load cell's zero may be. The mean of the medians of both ways: friction and delays move these apart.
+    /// Load at which δX passes the middle between its 5 % and 95 % quantiles, N, if far from zero: a candidate for the load zero.
+    /// Mean of the medians of rising and falling passes, which friction and delays shift in opposite directions.
     pub(crate) fn far_zero_n(&self, load_n: f64) -> Option<f64> {
         let all = 0..self.len();
         let [low_m, high_m] = quantiles(&self.dx_m, std::slice::from_ref(&all), [0.05, 0.95])?;

@@ -6,11 +6,11 @@ use crate::kalman::nis::{Nis, NisBlocks};
 use crate::kalman::stream::{Stream, StreamStep};
 use crate::samples::Samples;
 
-/// Settled gain and bandwidth of one filter: they depend on no measurement, so one schedule serves every series of these
-/// parameters, this step and this noise.
+/// Steady-state gain and bandwidth of one filter. They depend on no measurement, so all series with the same parameters,
+/// step and noise share one schedule.
 #[derive(Debug, Clone)]
 pub struct GainSchedule {
-    /// At the start of a segment.
+    /// The filter before the first sample of a segment.
     start: Stream,
     bandwidth_hz: Result<f64, Error>,
 }
@@ -29,8 +29,7 @@ impl GainSchedule {
         self.bandwidth_hz.clone()
     }
 
-    /// Filters all segments (24–28), each from its own initial state, and hands out the step of each of their samples with
-    /// the sample's index.
+    /// Filters all segments (24–28), each from its own initial state, and passes index and step of each sample to `put`.
     ///
     /// Channels have one value per sample: δX in m and load in N. A missing load (NaN) is replaced by the one before.
     ///
@@ -60,10 +59,10 @@ impl GainSchedule {
         nis.finish()
     }
 
-    /// S at each sample, m, by [`GainSchedule::for_each_step`], in memory that many series share; NaN outside the segments.
+    /// Writes S at each sample, m, into `s_m`, whose memory is reused; NaN outside the segments.
     ///
     /// # Errors
-    /// As there.
+    /// As [`GainSchedule::for_each_step`].
     pub fn track(&self, samples: &Samples<'_>, s_m: &mut Vec<f64>) -> Result<Nis, Error> {
         s_m.clear();
         s_m.resize(samples.dx_m.len(), f64::NAN);

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 
-/// Samples of a block: an eighth of the flight within these bounds. Neighbouring blocks of a short one are coupled.
+/// Bounds of the samples of a block, an eighth of the flight: means of shorter neighbouring blocks are correlated.
 const SHORTEST_BLOCK: usize = 512;
 const LONGEST_BLOCK: usize = 2048;
 /// Fewer blocks give no standard error.
@@ -14,10 +14,10 @@ pub struct Nis {
     /// Mean normalised innovation squared (NIS, e²/(C P Cᵀ + V_d), Bar-Shalom, Li and Kirubarajan 2001, section 5.4) over
     /// the measured samples; 1 for a true model.
     pub mean: f64,
-    /// Its standard error from the means of successive blocks of hundreds of samples, which neighbouring innovations
-    /// hardly couple (ratio estimator, Cochran 1977, section 6.3); none below eight blocks.
+    /// Standard error of the mean, from the scatter of blocks of hundreds of samples, which are hardly correlated (ratio
+    /// estimator, Cochran 1977, section 6.3); none below eight blocks.
     pub standard_error: Option<f64>,
-    /// Measured samples.
+    /// Number of measured samples.
     pub measured: usize,
 }
 
@@ -43,7 +43,7 @@ impl NisBlocks {
         Self { full, blocks: 0.0, sum_q: 0.0, measured: 0, q_q: 0.0, q_n: 0.0, n_n: 0.0, open: (0.0, 0) }
     }
 
-    /// Adds one innovation, m, by its variance, m²; a missing one (NaN) is skipped.
+    /// Adds one innovation, m, with its variance, m²; a missing innovation (NaN) is skipped.
     #[inline]
     pub(crate) fn add_sample(&mut self, innovation_m: f64, variance_m2: f64) {
         if !innovation_m.is_nan() {

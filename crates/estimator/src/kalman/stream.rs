@@ -1,17 +1,17 @@
-//! Sample-by-sample filter in bounded time, without allocation. The batch is a loop over it.
+//! Sample-by-sample filter in bounded time, without allocation. The filter of whole flights is a loop over it.
 //!
-//! The covariance depends on no measurement, so its gain settles while no position is missing.
-//! [`Stream::steady_state`] then keeps that gain, which saves nine tenths of a step. [`Stream::constant_time`] never
-//! does, so its longest step takes as many operations as its mean step (a missing sample takes fewer). Neither fuses a
-//! product with a sum: both give the same bits on every machine.
+//! The covariance depends on no measurement, so the gain converges while no position is missing.
+//! [`Stream::steady_state`] then keeps this gain, which saves nine tenths of a step's time. [`Stream::constant_time`]
+//! computes every gain, so its longest step takes as many operations as its mean step (a missing sample takes fewer).
+//! Neither uses fused multiply-add: both give the same bits on every machine.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::Error;
 use crate::kalman::filter::{Filter, FilterStep, KalmanState, distance};
 
-/// The settled gain takes over when the covariance is this near to its limit, as a share of itself. The difference
-/// leaves a share as small in S, and is forgotten.
+/// Relative difference of the covariance from its steady state below which the steady-state gain is used. The relative
+/// error of S that this causes is as small, and decays.
 const NEAR: f64 = 1e-13;
 
 /// Kalman filter (24–28) with its current state.
@@ -40,9 +40,9 @@ pub struct Stream {
     steady: Option<SteadyGain>,
     /// x(k+1/k) and P(k+1/k) of the next sample, once a position was measured.
     prior: Option<KalmanState>,
-    /// Whether the covariance has come to that of the settled gain.
+    /// Whether the covariance has converged to that of the steady-state gain.
     settled: bool,
-    /// The last load that was there, N.
+    /// The last load that was not missing, N.
     held_load_n: f64,
 }
 
@@ -58,17 +58,17 @@ pub struct StreamStep {
 }
 
 impl StreamStep {
-    /// S, m: the position that bending does not explain.
+    /// S, m: the relative position that elastic deflection does not explain.
     pub fn s_m(&self) -> f64 {
         self.x[2]
     }
 }
 
-/// The settled gain K and its covariance.
+/// The steady-state gain K and its covariance.
 #[derive(Debug, Clone, Copy)]
 struct SteadyGain {
     gain: Vector3<f64>,
-    /// What position and speed of the prediction take of x(k+1/k), of y and of u: rows of
+    /// Coefficients of x(k+1/k), y and u in the predicted position and speed: the first two rows of
     /// `[A_d (I − K C), A_d K, B_d]`.
     ahead: [[f64; 5]; 2],
     /// P(k+1/k).
@@ -77,17 +77,17 @@ struct SteadyGain {
 }
 
 impl Stream {
-    /// The whole recursion (24–28) at each step: worst time equals mean time, and nothing is computed ahead.
+    /// The whole recursion (24–28) at each step: the longest step takes as long as the mean step.
     ///
-    /// Differs from the batch by less than 1e-12 of the peak of S.
+    /// S differs from that of [`Stream::steady_state`] by less than 1e-12 of its peak.
     pub fn constant_time(filter: &Filter) -> Self {
         Self { filter: *filter, steady: None, prior: None, settled: false, held_load_n: 0.0 }
     }
 
-    /// The whole recursion (24–28) until the gain settles, (24) and (27) with that gain afterwards. The batch does the
-    /// same, so S is bitwise identical to it.
+    /// The whole recursion (24–28) until the gain converges, (24) and (27) with that gain afterwards. The filter of whole
+    /// flights does the same, so its S is bitwise identical.
     ///
-    /// Without a steady state it continues as [`Stream::constant_time`], like the batch.
+    /// Where the gain does not converge, each step is that of [`Stream::constant_time`].
     pub fn steady_state(filter: &Filter) -> Self {
         let settled = filter.steady_state_gain().ok();
         let steady = settled.map(|(gain, p)| SteadyGain::new(filter, gain, p));
@@ -96,12 +96,12 @@ impl Stream {
 
     /// Filters the next sample, from the relative position `y_m`, m, and the load, N; NaN where missing.
     ///
-    /// A missing load is replaced by the one before it. S is NaN until a first position is measured. Only there the
-    /// batch differs: it starts at the segment's first row from the first measurement; this filter starts at that
-    /// measurement.
+    /// A missing load is replaced by the one before it. S is NaN until a first position is measured. Only before that
+    /// measurement does the filter of whole flights differ: it starts from the same measurement, but at the segment's
+    /// first row.
     ///
     /// # Errors
-    /// [`Error::InnovationCovariance`], for noise levels that contradict each other.
+    /// [`Error::InnovationCovariance`] for noise levels that contradict each other.
     #[inline]
     pub fn push(&mut self, y_m: f64, load_n: f64) -> Result<StreamStep, Error> {
         if let Some((steady, x)) = self.settled_state().filter(|_| is_complete(y_m, load_n)) {
@@ -112,7 +112,7 @@ impl Stream {
         self.push_unsettled(y_m, load_n)
     }
 
-    /// Pushes one sample after the other, and hands out each step.
+    /// Pushes all samples in order, and passes each step to `put`.
     ///
     /// The same numbers as [`Stream::push`]. While the gain is settled and no sample is missing, the state stays in
     /// registers, which saves more than half of the time.
@@ -145,7 +145,7 @@ impl Stream {
         }
     }
 
-    /// The settled gain and the x(k+1/k) it is applied to, while it is.
+    /// The steady-state gain and x(k+1/k); `None` while the covariance has not converged.
     #[inline]
     fn settled_state(&self) -> Option<(SteadyGain, Vector3<f64>)> {
         if !self.settled {
@@ -183,7 +183,7 @@ impl Stream {
         Ok(StreamStep { x: posterior.x, innovation_m, innovation_variance_m2 })
     }
 
-    /// Takes the next sample from the initial state of this position, m, and load, N.
+    /// Sets the initial state, from a position, m, and a load, N, for the next sample.
     pub(crate) fn start(&mut self, y_m: f64, load_n: f64) {
         self.prior = Some(self.filter.initial_state(y_m, load_n));
     }
@@ -194,7 +194,7 @@ impl Stream {
     }
 }
 
-/// Whether both were measured.
+/// Whether neither position nor load is missing (NaN).
 #[inline]
 fn is_complete(y_m: f64, load_n: f64) -> bool {
     y_m.partial_cmp(&load_n).is_some()
@@ -208,9 +208,9 @@ impl SteadyGain {
         Self { gain, ahead, p, variance_m2: p[(0, 0)] + filter.noise().v_d_m2 }
     }
 
-    /// One sample (27), and the prediction (24) for the next, in which the backlash stays as it is.
+    /// Corrects with one sample (27), and predicts the next state (24), in which S does not change.
     ///
-    /// The prediction is A_d (I − K C) x + A_d K y + B_d u, which waits for no innovation.
+    /// The prediction is A_d (I − K C) x + A_d K y + B_d u: the processor computes it without waiting for the innovation.
     #[inline]
     fn step(&self, prior: &Vector3<f64>, y_m: f64, load_n: f64) -> (StreamStep, Vector3<f64>) {
         let innovation_m = y_m - prior[0];
@@ -222,7 +222,7 @@ impl SteadyGain {
         (step, Vector3::new(position_m, speed_m_per_s, x[2]))
     }
 
-    /// Whether a correction was made with a covariance near to that of this gain.
+    /// Whether the step corrected the state with a covariance that has converged to that of this gain.
     fn is_reached(&self, step: &FilterStep) -> bool {
         !step.innovation_m.is_nan() && distance(&self.p, &step.prior.p) <= NEAR
     }

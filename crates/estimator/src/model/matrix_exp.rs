@@ -13,21 +13,21 @@ where
     m.exp()
 }
 
-/// e^M, where `nalgebra` has none.
+/// Matrix exponential without `std`, where `nalgebra` has none.
 #[cfg(not(feature = "std"))]
 pub(crate) use by_series as exponential;
 
-/// Halvings that bring any finite, sensible M·Ts under a half.
+/// Halvings that bring the norm of M below a half for any physical parameters.
 #[cfg(any(test, not(feature = "std")))]
 const HALVINGS: i32 = 64;
 /// Terms of the series; 0.5¹⁸/18! is far below the last bit.
 #[cfg(any(test, not(feature = "std")))]
 const TERMS: u32 = 18;
 
-/// e^M = (e^{M/2^h})^{2^h}, h the least that brings M/2^h under a half, and the inner one by its series.
+/// e^M = (e^{M/2^h})^{2^h}, with the least h for which the norm of M/2^h is at most a half, and e^{M/2^h} by its series.
 ///
-/// Units are balanced first, by powers of two: a stiff spring would ask for twenty squarings, each of
-/// which may double the rounding.
+/// M is balanced first, by powers of two: without it a stiff spring needs twenty squarings, each of
+/// which may double the rounding error.
 #[cfg(any(test, not(feature = "std")))]
 pub(crate) fn by_series<const N: usize>(m: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     let norm = |m: &SMatrix<f64, N, N>| {

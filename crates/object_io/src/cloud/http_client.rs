@@ -1,4 +1,4 @@
-//! One JSON document posted to an address of HTTP, with the client that the object stores use.
+//! POST of one JSON document over HTTP, with the client library of the object stores.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use crate::client::handle;
 use crate::error::root_cause;
 use crate::http_post::{Posted, parse};
 
-/// Posts a JSON document and waits for the status of the answer, at most `timeout`.
+/// Posts a JSON document and waits at most `timeout` for the status of the response.
 ///
-/// A redirection is an answer like any other: following it would turn the post into a request without the document, or
-/// send the document to another host. Messages hold no address, which may hold a secret.
+/// A redirection is not followed: following it would send a request without the document, or the document to another
+/// host. Messages do not contain the address, since it may contain a secret.
 pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
     let url = match parse(url) {
         Ok(url) => url,
@@ -47,7 +47,7 @@ mod tests {
 
     const SOON: Duration = Duration::from_millis(500);
 
-    /// Accepts one request, hands it over and answers with `reply`; an empty reply never comes.
+    /// Accepts one request, passes it on and responds with `reply`; with an empty reply it never responds.
     fn server(reply: &'static str) -> (String, std::thread::JoinHandle<String>) {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let url = format!("http://{}/hook?token=SECRET", listener.local_addr().unwrap());

@@ -76,14 +76,14 @@ impl FlightRow {
         Self { departure_us, gap_m: gap_m.unwrap_or(f64::NAN), place, row, name: [begin, names.len() as u32] }
     }
 
-    /// The same among more flights: its place has another number, and its row and its name come after others.
+    /// Adjusts the indices when the flight is appended to others: of its place, its row and its name.
     pub(crate) fn relocate(&mut self, places: &[u32], rows: u32, names: u32) {
         self.place = places[self.place as usize];
         self.row += rows;
         self.name = self.name.map(|at| at + names);
     }
 
-    /// Its name among those of its unit's flights.
+    /// The flight's name, from the joined names of its unit's flights.
     pub(crate) fn name_in<'a>(&self, names: &'a str) -> Option<&'a str> {
         let name = &names[self.name[0] as usize..self.name[1] as usize];
         (!name.is_empty()).then_some(name)

@@ -1,4 +1,4 @@
-//! Rows of many units, grouped by unit while they come in, from tables of any length.
+//! Rows of tables of any length, grouped by unit while they are read.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -12,11 +12,11 @@ use store::ColumnScan;
 use crate::error::Error;
 use crate::fleet::flight_row::{StoredFlight, TailPosition, UnitKey, place_number};
 
-/// Shares of a table for each worker: several, so that faster workers take more.
+/// Number of shares of a table for each worker: more than one, so that faster workers take more of them.
 const SHARES: usize = 4;
 
 /// Number of gaps and latest departure, µs since 1970 UTC, by the digest of the settings of the estimate. A unit has one or
-/// two, so each row's is found by comparing.
+/// two digests, so a linear search finds that of a row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SettingsCounts(Vec<(String, usize, i64)>);
 
@@ -35,8 +35,8 @@ impl SettingsCounts {
         others.0.iter().for_each(|(settings, gaps, latest_us)| self.add(settings, *gaps, *latest_us));
     }
 
-    /// Number of gaps with other settings than the latest gap, the departure of the last of them, and the number of all
-    /// gaps; `None` if all have the same settings.
+    /// Number of gaps with other settings than the latest gap, the latest departure of these gaps, and the number of all
+    /// gaps; `None` if all gaps have the same settings.
     pub(crate) fn others(&self) -> Option<(usize, Timestamp, usize)> {
         let latest_us = self.0.iter().map(|(_, _, us)| *us).max()?;
         let others = || self.0.iter().filter(|(_, _, us)| *us < latest_us);
@@ -49,12 +49,12 @@ impl SettingsCounts {
 /// Flights of one unit, in the order of arrival.
 #[derive(Debug, Default)]
 pub(crate) struct UnitRows {
-    /// Where the unit was; a flight holds the number of its place.
+    /// Places of the unit; a flight holds the index of its place.
     pub(crate) places: Vec<TailPosition>,
     pub(crate) names: String,
     /// Gaps by the settings that they were estimated with.
     pub(crate) settings: SettingsCounts,
-    /// Rows of the table before those that the flights count from.
+    /// Number of rows of the table before the part from which the flights count their rows.
     rows_before: u32,
     pub(crate) rows: Vec<StoredFlight>,
 }
@@ -80,7 +80,7 @@ impl UnitRows {
     }
 }
 
-/// Numbers of a unit and of its place.
+/// Index of a unit, and index of a place of this unit.
 type Seat = (usize, u32);
 
 pub(crate) struct KeyColumns {
@@ -88,12 +88,12 @@ pub(crate) struct KeyColumns {
     pub(crate) parts: StringColumn,
     pub(crate) tails: StringColumn,
     pub(crate) positions: StringColumn,
-    /// The last row of each serial number with its seat, by code; the first entry is that of serial numbers without codes.
+    /// Last row of each serial number with its seat, by dictionary code plus 1; entry 0 is of serial numbers without a code.
     seats: Vec<Option<(usize, Seat)>>,
 }
 
 impl KeyColumns {
-    /// The columns of names that repeat, under all their names.
+    /// Columns that identify unit and place, under all their accepted names.
     pub(crate) const COLUMNS: [&'static str; 6] =
         ["serial_number", "serial", "part_number", "tail_number", "tail", "position"];
 
@@ -108,7 +108,7 @@ impl KeyColumns {
         })
     }
 
-    /// The seat of a row: that of an earlier row with the same keys, or what `find` finds.
+    /// The seat of a row: that of the last row with this serial number if all keys are equal, else the result of `find`.
     pub(crate) fn seat(
         &mut self,
         row: usize,
@@ -131,13 +131,13 @@ impl KeyColumns {
     }
 }
 
-/// Flights by unit, while they come in.
+/// Flights by unit, while a table is read.
 #[derive(Debug, Default)]
 pub(crate) struct RowsByUnit {
     /// Units by serial number; a serial number is unique only with its part number.
     by_serial: HashMap<String, Vec<usize>>,
     units: Vec<(UnitKey, UnitRows)>,
-    /// Number of rows that came in.
+    /// Number of rows read.
     count: u32,
 }
 
@@ -145,8 +145,8 @@ pub(crate) struct RowsByUnit {
 pub(crate) type PartsByUnit = BTreeMap<UnitKey, Vec<UnitRows>>;
 
 impl RowsByUnit {
-    /// Reads the rows of a table: `read` gets the number of a row, the rows of its unit, to which it adds, and the index of
-    /// its place with the number of the row among all that came in.
+    /// Passes each row of a table to `read`: its number, the rows of its unit, to which `read` adds, the index of its place,
+    /// and its number among all rows read so far.
     pub(crate) fn add_rows(
         &mut self,
         chunk: &TableBatch,
@@ -179,8 +179,8 @@ impl RowsByUnit {
     }
 }
 
-/// The rows of a table in several parts by unit, added by all workers in shares: the same result as if one worker had added
-/// all parts in order.
+/// The rows of a table in several parts, by unit. The workers read shares of the parts in parallel; the result is the same
+/// as if one worker read all parts in order.
 ///
 /// # Errors
 /// The first of the parts' errors.
@@ -207,10 +207,10 @@ pub(crate) fn of_parts(
     Ok(found)
 }
 
-/// Further columns of the rows of the store, in the order of the rows: what `read` makes of a row of a batch.
+/// Values of further columns of the store's rows, in the order of the rows; `read` converts the rows of a batch.
 ///
 /// # Errors
-/// When a part cannot be read, and what `read` cannot take.
+/// If a part cannot be read, or `read` fails.
 pub(crate) fn further_columns<R: Send, F: Fn(usize) -> R>(
     stored: &ColumnScan,
     names: &[&str],
@@ -230,18 +230,18 @@ pub(crate) fn further_columns<R: Send, F: Fn(usize) -> R>(
     Ok(all)
 }
 
-/// The rows of a part of the store, by name of column and as they are.
+/// The batches of a part of the store: each as a table with columns by name, and as stored.
 pub(crate) fn batches(scan: &ColumnScan, part: usize) -> Result<Vec<(TableBatch, RecordBatch)>, Error> {
     let named = |batch: RecordBatch| (TableBatch::new(Path::new("results"), batch.clone(), 0), batch);
     Ok(scan.read(part)?.into_iter().map(named).collect())
 }
 
-/// The number of a row.
+/// The number of a row; `None` if null.
 pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
     numbers.is_valid(row).then(|| numbers.value(row))
 }
 
-/// The number of a row; NaN for none.
+/// The number of a row; NaN if null.
 pub(crate) fn number(numbers: &Float64Array, row: usize) -> f64 {
     at(numbers, row).unwrap_or(f64::NAN)
 }

@@ -1,4 +1,4 @@
-//! Unit state: what the last run said about a unit, so that the next one can tell what changed and why.
+//! Unit state: the result of the last run for a unit, so that the next run can show what changed and why.
 
 use jiff::Timestamp;
 
@@ -58,7 +58,7 @@ impl UnitState {
         })
     }
 
-    /// Whether two rows say the same, whenever and in whatever run.
+    /// Whether two rows are equal apart from date and run.
     pub fn is_same(&self, other: &Self) -> bool {
         let other = Self { as_of_utc: self.as_of_utc, run_id: self.run_id.clone(), ..other.clone() };
         *self == other

@@ -30,7 +30,7 @@ impl Plan {
     /// Lays out the calendar of a fleet and the truth of each of its actuators.
     ///
     /// # Errors
-    /// The first fault of the spec.
+    /// The first error of the specification.
     pub fn new(spec: &Spec) -> Result<Self, Error> {
         spec.check()?;
         Planner::new(spec)?.plan()
@@ -38,7 +38,7 @@ impl Plan {
 }
 
 impl<'a> Planner<'a> {
-    /// Every tail on the ground with its first units.
+    /// A planner in which every position has its first unit and no flight is planned.
     fn new(spec: &'a Spec) -> Result<Self, Error> {
         let mut planner = Self {
             spec,
@@ -68,12 +68,12 @@ impl<'a> Planner<'a> {
         Ok(self.plan)
     }
 
-    /// A flight's slot opens at this instant; swaps happen here, while every aircraft is on the ground.
+    /// Begin of a flight's time slot. Swaps happen at this instant, while every aircraft is on the ground.
     fn slot_us(&self, number: usize) -> i64 {
         self.start_us + ((number - 1) as f64 * self.slot_days() * DAY_US) as i64
     }
 
-    /// Slots of a day or more are whole days, so that each begins at midnight.
+    /// Length of a slot in days: whole days if a day or more, so that each slot begins at midnight.
     fn slot_days(&self) -> f64 {
         let days = self.spec.days_between_flights;
         if days >= 1.0 { days.floor() } else { days }
@@ -144,7 +144,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Which of the tail's logs a flight has, counted from 1: one flight of each group has one.
+    /// Number of a flight's log among those of its tail, from 1: one random flight of each `flights_per_log` has a log.
     fn log_number(&self, number: usize, tail: &str) -> Option<usize> {
         let (size, log) = (self.spec.flights_per_log, (number - 1) / self.spec.flights_per_log + 1);
         let size = size.min(self.spec.flights_per_tail - (log - 1) * size);
@@ -171,7 +171,7 @@ impl<'a> Planner<'a> {
         let name = &spec.tails[tail];
         let flight_id = format!("{name}-{number:04}");
         let mut rng = seeded_rng(spec.seed, &["flight", &flight_id]);
-        // Books keep hours to a hundredth.
+        // Operators record flight hours to a hundredth.
         let spread = spec.flight_hours_spread * rng.random_range(-1.0..=1.0);
         let flight_hours = (spec.flight_hours * (1.0 + spread) * 100.0).round() / 100.0;
         let departure_us = self.slot_us(number) + self.departure_us(flight_hours, &mut rng);
@@ -194,8 +194,8 @@ impl<'a> Planner<'a> {
         });
     }
 
-    /// Departure within the slot, to the second: between six and ten at night on any of its days, or
-    /// anywhere the flight still fits.
+    /// Departure within the slot, to the second: on any of its days with the flight between 06:00 and 22:00, or, in a
+    /// slot shorter than a day, at any time that lets the flight end within the slot.
     fn departure_us(&self, flight_hours: f64, rng: &mut ChaCha8Rng) -> i64 {
         let slot_hours = 24.0 * self.slot_days();
         let chance: f64 = rng.random();
@@ -290,7 +290,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     drawn.clamp(-2.5, 2.5)
 }
 
-/// A unit as chance and the spec made it.
+/// A unit, with properties drawn at random where the specification does not declare them.
 #[derive(Debug, Clone)]
 struct FleetUnit {
     /// Index into the spec's parts.
@@ -342,7 +342,7 @@ fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<Fleet
     })
 }
 
-/// A spare of the part that its place holds, as stiff as the part.
+/// A spare of the part number at its position, with the nominal stiffness.
 fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUnit {
     let part = units[seat(spec, &spare.tail, &spare.position)].part;
     FleetUnit {
@@ -356,7 +356,7 @@ fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUni
     }
 }
 
-/// Index of a place, counted by tail and then by position; the spec is checked before, so both names are found.
+/// Index of a position of a tail, counted by tail and then by position; `Spec::check` ensures that both names exist.
 fn seat(spec: &Spec, tail: &str, position: &str) -> usize {
     let tail = spec.tails.iter().take_while(|known| *known != tail).count();
     let position = spec.positions.iter().take_while(|known| known.position != position).count();

@@ -18,17 +18,17 @@ use crate::load::shaping_filter::{Section, ShapedNoise};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GustForm {
-    /// Two equal low-passes: falls with the fourth power beyond the corner.
+    /// Two equal low-pass filters: the spectrum falls with the fourth power beyond the corner frequency.
     #[default]
     LowPass,
-    /// Dryden: falls with the second power.
+    /// Dryden: the spectrum falls with the second power.
     Dryden,
-    /// Von Kármán: falls with the power 5/3, by the rational fit of MIL-HDBK-1797.
+    /// Von Kármán: the spectrum falls with the power 5/3, by the rational fit of MIL-HDBK-1797.
     VonKarman,
 }
 
 impl GustForm {
-    /// The turbulence filter on a grid; none for the low-pass form.
+    /// The turbulence filter, discretised with a step, s; `None` for the low-pass form.
     pub(crate) fn noise(self, corner_hz: f64, step_s: f64, rng: ChaCha8Rng) -> Option<ShapedNoise> {
         let scale_s = (TAU * corner_hz).recip();
         let (numerator, denominator) = match self {

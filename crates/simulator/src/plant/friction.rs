@@ -3,14 +3,14 @@
 //! ```text
 //! F_f = F_v Ẋ + sign(Ẋ) (F_dry + η |F_l|)                                             (1)
 //! ```
-//! sign(·) is a set at rest: a stopped mass holds any push up to the level in brackets. Nothing is
-//! smeared by a tanh, so a held mass does not creep.
+//! At rest, sign(·) is any value from −1 to 1: friction holds a stopped mass against any force up to the level in
+//! brackets. No tanh smooths the sign, so a held mass does not creep.
 #![expect(missing_docs, reason = "docs/simulator.md explains each key")]
 
 use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 
-/// The parameters of equation 1 for one mass, and what departs from it. Without any key there is no friction.
+/// The parameters of equation 1 for one mass, and of departures from it. Without any key there is no friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, SmartDefault)]
 #[serde(deny_unknown_fields, default)]
 pub struct Friction {
@@ -38,7 +38,7 @@ pub(crate) struct Levels {
 }
 
 impl Friction {
-    /// Friction of equation 1 as it stands.
+    /// Friction of equation 1 without departures.
     pub fn new(dry_n: f64, load_share: f64, viscous_n_s_per_m: f64) -> Self {
         Self { dry_n, load_share, viscous_n_s_per_m, ..Self::default() }
     }
@@ -50,7 +50,7 @@ impl Friction {
         Self { dry_n, load_share, backdriven_load_share, ..self }
     }
 
-    /// Whether drag changes during a log.
+    /// Whether viscous and grease drag change during a log.
     pub(crate) fn is_warming(&self) -> bool {
         (self.cold_factor - 1.0).abs() > 0.0
     }
@@ -82,11 +82,11 @@ impl Friction {
     }
 }
 
-/// How the dry part answers to speed.
+/// Dependence of dry friction on speed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FrictionLaw {
-    /// Equation 1 as it stands.
+    /// Independent of speed, as in equation 1.
     #[default]
     Coulomb,
     /// The level is `ratio` times higher at rest and falls with speed as `exp(−(v/speed)²)`.
@@ -114,7 +114,7 @@ impl FrictionLaw {
 
     /// One mass under friction during a step.
     ///
-    /// `inertia_n_s_per_m` is twice the mass over the step, `bend` the bristles' before it.
+    /// `inertia_n_s_per_m` is twice the mass over the step, `bend` the bend of the bristles before the step.
     pub(crate) fn body(
         &self,
         friction: &Friction,
@@ -162,7 +162,7 @@ struct Bristle {
 }
 
 impl Bristle {
-    /// The bristles in units of the level that they bend up to on one side, and this level over the base.
+    /// The bristles with their bend relative to the friction level of one direction, and this level over the base.
     fn up_to(&self, level_n: f64) -> (Self, f64) {
         let lift = if self.base_n > 0.0 { level_n / self.base_n } else { 1.0 };
         let (bend, rate_s_per_m) = (self.bend / lift, self.rate_s_per_m / lift);
@@ -171,7 +171,7 @@ impl Bristle {
 }
 
 impl FrictionBody {
-    /// The mean speed under a push, m/s, and its derivative by the push; exactly zero when held.
+    /// The mean speed under a force, m/s, and its derivative by the force; both are zero if friction holds the mass.
     pub(crate) fn mean_velocity(&self, push_n: f64) -> (f64, f64) {
         if let Some(bristle) = &self.bristle {
             return self.slide(push_n, bristle);

@@ -10,17 +10,17 @@
 //! second order, stable at any stiffness, elastic energy exchanged exactly, friction only dissipates.
 //! A mass that friction holds has U = 0 exactly, and stops: V′ = 0.
 //!
-//! Each mass answers monotonically to c, and c to U₂ − U₁, so one scalar equation with one root
-//! remains; Newton's method inside a bracket finds it in two or three turns.
+//! U₁ and U₂ are monotonic in c, and c in U₂ − U₁, so one scalar equation with one root
+//! remains; Newton's method inside a bracket finds it in two or three iterations.
 
 use crate::plant::actuator_plant::Plant;
 
-/// The equation for U₂ − U₁ is solved to this, m/s: 10⁻¹⁷ m over a step of 10⁻⁴ s.
+/// Tolerance of the equation for U₂ − U₁, m/s: 10⁻¹⁷ m over a step of 10⁻⁴ s.
 const SPEED_TOLERANCE_M_PER_S: f64 = 1e-13;
-/// Far more turns than bisection alone would need.
+/// Most iterations: far more than bisection alone would need.
 const TURNS: usize = 80;
 
-/// Where both masses are, and how fast.
+/// Positions and speeds of both masses, and bend of their friction bristles.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct State {
     /// X₁, metres.
@@ -44,9 +44,9 @@ pub(crate) struct Forces {
     pub(crate) drive_n: f64,
     /// The aerodynamic load on the screw, N, positive along +X.
     pub(crate) load_n: f64,
-    /// Motion of the motor on top of X₁ at the start of the step, metres: a vibration nothing resists.
+    /// Prescribed vibration of the motor, added to X₁, at the start of the step, metres.
     pub(crate) shake_m: f64,
-    /// Its mean speed over the step, m/s.
+    /// Mean speed of this vibration over the step, m/s.
     pub(crate) shake_m_per_s: f64,
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64)
     }
 }
 
-/// A held mass has stopped; any other leaves the step by the midpoint rule.
+/// Speed after a step: zero for a mass that friction holds, else by the midpoint rule.
 fn after(before: f64, mean: f64) -> f64 {
     if mean == 0.0 { 0.0 } else { 2.0 * mean - before }
 }

@@ -9,7 +9,7 @@ use crate::handle::Store;
 use crate::read::query::Query;
 use crate::read::{frame, scan};
 
-/// A store in numbers; flights, units and aircraft are those with a record.
+/// Contents of a store in numbers; flights, units and tails are counted if they have a record.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct Info {
@@ -23,7 +23,7 @@ pub struct Info {
     pub failed_logs: usize,
     /// Data files of the records.
     pub files: usize,
-    /// Their bytes; superseded files, which are kept for a while, are not counted.
+    /// Size of these files, bytes, without superseded files, which are kept for a while.
     pub bytes: u64,
     /// The Delta version of the records.
     pub version: u64,
@@ -59,7 +59,7 @@ impl Store {
             files: snapshot.files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,
-            // A run under a clock that was ahead counts only where there is no other: it hides none.
+            // A run whose clock was ahead would hide all later runs: it counts only if there is no other.
             last_completed: completed.max_by_key(|run| (run.finished_utc <= now, run.finished_utc)).cloned(),
             last: runs.last().cloned(),
         })

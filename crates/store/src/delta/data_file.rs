@@ -1,7 +1,7 @@
-//! A data file: Parquet whose name carries the digest of its content.
+//! A data file: Parquet whose name contains the digest of its content.
 //!
-//! The digest is in the name, not in the action's tags nor in a sidecar: it survives checkpoints and
-//! log clean-up, which may drop tags, it cannot be separated from its file, and `b3sum` verifies it.
+//! The digest is in the name, not in the tags of the Delta action nor in a second file: checkpoints and
+//! log clean-up may drop tags, a second file can be lost, and `b3sum` verifies the file against its name.
 
 use std::path::Path;
 
@@ -16,15 +16,15 @@ use crate::delta::file_stats;
 use crate::delta::location::Location;
 use crate::error::Error;
 
-/// Rows of a row group: small enough that one tail's history decodes little of a big file.
+/// Rows of a row group: few enough that reading one tail's history decodes little of a big file.
 pub(crate) const GROUP_ROWS: usize = 16_384;
 
 const DIGEST_DIGITS: usize = 64;
 
 /// Writes a batch as a data file into a table's folder and returns the action that adds it.
 ///
-/// The version the file is made for comes first in its name: the same content written again later
-/// is another file, since Delta cannot remove and add one name in one commit.
+/// The name begins with the table version, so that the same content written again later is another
+/// file: Delta cannot remove and add one name in one commit.
 pub(crate) fn write(
     location: &Location,
     version: u64,
@@ -51,7 +51,7 @@ pub(crate) fn write(
     })
 }
 
-/// The digest a file's name carries; none for a file that another program wrote.
+/// The digest in a file's name; `None` for a file that another program wrote.
 pub(crate) fn digest_of_name(name: &str) -> Option<&str> {
     let (_, digest) = name.strip_suffix(".parquet")?.rsplit_once('-')?;
     let hexadecimal = digest.len() == DIGEST_DIGITS && digest.bytes().all(|b| b.is_ascii_hexdigit());

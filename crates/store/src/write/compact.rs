@@ -14,12 +14,12 @@ use crate::read::frame;
 use crate::read::scan::{self, Condition};
 use crate::write::writer::Writer;
 
-/// Rows of a full file: with fewer, a query opens more files; with more, replacing one flight copies more rows.
+/// Rows of a full file: smaller files make a query open more of them; larger ones make a replaced flight copy more rows.
 const FILE_ROWS: usize = 100_000;
-/// Number of files that are written in one pass, which reads the old files that may hold their rows.
+/// Number of new files of one pass; each pass reads the old files that may contain their rows.
 const FILES_AT_ONCE: usize = 5;
 
-/// Age at which superseded files are deleted, so that a reader that still uses them may finish: Delta's default.
+/// Age at which superseded files are deleted, so that readers that use them can finish: Delta's default.
 const KEPT: Duration = Duration::from_hours(7 * 24);
 
 /// What a compaction did.
@@ -57,11 +57,10 @@ impl Store {
 impl Writer {
     /// Merges the files of every table and deletes superseded ones older than seven days.
     ///
-    /// Rows do not change. Memory holds the rows of five files, or of five tails where these have more. An error leaves the
-    /// tables as they were.
+    /// Rows do not change. Memory holds the rows of five files, or of five tails if these have more rows.
     ///
     /// # Errors
-    /// As [`Writer::commit`]; the tables are unchanged then.
+    /// As [`Writer::commit`]; the table of the error is unchanged.
     pub fn compact(&mut self) -> Result<Compaction, Error> {
         let store = self.store();
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
@@ -75,7 +74,7 @@ impl Writer {
         Ok(total)
     }
 
-    /// Deletes data files that were superseded, or written and never committed, longer ago than given.
+    /// Deletes data files that were superseded, or written and never committed, longer ago than `kept`.
     ///
     /// # Errors
     /// [`Error::Io`] when a file cannot be deleted, [`Error::Table`] when the log cannot be read.
@@ -85,7 +84,7 @@ impl Writer {
     }
 }
 
-/// Columns by which the rows of a compacted table are sorted; rows with one value of the first are written together.
+/// Columns by which a compacted table is sorted; rows with the same value of the first column are written together.
 fn order(table: &Table) -> &'static [&'static str] {
     match table.name {
         "gaps" => &["tail_number", "serial_number", "departure_utc"],
@@ -96,7 +95,7 @@ fn order(table: &Table) -> &'static [&'static str] {
     }
 }
 
-/// The change that merges the files of a table; empty if they are few.
+/// The change that merges the files of a table; empty if that would not lower their number and all have a digest.
 fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Change<'a>, Error> {
     let order = order(table);
     let (slice_by, files, schema) = (order[0], snapshot.paths().collect::<Vec<_>>(), &table.schema);
@@ -116,7 +115,7 @@ fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Ch
         let read =
             |files: &[PathBuf]| frame::sorted(&store.read_files(files, schema, &conditions)?, order, None);
         let mut rows = read(&snapshot.paths_where(|stats| conditions[0].may_be_in(stats)))?;
-        // No row is lost to a file whose statistics are wrong.
+        // The statistics of a file are wrong: read all files, so that no row is lost.
         if rows.num_rows() != slices.iter().map(|slice| slice.rows).sum::<usize>() {
             rows = read(&files)?;
         }
@@ -132,7 +131,7 @@ fn merged<'a>(store: &Store, table: &Table, snapshot: &'a Snapshot) -> Result<Ch
     Ok(change)
 }
 
-/// Neighbouring values of the first sort column, whose rows share a file.
+/// A range of values of the first sort column; its rows are written together.
 #[derive(Debug, PartialEq)]
 struct OutputRange {
     first: String,

@@ -46,7 +46,7 @@ pub(crate) struct Pass {
     pub(crate) start: f64,
 }
 
-/// One curve's pass, against the gaps' and the season's.
+/// Weighted products of a curve's pass with itself, the gaps and the season, and its level at both ends.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Regression {
     pub(crate) sff: f64,

@@ -4,19 +4,19 @@ use crate::data::bins::{Bin, Segment};
 use crate::inference::level_filter::{Filter, Pass, Regression};
 use crate::prior::{FleetPrior, LogPrior};
 
-/// A segment's bins behind one filter, with the season fitted together with the candidate.
+/// A segment's bins filtered once for all candidates, each of which is fitted together with the season.
 pub(crate) struct SegmentFit<'a> {
     pub(crate) segment: &'a Segment<'a>,
     pub(crate) prior: &'a FleetPrior,
     pub(crate) logs: LogPrior<'a>,
     pub(crate) bins: Vec<Bin>,
     pub(crate) filter: Filter,
-    /// The gaps less the fleet's mean season.
+    /// Pass of the gaps minus the fleet's mean season; its two levels are also without the unit's own seasonal deviation.
     pub(crate) gaps: Pass,
     /// Variance of the first level about a new unit's mean gap, and its logarithm.
     pub(crate) new_m2: f64,
     pub(crate) ln_new_m2: f64,
-    /// The season with unit amplitude, and the estimate of its amplitude from the gaps alone.
+    /// Pass of the season with unit amplitude.
     pub(crate) wave: Pass,
     wave_by_gaps: f64,
     wave_information: f64,
@@ -25,8 +25,8 @@ pub(crate) struct SegmentFit<'a> {
 }
 
 impl<'a> SegmentFit<'a> {
-    /// `growth_m` is the wear expected up to a usage since the segment's begin: the level walks by a
-    /// variance proportional to it.
+    /// `growth_m` is the expected wear, m, by usage since the begin of the segment: the process variance of the
+    /// level is proportional to it.
     pub(crate) fn new(
         segment: &'a Segment<'a>,
         prior: &'a FleetPrior,
@@ -70,20 +70,20 @@ impl<'a> SegmentFit<'a> {
         pass
     }
 
-    /// Variance of the level now, whatever the curve.
+    /// Variance of the level now, which is the same for every curve.
     pub(crate) fn level_m2(&self) -> f64 {
         self.filter.end_m2 + self.wave.end * self.wave.end * self.seasonal_m2
     }
 
-    /// What every curve's likelihood shares; it matters when one usage axis is weighed against another.
+    /// Part of the log-likelihood that all curves share; it matters only for comparing usage axes.
     pub(crate) fn shared_log_likelihood(&self) -> f64 {
         let fitted = self.wave_by_gaps * self.wave_by_gaps / self.wave_information;
         -0.5 * (self.gaps.square - fitted + self.filter.log_variance + self.wave_information.ln())
     }
 }
 
-/// Variance by which the level walks before each bin: wear's own, a little drift, and a new
-/// installation's bias where it changed.
+/// Process variance of the level before each bin, m²: of wear, of a small drift, and of the bias of the
+/// installation where that changes.
 pub(crate) fn process_variance(
     bins: &[Bin],
     begin: f64,
@@ -103,7 +103,7 @@ pub(crate) fn process_variance(
     walk_m2
 }
 
-/// Growth between the means of the first and the last quarter of the bins, brought to the whole.
+/// Growth over all bins, m, extrapolated from the means of the first and the last quarter.
 pub(crate) fn linear_growth(bins: &[Bin]) -> f64 {
     let quarter = bins.len().div_ceil(4);
     let mean = |bins: &[Bin]| bins.iter().map(|b| b.gap_m).sum::<f64>() / bins.len() as f64;

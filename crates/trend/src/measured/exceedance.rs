@@ -6,35 +6,35 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Exceedance {
-    /// One record alone, or flagged ones: the next sound one confirms or clears it.
+    /// One record alone, or flagged records only: later sound records confirm or clear it.
     Unconfirmed { gap_m: f64, before_m: Option<f64>, records: usize },
-    /// Several of the last records, with others in between.
+    /// Several of the last records, with records below the limit in between.
     Repeated { records: usize, among: usize },
-    /// Two records at least, or the level of the last records.
+    /// Two records or more in a row, one of them sound; or the level of the last records.
     Confirmed { records: usize },
-    /// Confirmed before; neither two records below the limit nor maintenance have ended it, or the level is at 97 % of
-    /// the limit or more.
+    /// Confirmed before, and not ended by two records below the limit or by maintenance; or ended by two records, but the
+    /// level is still at 97 % of the limit or more.
     Held,
 }
 
-/// Records at or above the limit that are no exception although others came in between: their least number, and the number
-/// of last records among which it counts.
+/// Least number of records at or above the limit that count as a repeated exceedance, and the number of last records
+/// among which they are counted.
 const REPEATED: [(usize, usize); 2] = [(3, 6), (4, 12)];
 
-/// Records at or above the limit, one after the other.
+/// Successive records at or above the limit, and the records below it that follow.
 #[derive(Debug, Clone, Copy, Default)]
 struct Run {
     first: usize,
     above: usize,
-    /// Whether one of those above is sound.
+    /// Whether one of the records above is sound.
     has_sound: bool,
-    /// Records below the limit since.
+    /// Number of records below the limit since the last one above it.
     below: usize,
     is_confirmed: bool,
     before_m: Option<f64>,
 }
 
-/// The exceedance at the last of some records, and the events of all of them.
+/// The exceedance at the last record, and the events of all records.
 pub(crate) fn exceedance(
     all: &[Record],
     level: Option<Level>,
@@ -67,7 +67,7 @@ pub(crate) fn exceedance(
             run = Some(current);
         } else if current.is_confirmed {
             ended_at = Some(k);
-            // Nothing on record made the gap smaller. Records near the limit fall below it by their scatter.
+            // No recorded maintenance made the gap smaller. A smaller fall may be scatter of records near the limit.
             if records[k - 1].gap_m < HYSTERESIS * limit_m {
                 let [before, Record { departure_us, gap_m, error_m, .. }] = [records[k - 2], records[k - 1]];
                 let (kind, step_m) = (ChangePointKind::Reset, gap_m - before.gap_m);
@@ -84,7 +84,7 @@ pub(crate) fn exceedance(
     let last_renewals = |records: &[Record]| records.last().map(|record| record.renewals);
     let repeated = repeated(&records, is_above);
     let found = match (run, by_level) {
-        // The records before a renewal.
+        // After a renewal, records before it count no more.
         _ if last_renewals(&records) != last_renewals(all) => None,
         (Some(run), _) if run.is_confirmed && run.below == 0 => {
             Some(Exceedance::Confirmed { records: run.above })
@@ -101,7 +101,7 @@ pub(crate) fn exceedance(
     (found, events)
 }
 
-/// Records above the limit that come back after others below it, since the last renewal; one of them must be sound.
+/// Records since the last renewal that exceed the limit again after records below it; one of them must be sound.
 fn repeated(records: &[Record], is_above: impl Fn(&Record) -> bool) -> Option<Exceedance> {
     let of_life = records.chunk_by(|before, here| before.renewals == here.renewals).last()?;
     REPEATED.into_iter().find_map(|(least, among)| {
@@ -113,7 +113,7 @@ fn repeated(records: &[Record], is_above: impl Fn(&Record) -> bool) -> Option<Ex
     })
 }
 
-/// The middle of the last three sound records before a record, in its period.
+/// Median of the last three sound records before a record, in its period, m.
 fn before(records: &[Record], at: usize) -> Option<f64> {
     let period = records[at].period;
     let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);

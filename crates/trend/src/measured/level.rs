@@ -1,17 +1,17 @@
-//! Level at the last record: a line through the last records that it explains.
+//! Level at the last record: a line through as many of the last records as it explains.
 
 use crate::measured::record::Record;
 
-/// Most records of a level.
+/// Most records of a level's line.
 const WINDOW: usize = 12;
 
-/// Records below which a constant is tried before a line.
+/// With fewer records than this, a constant is tried before a line.
 const LEAST_LINE: usize = 5;
 
-/// Standard errors from which a single record among others is not counted.
+/// Standard errors beyond which a single record between others is an outlier.
 pub(crate) const WILD: f64 = 5.0;
 
-/// Standard errors, and share of the limit, by which a lone last record must lie below the level to be unconfirmed.
+/// Standard errors, and share of the limit, by which a lone last record must lie below the level to be ignored.
 const FALL_ERRORS: f64 = 4.0;
 const FALL_SHARE: f64 = 0.05;
 
@@ -20,13 +20,13 @@ const FALL_SHARE: f64 = 0.05;
 pub struct Level {
     /// The gap, metres.
     pub gap_m: f64,
-    /// Its standard error from the errors and the scatter of its records, and from what these may share, metres.
+    /// Standard error of the level, from errors and scatter of its records and from an error that all may share, metres.
     pub se_m: f64,
-    /// The same without what the records may share, which two levels of a unit share too, metres.
+    /// The standard error without that shared error, which two levels of a unit have in common too, metres.
     pub(crate) own_se_m: f64,
-    /// Number of records that it rests on.
+    /// Number of records of the line, without outliers.
     pub records: usize,
-    /// Number of records from the first of these to the last one, outliers included.
+    /// Number of records from the first of the line to the last one, outliers included.
     pub(crate) window: usize,
     pub(crate) period: u32,
     slope_m_per_hour: f64,
@@ -34,7 +34,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// The level at other hours, by its line.
+    /// Value of the level's line at other hours, m.
     pub(crate) fn at(&self, hours: f64) -> f64 {
         self.gap_m + self.slope_m_per_hour * (hours - self.hours)
     }
@@ -43,7 +43,7 @@ impl Level {
 /// Weighted least-squares line through some records.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line {
-    /// At the last record.
+    /// Value at the last record, m, and its variance, m².
     pub(crate) end_m: f64,
     pub(crate) end_m2: f64,
     pub(crate) slope: f64,
@@ -86,31 +86,31 @@ impl Line {
         })
     }
 
-    /// How far a record lies from the line whose last record is given, m.
+    /// Residual of a record, m; `last` is the last record of the line.
     pub(crate) fn off_m(&self, record: &Record, last: &Record) -> f64 {
         record.gap_m - self.end_m - self.slope * (record.hours - last.hours)
     }
 
-    /// Sum of squared residuals over that about the constant.
+    /// Sum of squared residuals, divided by that of the fitted constant.
     pub(crate) fn unexplained_share(&self, records: &[Record]) -> f64 {
         Self::fit(records, true).map_or(1.0, |constant| self.chi2 / constant.chi2.max(f64::MIN_POSITIVE))
     }
 
-    /// Whether the residuals are those of the errors: 99.8 % of sound windows pass.
+    /// Whether the records' errors explain the residuals: 99.8 % of sound windows pass.
     pub(crate) fn explains(&self) -> bool {
         self.chi2 <= self.freedom + 4.0 * (2.0 * self.freedom).sqrt() + 3.0 && self.last_two.abs() <= 3.0
     }
 
-    /// Factor of the variances by the scatter about the line, at least one.
+    /// Factor by which the scatter about the line increases the variances, at least one.
     pub(crate) fn inflation(&self) -> f64 {
         if self.freedom > 0.0 { (self.chi2 / self.freedom).max(1.0) } else { 1.0 }
     }
 }
 
-/// The level at the last record: by the longest window up to twelve records of its period that a line explains.
+/// The level at the last record, by a line through the longest window of its period, up to twelve records, that it explains.
 ///
-/// A lone record far below a level of several records does not lower it, be it the first of a new installation: two of them
-/// do.
+/// A lone record far below a level of several records does not lower the level, even as the first of a new installation;
+/// two such records do.
 pub(crate) fn measured_level(sound: &[Record], limit_m: f64) -> Option<Level> {
     let level = level_at_end(sound)?;
     let (last, before) = sound.split_last()?;
@@ -129,14 +129,14 @@ fn level_at_end(sound: &[Record]) -> Option<Level> {
     (1..=most).rev().find_map(|count| explained(&sound[sound.len() - count..]))
 }
 
-/// The level by the line through these records, or through all but one of five or more; `None` if no line explains them.
+/// The level by the line through these records, or, for six or more, through all but one; `None` if no line explains them.
 fn explained(records: &[Record]) -> Option<Level> {
     let level = |line: Line, count: usize| {
         let last = records[records.len() - 1];
         let own_se_m = (line.end_m2 * line.inflation()).sqrt();
         Level {
             gap_m: line.end_m,
-            // No mean lowers an error that all records have.
+            // Averaging does not lower an error that all records share.
             se_m: own_se_m.hypot(last.shared_m),
             own_se_m,
             records: count,
@@ -167,7 +167,7 @@ fn without_wild(records: &[Record]) -> Option<(Record, Vec<Record>)> {
     }
     let off = |[a, b, c]: &[Record; 3]| (b.gap_m - 0.5 * (a.gap_m + c.gap_m)).abs() / b.error_m;
     let inner = records.array_windows().map(off).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?.0 + 1;
-    // The first of a window may be the outlier as well; the window one shorter covers that.
+    // If the first record of the window is the outlier, the window shorter by one excludes it.
     let others = records.iter().enumerate().filter(|(k, _)| *k != inner).map(|(_, r)| *r).collect();
     Some((records[inner], others))
 }

@@ -18,7 +18,7 @@ pub(crate) const JUMP_ERRORS: f64 = 6.0;
 /// Records for which a jump is reported, however long they take.
 pub(crate) const JUMP_RECORDS: usize = 12;
 
-/// A level that was at the watch limit stays there until it is this share of it, or for this many records.
+/// A level that was at a limit keeps its state down to this share of the limit, for at most this many records.
 pub(crate) const HYSTERESIS: f64 = 0.97;
 pub(crate) const RECALLED: usize = 24;
 
@@ -31,20 +31,20 @@ pub struct Record {
     pub(crate) hours: f64,
     /// The gap, metres.
     pub gap_m: f64,
-    /// Its standard error with the scatter that was found, metres.
+    /// Standard error of the gap, scaled by the scatter found between records, metres.
     pub error_m: f64,
-    /// The part of its stated error that the scatter does not show: an error that the flights may share, metres.
+    /// Part of the stated standard error that the scatter does not show: an error that all flights may share, metres.
     pub(crate) shared_m: f64,
-    /// Without a quality flag that makes it uncertain.
+    /// Whether no quality flag makes the record uncertain.
     pub(crate) is_sound: bool,
-    /// A new one begins with each installation and after each renewal.
+    /// Number of the period: a new period begins with each installation and after each renewal.
     pub(crate) period: u32,
-    /// Renewals before it. The gap goes with the unit from one installation to the next, and ends with a renewal.
+    /// Number of renewals before the record. A unit keeps its gap in a new installation; a renewal resets the gap.
     pub(crate) renewals: u32,
 }
 
 impl Record {
-    /// Whether it is so far below zero that it shows a fault, and nothing of the unit.
+    /// Whether the gap is so far below zero that the record shows a fault of the data, not the unit's gap.
     pub fn is_impossible(&self) -> bool {
         !self.is_sound && self.gap_m < -IMPOSSIBLE_ERRORS * self.error_m
     }

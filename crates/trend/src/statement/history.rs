@@ -27,7 +27,7 @@ pub(crate) struct History<'a> {
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
     starts: Vec<SegmentStart>,
-    /// Offset that was removed from the last estimates, metres. The forecast adds a rise again: only the law is without it.
+    /// Offset that was removed from the last estimates, metres: laws are fitted without a rise, but the forecast adds it again.
     pub(crate) undone_m: f64,
     /// Usage at the last flight.
     pub(crate) now: f64,

@@ -6,10 +6,10 @@ use crate::statement::types::Rate;
 use crate::wear::Component;
 use crate::wear::bank::{WearClass, WearLaw};
 
-/// Growth that counts as visible, a share of the limit.
+/// Least visible growth, as a share of the limit.
 const VISIBLE: f64 = 0.02;
 
-/// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
+/// Quantiles of the curves' present rates, per flight hour; the distances from the median are multiplied by `width`.
 pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64, width: f64) -> Rate {
     let of = |n: &Component| (n.amplitude_m * n.law.derivative(n.age_now) / hours_per_usage, n.weight);
     let rates = WeightedSamples::new(posterior.significant_components().map(of));
@@ -28,8 +28,8 @@ pub(crate) fn growth_probability(posterior: &Posterior, limit_m: f64) -> f64 {
     posterior.components.iter().map(grown).sum::<f64>().min(1.0)
 }
 
-/// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
-/// where that is most of it.
+/// Usage since the begin of the segment at which wear began, and the probability of an onset; `None` if that is
+/// at most one half.
 pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
     let start = |n: &Component| match n.law {
         WearLaw::Onset { start } => Some((start, n.weight)),
@@ -39,7 +39,7 @@ pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
     (starts.total > 0.5).then(|| (starts.quantile(0.5), starts.total.min(1.0)))
 }
 
-/// Most probable class of wear laws, and its probability; for a wearing unit, of the classes other than none.
+/// Most probable class of wear laws, and its probability; for a wearing unit, without the class *none*.
 pub(crate) fn law(posterior: &Posterior, is_wearing: bool) -> Option<(WearClass, f64)> {
     let mut shares: Vec<(WearClass, f64)> = Vec::new();
     for component in &posterior.components {

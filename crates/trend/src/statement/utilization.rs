@@ -1,4 +1,4 @@
-//! The present pace of a unit: flight hours a day.
+//! Present usage of a unit: flight hours per day.
 //!
 //! It is the mean of the last 91 days of flights, with two exceptions. A pause three times as long as any other (a heavy
 //! check, a part in store) counts only as long as the next longest. If each of the last one to four weeks has 1.5 times the
@@ -8,17 +8,17 @@
 use crate::data::series::{DAY_US, Flight};
 use crate::statement::types::Utilization;
 
-/// Number of last days that give the pace, in whole weeks.
+/// Number of last days that give the usage, in whole weeks.
 const DAYS: i64 = 91;
 const WEEK: i64 = 7;
-/// Shortest pause that is left out, days, and how many times as long as any other it is.
+/// Shortest pause that is shortened, days, and the least ratio of its length to that of any other pause.
 const PAUSE_DAYS: f64 = 7.0;
 const PAUSE_FACTOR: f64 = 3.0;
-/// Most weeks that count alone, and how much busier they are than any before.
+/// Most weeks that count alone, and least ratio of their hours to those of any week before.
 const BUSY_WEEKS: usize = 4;
 const BUSIER: f64 = 1.5;
 
-/// The pace at the last of some flights; nothing when they show no hours.
+/// Usage per day at the last flight; `None` if the flights show no hours.
 pub(crate) fn utilization(flights: &[Flight]) -> Option<Utilization> {
     let last = flights.last()?;
     let since = |flight: &Flight| last.departure_us.saturating_sub(flight.departure_us);

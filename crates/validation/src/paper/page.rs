@@ -34,7 +34,7 @@ pub(crate) fn page(claims: &Claims) -> String {
     )
 }
 
-/// The mean change at a factor, %.
+/// Mean change of the gap by a parameter times `factor`, %.
 fn mean(changes: &[Change], factor: f64) -> f64 {
     let found = changes.iter().find(|change| (change.factor / factor - 1.0).abs() < 1e-9);
     found.map_or(f64::NAN, |change| change.percent[1])

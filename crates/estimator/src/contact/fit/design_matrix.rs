@@ -25,7 +25,7 @@ pub(crate) const STRIBECK: usize = 6;
 pub(crate) const FORCE_DRIFT: usize = 7;
 /// c·X and c·X²: a stiffness that varies along the stroke.
 pub(crate) const FORCE_PLACE: usize = 8;
-/// Ẋ₁ over a reference speed: its coefficient is the skew. From here on no column depends on the force in the coupling.
+/// Ẋ₁ over a reference speed: its coefficient is the skew. This column and all later ones do not depend on c.
 pub(crate) const SPEED: usize = 10;
 /// Ḟ: a load channel that lags.
 pub(crate) const LOAD_RATE: usize = 11;
@@ -38,7 +38,7 @@ pub(crate) const PERIODIC: usize = 17;
 
 /// Share of the 95 % load below which flanks may be soft.
 pub(crate) const FIRM_SHARE: f64 = 0.12;
-/// Number of blocks before a block that must press the same flank as firmly; one block after it must as well.
+/// Number of blocks before a block that must press the same flank as firmly as it does; the next block must as well.
 pub(crate) const BEFORE: usize = 2;
 
 /// The mean of some blocks in contact on one flank.
@@ -50,7 +50,7 @@ pub(crate) struct DesignRow<const N: usize> {
     pub(crate) y_m: f64,
     /// Number of blocks.
     pub(crate) blocks: f64,
-    /// Rows of one stretch are taken as dependent.
+    /// Number of the stretch of the flight; rows of one stretch are taken as correlated.
     pub(crate) stretch: u32,
 }
 
@@ -65,8 +65,8 @@ pub(crate) struct DesignMatrix {
 
 #[allow(clippy::inline_always, reason = "one row for each block: a call would put its numbers into memory")]
 impl BlockMeans {
-    /// Rows of all blocks that keep their flank, none of which mixes flank and gap, once the screw has slipped. A firm row is
-    /// of blocks before which its flank was pressed firmly for `settling` blocks.
+    /// Rows of all blocks whose neighbours press the same flank, after the screw first slipped: such a block does not mix
+    /// flank and gap. Blocks of a firm row follow at least `settling` blocks that press the flank firmly.
     ///
     /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
     /// full or its stretch ends.
@@ -150,7 +150,7 @@ impl BlockMeans {
         ]
     }
 
-    /// δX of a block without all that does not depend on the force in the coupling, m; NaN where something is missing.
+    /// δX of a block minus the fitted terms that do not depend on the coupling force, m; NaN if the block is incomplete.
     #[inline]
     pub(crate) fn without_slow_parts_m(&self, scaling: &Scaling, k: usize, beta: &[f64; COLUMNS]) -> f64 {
         if self.is_complete(k) {
@@ -162,7 +162,7 @@ impl BlockMeans {
 }
 
 impl DesignMatrix {
-    /// Takes in a row, if it is not empty, and empties it.
+    /// Adds the mean of an open row, unless it is empty, and empties the row.
     fn close(&mut self, kind: usize, row: &mut DesignRow<COLUMNS>) {
         if row.blocks > 0.0 {
             let rows = if kind < 2 { &mut self.light } else { &mut self.firm };
@@ -171,7 +171,7 @@ impl DesignMatrix {
     }
 }
 
-/// Number of blocks on the less pressed flank, times `each`: with a block's length, the time in contact, s.
+/// Number of blocks on the flank with fewer blocks, times `each`: with a block's length in s, the time in contact, s.
 pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>, each: f64) -> f64 {
     let (mut upper, mut lower) = (0.0, 0.0);
     for row in rows {
@@ -180,7 +180,7 @@ pub(crate) fn less_pressed<'a>(rows: impl Iterator<Item = &'a DesignRow<COLUMNS>
     f64::min(upper, lower)
 }
 
-/// Number of blocks whose force presses the less pressed flank by more than `least_n`.
+/// Number of blocks with a force above `least_n`, on the flank with fewer of them.
 pub(crate) fn less_pressed_blocks(forces_n: impl Iterator<Item = f64>, least_n: f64) -> f64 {
     let (mut upper, mut lower) = (0, 0);
     for force_n in forces_n {
@@ -190,8 +190,8 @@ pub(crate) fn less_pressed_blocks(forces_n: impl Iterator<Item = f64>, least_n: 
     upper.min(lower) as f64
 }
 
-/// Kind of contact of a block: 0 lower, 1 upper flank, plus 2 if pressed firmly; `None` if the blocks around it do not
-/// keep it.
+/// Kind of contact of a block: 0 lower, 1 upper flank, plus 2 if pressed firmly; `None` if a block around it is not in the
+/// same contact.
 #[inline]
 fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
     let here_n = around[BEFORE].force_n;
@@ -205,8 +205,8 @@ fn touch(around: &[Coupling; BEFORE + 2], firm_n: f64) -> Option<usize> {
     is_kept.then_some(2 * usize::from(is_firm) + usize::from(here_n > 0.0))
 }
 
-/// Number of blocks in a row that press one flank firmly, up to one with this force: above zero those on the upper flank,
-/// below zero those on the lower one.
+/// Number of successive blocks, up to one with this force, that press one flank firmly: positive for the upper flank,
+/// negative for the lower one.
 fn pressed_blocks(before: isize, force_n: f64, firm_n: f64) -> isize {
     if force_n > firm_n {
         before.max(0) + 1
@@ -217,7 +217,6 @@ fn pressed_blocks(before: isize, force_n: f64, firm_n: f64) -> isize {
     }
 }
 
-/// Σ a·b.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -1,8 +1,8 @@
-//! Search over the parameters that the regression cannot find by derivatives: where friction starts, the zero of the
-//! load cell, and the bristles.
+//! Search over the parameters that the regression cannot find by derivatives: the start values of friction, the load
+//! zero, and the bristles.
 //!
-//! Candidates are compared by their misfit of all complete blocks, in contact or within the gap: which blocks are in
-//! contact depends on the candidate, so that a comparison over contact alone would compare different data.
+//! Candidates are compared by their misfit over all complete blocks, in contact or within the gap. Which blocks are in
+//! contact depends on the candidate: over these alone, two candidates would be compared by different data.
 
 use crate::contact::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
@@ -17,19 +17,19 @@ use crate::contact::stats::spread;
 /// First and last step of the search for the load zero, as shares of the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.003);
 
-/// By how much the misfit must be smaller from a far zero of the load cell.
+/// By how much the misfit from a far load zero must be smaller than that from the logged zero.
 const ZERO_GAIN: f64 = 0.5;
-/// Reading of the load cell, over the 95 % load, from which a far zero counts where no other start succeeds.
+/// Share of the 95 % load beyond which a far load zero is accepted where no other start succeeds.
 const ZERO_ALONE: f64 = 0.25;
 
-/// Residuals with its sides, over those with the sides of the logged load, below which such a zero explains δX better.
+/// Mean residual of the sign check with a far load zero, over that with the logged one, below which the far one is taken.
 const ZERO_EXPLAINS: f64 = 0.9;
 
 /// The best candidate.
 #[derive(Debug)]
 pub(crate) struct SearchResult {
     pub(crate) line: GaussNewtonResult,
-    /// Spread of the gaps of all candidates about the best one's, each weighted by its misfit, m.
+    /// Spread of the gaps of all candidates about that of the best candidate, each weighted by its misfit, m.
     pub(crate) spread_m: f64,
     /// Scale of the residuals of single blocks, m.
     pub(crate) scale_m: f64,
@@ -43,7 +43,7 @@ pub(crate) struct SearchResult {
 pub(crate) struct ParameterSearch<'a> {
     blocks: &'a mut BlockMeans,
     scaling: &'a Scaling,
-    /// Whether a longer excerpt may be asked for where one start fails, and not only where all do.
+    /// Whether the search may fail where only the start from a far load zero fails: the caller then takes a longer excerpt.
     can_grow: bool,
     /// δX of each block minus the fitted terms that do not depend on the force in the coupling, m.
     linear_m: Vec<f64>,
@@ -66,11 +66,11 @@ impl<'a> ParameterSearch<'a> {
     /// The best parameters of a flight.
     ///
     /// # Errors
-    /// The last rejection, if [`search`] fails from every start, or from that of a far zero where the excerpt can grow.
+    /// A rejection, if [`search`] fails from every start, or from that of a far load zero where the excerpt can grow.
     pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
         let mut best = self.best_start()?;
         self.improve_zero(&mut best);
-        // First bristles about as compliant as the coupling, then about as compliant as the best of these.
+        // Bristles about as compliant as the coupling are tried first, then bristles about as compliant as the best of them.
         let compliance_m_per_n = best.found.state.stiffness_n_per_m.recip();
         if self.try_bristles(&mut best, &[0.3, 1.0, 3.0], compliance_m_per_n) {
             let found_m_per_n = best.found.at.bristle_m_per_n;
@@ -109,8 +109,8 @@ impl<'a> ParameterSearch<'a> {
         let rejection = heavy.as_ref().err().or(usual.as_ref().err()).copied().unwrap_or(Rejection::TooShort);
         let near = self.best_of(usual.into_iter().chain(heavy));
         let far = self.best_of(far.into_iter().flatten());
-        // Without a gap, and without a load on both sides, any zero fits. Under a load that presses one flank only briefly, δX
-        // passes its middle in contact: a zero there explains it no better than the logged one.
+        // Without a gap, and without a load on both sides, any load zero fits. Under a load that presses one flank only
+        // briefly, δX passes its middle in contact: a load zero there fits no better than the logged one.
         let off_m = |zero_n| sign_check::misfit_m(self.blocks, self.scaling, zero_n);
         let is_sure = |far: &Candidate| {
             zero_n.is_some_and(|n| {
@@ -184,7 +184,7 @@ impl<'a> ParameterSearch<'a> {
         Candidate { found, misfit }
     }
 
-    /// Pattern search for the zero of the load cell. In contact, it acts as δX₀ does; it shows where contact ends.
+    /// Pattern search for the load zero. In contact it acts as δX₀ does: only the ends of contact tell them apart.
     fn improve_zero(&mut self, best: &mut Candidate) {
         self.prepare(&best.found);
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
@@ -224,9 +224,9 @@ impl<'a> ParameterSearch<'a> {
         if curvature > 0.0 { error_n.clamp(least_n, self.scaling.load_n) } else { self.scaling.load_n }
     }
 
-    /// Standard error of the gap by the priors, m, under friction that is larger than the fitted one by the standard
-    /// deviation of its prior: under next to none, noise of the load makes the screw slip to and fro, so that
-    /// friction seems to be known.
+    /// Standard error of the gap by the priors, m, under the fitted friction plus the standard deviation of its prior:
+    /// under almost no friction, noise of the load makes the screw slip to and fro, so that the data seem to determine
+    /// the friction.
     fn error_of_priors_m(&mut self, found: &GaussNewtonResult) -> f64 {
         let mut state = found.state;
         state.friction.dry_n += DRY_SHARE.1 * self.scaling.load_n;

@@ -1,7 +1,7 @@
 //! The gap along the stroke: a screw wears where it works.
 //!
 //! Where the residuals of the fit with one gap show that the gap depends on the place, the regression is repeated with
-//! a gap, and a common error of the transducer, at each of some knots in addition; between knots both change linearly.
+//! two more terms at each knot along the stroke: of the gap and of the transducer's error, linear between knots.
 
 use crate::contact::block_means::BlockMeans;
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE, dot};
@@ -10,13 +10,13 @@ use crate::contact::fit::robust_regression::{GaussianPrior, REWEIGHTINGS, fit};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::types::GapAtPlace;
 
-/// Knots, evenly from one end of the stroke seen to the other.
+/// Number of knots, evenly spaced over the range of screw positions in the flight.
 const KNOTS: usize = 9;
 /// Columns with a gap and an error at each knot.
 const ALL: usize = COLUMNS + 2 * KNOTS;
 /// Standard errors by which the largest gap must exceed the mean, and by which no gap is below zero.
 const CERTAIN: f64 = 4.0;
-/// Least share of the time near a knot that counts.
+/// Share of the flight's time that the screw must spend near a knot for the knot to count.
 const VISITED: f64 = 0.05;
 
 /// A gap that varies along the stroke.
@@ -24,7 +24,7 @@ const VISITED: f64 = 0.05;
 pub(crate) struct StrokeProfile {
     /// Mean over the time that the screw spent at each place, and its standard error, m.
     pub(crate) mean_m: (f64, f64),
-    /// The knots at which the screw spent time enough.
+    /// Gaps at the knots where the screw spent at least [`VISITED`] of the time.
     pub(crate) places: Vec<GapAtPlace>,
     /// By how much the gap at each knot exceeds that of the fit with one gap, m.
     beyond_m: [f64; KNOTS],
@@ -37,7 +37,7 @@ impl StrokeProfile {
     }
 }
 
-/// The profile of a flight whose gap varies along the stroke for certain.
+/// The profile of a flight; `None` unless its largest gap exceeds the mean by [`CERTAIN`] standard errors and by 10 %.
 pub(crate) fn stroke_profile(
     line: &GaussNewtonResult,
     blocks: &BlockMeans,
@@ -48,7 +48,7 @@ pub(crate) fn stroke_profile(
     }
     let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
     let known = gauss_newton::priors(scaling, &line.at);
-    // Spread of the gap, and of the transducer's error, at a knot about their values for the whole stroke, m.
+    // Prior standard deviation of the gap, and of the transducer's error, at a knot about the value of the whole stroke, m.
     let priors: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
         0..COLUMNS => known[column],
         _ if column < COLUMNS + KNOTS => GaussianPrior::zero(60e-6),
@@ -75,7 +75,7 @@ pub(crate) fn stroke_profile(
         gap_se_m: error_m(1.0, &only(knot)),
     };
     let places: Vec<GapAtPlace> = visited().map(place).collect();
-    // Where the load follows the place, each place shows one flank only: its gap is then an error of the fit.
+    // Where the load follows the place, each place shows one flank only: a gap far below zero is then an error of the fit.
     let is_possible = places.iter().all(|at| at.gap_m > -CERTAIN * at.gap_se_m);
     (is_certain && is_possible).then(|| StrokeProfile {
         mean_m: (mean_m, error_m(1.0, &shares)),
@@ -99,7 +99,7 @@ fn is_suspect(line: &GaussNewtonResult) -> bool {
     (0..KNOTS).filter(|&k| blocks[k] > VISITED * all).any(|k| is_off(&k))
 }
 
-/// A row with a gap and an error at each knot.
+/// A row extended by the columns of gap and transducer error at each knot.
 fn with_knots(row: &DesignRow<COLUMNS>) -> DesignRow<ALL> {
     let mut x = [0.0; ALL];
     x[..COLUMNS].copy_from_slice(&row.x);
@@ -110,7 +110,7 @@ fn with_knots(row: &DesignRow<COLUMNS>) -> DesignRow<ALL> {
     DesignRow { x, y_m: row.y_m, blocks: row.blocks, stretch: row.stretch }
 }
 
-/// How much each knot counts at a place from −1 to 1: linear between neighbours.
+/// Interpolation weight of each knot at a place from −1 to 1: linear between neighbours.
 fn hats(place: f64) -> [f64; KNOTS] {
     let at = (0.5 * (place.clamp(-1.0, 1.0) + 1.0)) * (KNOTS - 1) as f64;
     std::array::from_fn(|knot| (1.0 - (at - knot as f64).abs()).max(0.0))

@@ -1,8 +1,8 @@
-//! Comparison with peers: a unit or a tail whose quantities differ from those of its part from the first day.
+//! Comparison with peers finds units and tails whose quantities differ from those of their part from the first day.
 //!
-//! Changes in time show nothing of what was always so: a load cell with a wrong zero, a position with a delay, settings of
-//! another part. A unit is compared with the units of its part on other tails, by median and robust spread; what belongs to
-//! sensors and recorders, with all units on other tails where its part has too few.
+//! Changes in time do not show a fault that exists from the start: a wrong load zero, a delayed position, settings of another
+//! part. A unit is compared with the units of its part on other tails, by median and robust spread. Quantities of sensors and
+//! recorders are compared with all units on other tails if the part has too few.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use records::{Quantity, QuantityRow};
 use crate::assess::quantities::limits::Treatment;
 use crate::assess::quantities::rows::short;
 
-/// Quantities that are compared; a gap differs by wear.
+/// Quantities that are compared. Gaps are not: they differ by wear.
 const COMPARED: [Quantity; 6] = [
     Quantity::StiffnessNPerM,
     Quantity::FrictionN,
@@ -22,15 +22,15 @@ const COMPARED: [Quantity; 6] = [
     Quantity::Nis,
 ];
 const MIN_PEERS: usize = 6;
-/// Number of peers from which some of them are taken, evenly: they tell the median to a tenth of the spread, and a fleet of
-/// ten times as many units takes ten times as long, not a hundred times.
+/// Number of peers above which an even selection of them is used: it gives the median to a tenth of the spread, and ten times
+/// as many units take ten times as long, not a hundred times.
 const ENOUGH_PEERS: usize = 256;
-/// Spreads from the peers' median from which a unit differs, for many peers; fewer ask for more. Of 60,000 draws each of
-/// normal and of t-distributed values (5 degrees of freedom), with 6 to 30 peers, at most 1.2 in 1,000 differ by as much.
+/// Spreads from the peers' median beyond which a unit differs, for many peers; few peers need more spreads. With 6 to 30
+/// peers, at most 1.2 in 1,000 of 60,000 draws each of normal and of t-distributed values (5 degrees of freedom) differ.
 const SPREADS: f64 = 6.0;
-/// Share of the standard deviation that the spread is at least: the median deviation of few values may be far too small.
+/// Lower bound of the spread, as a share of the standard deviation: the median deviation of few values may be far too small.
 const LEAST_SPREAD: f64 = 0.7;
-/// Fewest units of a tail that make a difference the tail's, and their share.
+/// Fewest units of a tail, and their share, that must differ for a difference to be the tail's.
 const TAIL: (usize, f64) = (3, 0.75);
 
 struct Deviation<'a> {
@@ -39,14 +39,14 @@ struct Deviation<'a> {
     peers: usize,
     median: f64,
     spread: f64,
-    /// Deviation over what is allowed; beyond 1 the unit differs.
+    /// Deviation over the allowed deviation, with its sign; beyond ±1 the unit differs.
     share: f64,
 }
 
 /// Differences of the selected units from their peers, in words: tails first, then units.
 pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> bool) -> Vec<String> {
     let (mut tails, mut units, mut named) = (Vec::new(), Vec::new(), BTreeSet::new());
-    // Of the other units, those on the tails of selected ones decide whether a difference is the tail's.
+    // Unselected units on the tail of a selected unit count too: they decide whether a difference is the tail's.
     let selected = rows.iter().filter(|row| is_selected(row));
     let with_selected: BTreeSet<&str> = selected.filter_map(|row| row.tail_number.as_deref()).collect();
     let is_near = |row: &QuantityRow| {
@@ -61,7 +61,7 @@ pub(crate) fn notes(rows: &[QuantityRow], is_selected: impl Fn(&QuantityRow) -> 
         let is_unit = |d: &&Deviation<'_>| d.share.abs() > 1.0 && !is_tails(d) && is_selected(d.row);
         units.extend(found.iter().filter(is_unit).map(unit_note));
         for (tail, members) in &of_tails {
-            // Innovations grow with every fault of a sensor: a tail that is named has its reason.
+            // Every sensor fault raises the NIS: a tail already named for another quantity needs no note about it.
             let is_new = quantity != Quantity::Nis || !named.contains(tail);
             if is_new && members.iter().any(|d| is_selected(d.row)) {
                 named.insert(*tail);
@@ -92,7 +92,7 @@ fn deviations(
         .collect()
 }
 
-/// The deviation of a unit from the others on other tails; `None` for too few of them.
+/// Deviation of a unit from `others` on other tails; `None` if these are fewer than [`MIN_PEERS`].
 fn deviation<'a>(
     &(row, level): &(&'a QuantityRow, f64),
     others: &[(&QuantityRow, f64)],
@@ -101,7 +101,7 @@ fn deviation<'a>(
     let some = others.iter().step_by(others.len().div_ceil(ENOUGH_PEERS).max(1));
     let peers: Vec<_> = some.filter(|(peer, _)| peer.tail_number != row.tail_number).collect();
     let (median, spread) = centre_and_spread(&peers.iter().map(|(_, level)| *level).collect::<Vec<_>>())?;
-    // A limit may be a share of the level: that of the peers counts, not that of a level which is wrong.
+    // A limit may be a share of the level: the peers' limit counts, since the unit's own level may be wrong.
     let limits = peers.iter().filter_map(|(peer, _)| peer.change_limit).collect();
     let factor = SPREADS * (1.0 + MIN_PEERS as f64 / peers.len() as f64);
     let allowed = factor * spread.hypot(row.level_se.unwrap_or(0.0));
@@ -109,7 +109,7 @@ fn deviation<'a>(
     Some(Deviation { row, quantity, peers: peers.len(), median, spread, share })
 }
 
-/// Median and robust spread of enough values.
+/// Median and robust spread; `None` for fewer than [`MIN_PEERS`] values.
 fn centre_and_spread(values: &[f64]) -> Option<(f64, f64)> {
     const NORMAL: f64 = 1.482_6;
     if values.len() < MIN_PEERS {
@@ -122,7 +122,7 @@ fn centre_and_spread(values: &[f64]) -> Option<(f64, f64)> {
     Some((median, (NORMAL * deviation).max(LEAST_SPREAD * variance.sqrt())))
 }
 
-/// Tails most of whose units deviate by half of what is allowed, in one direction, and one of them by more.
+/// Tails with most units beyond half of the allowed deviation in one direction, and one unit beyond all of it.
 fn of_tails<'d, 'a>(found: &'d [Deviation<'a>]) -> BTreeMap<&'a str, Vec<&'d Deviation<'a>>> {
     let mut tails = BTreeMap::<&str, Vec<&Deviation<'_>>>::new();
     for deviation in found {
@@ -173,7 +173,7 @@ fn tail_note(tail: &str, members: &[&Deviation<'_>]) -> String {
     )
 }
 
-/// What a wrong sensor of a tail does to its gaps, and who should act.
+/// Effect of a tail's wrong sensor on its gaps, and who should act.
 fn consequence(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::LoadZeroN => {
@@ -243,7 +243,7 @@ mod tests {
             rows.truncate(12);
             for row in &mut rows {
                 (row.quantity, row.part_number) = (quantity.as_str(), row.position.clone());
-                // A limit that is a share of the unit's own level hides nothing.
+                // A limit that is a share of the unit's own wrong level must not hide the deviation.
                 row.change_limit = row.level;
             }
             notes(&rows, |_| true)
@@ -257,7 +257,7 @@ mod tests {
     fn of_a_thousand_sound_units_at_most_one_is_named() {
         let named: usize = (0..250).map(|seed| notes(&fleet(seed + 1_000, |_, _| 1.0), |_| true).len()).sum();
         assert!(named <= 12, "{named} of 12,000");
-        // Fewer peers than a spread needs are compared with nothing.
+        // With too few peers for a spread, no comparison is made.
         let few: Vec<QuantityRow> =
             fleet(1, |tail, _| if tail == 0 { 2.0 } else { 1.0 }).into_iter().take(8).collect();
         assert!(notes(&few, |_| true).is_empty());

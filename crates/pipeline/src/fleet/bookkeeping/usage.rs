@@ -39,12 +39,12 @@ impl<'a> OperatorTables<'a> {
         })
     }
 
-    /// The installations that say where units are.
+    /// The installations table; `None` if it does not apply.
     pub(crate) fn installations(&self) -> Option<&'a Installations> {
         self.is_booked.then_some(self.installations)
     }
 
-    /// Where the hours of a unit are known from.
+    /// Source of a unit's flight hours.
     fn source(&self, history: &History) -> UsageSource {
         let has_meter = || history.extras.iter().any(|f| !f.tail_hours_end.is_nan());
         if history.tails().any(|tail| self.flights.of_tail(tail).next().is_some()) {
@@ -56,7 +56,7 @@ impl<'a> OperatorTables<'a> {
         }
     }
 
-    /// A unit's flights, added up.
+    /// A unit's flights with their accumulated usage and recorded maintenance.
     pub(crate) fn series(&self, name: &UnitKey, history: &History) -> Result<Series, Error> {
         let installations: Vec<&Installation> = self.installations.of_unit(name).collect();
         let installed = if self.is_booked { &installations[..] } else { &[] };
@@ -70,10 +70,10 @@ impl<'a> OperatorTables<'a> {
         series.unit_hours_at_start = installations.first().and_then(|first| first.unit_hours_at_install);
         series.source = self.source(history);
         series.faults.meter_readings = dropped;
-        // None is recorded of a unit without a part number.
+        // The maintenance table has no rows of a unit without a part number.
         let unit = name.0.clone().map(|part| (part, name.1.clone()));
         let mut events = unit.and_then(|unit| self.maintenance.get(&unit).cloned()).unwrap_or_default();
-        // Work without a time was done after the last flight of its day.
+        // Maintenance with a date alone counts as done after the last flight of that day.
         for event in events.iter_mut().filter(|event| is_day(event.utc_us)) {
             let of_day = series.flights_until(event.utc_us + DAY_US - 1);
             event.utc_us = of_day.last().map_or(event.utc_us, |last| event.utc_us.max(last.departure_us + 1));
@@ -82,8 +82,8 @@ impl<'a> OperatorTables<'a> {
     }
 }
 
-/// Takes the gap from each flight whose gap and error are to the last bit those of an earlier one: its log was stored again with
-/// another departure, and the same samples must neither confirm nor clear what they showed.
+/// Removes the gap of each flight whose gap and error are bitwise equal to those of an earlier flight: the same log was stored
+/// again with another departure, and the same samples must neither confirm nor clear an exceedance.
 fn count_samples_once(observations: &mut [Observation]) {
     let mut seen = HashSet::new();
     for row in observations {
@@ -94,7 +94,7 @@ fn count_samples_once(observations: &mut [Observation]) {
     }
 }
 
-/// A unit's flights as the trend knows them, those that left no record among them.
+/// A unit's flights as observations of the trend, with the flights that have no record.
 fn observations(
     history: &History,
     installations: &[&Installation],
@@ -103,7 +103,7 @@ fn observations(
     let outside = history.place_ranks();
     let mut before: Option<(&FlightRow, u32)> = None;
     let seen = history.flights().iter().zip(&history.extras).map(|(f, extras)| {
-        // Records of one day without a time are different flights if their names differ.
+        // Records with the same date and no time are different flights if their flight ids differ.
         let flight = match before.filter(|(last, _)| last.departure_us() == f.departure_us()) {
             Some((last, number)) if is_day(f.departure_us()) => {
                 number + u32::from(history.flight_id(last) != history.flight_id(f))
@@ -111,7 +111,7 @@ fn observations(
             _ => 0,
         };
         before = Some((f, flight));
-        // Numbers beyond the installations are those of places without one.
+        // Numbers beyond the installations stand for positions without an installation.
         let installation = history.installation(f, installations);
         let installation = installation.unwrap_or_else(|| installations.len() + outside[f.place as usize]);
         extras.observation(f, installation as u32, flight)
@@ -121,7 +121,7 @@ fn observations(
     observations.extend(unlogged.iter().zip(numbers).map(|((installation, flight), number)| Observation {
         departure_us: flight.departure_utc.as_microsecond(),
         installation: *installation as u32,
-        // A day alone is read as its noon.
+        // The flights table reads a date alone as noon.
         flight: if is_day(flight.departure_utc.as_microsecond() - DAY_US / 2) { number } else { 0 },
         flight_hours: flight.flight_hours,
         tail_hours_end: flight.tail_hours_end,
