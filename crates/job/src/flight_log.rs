@@ -105,7 +105,7 @@ impl<'c> FlightLog<'c> {
         })
     }
 
-    /// Estimates one actuator of the log; `of_run` is the provenance of the records of a run, but for the log.
+    /// Estimates one actuator of the log; `of_run` is the provenance that all records of a run share.
     ///
     /// # Errors
     /// A diagnostic when the actuator cannot be used; the others of the log are not affected.

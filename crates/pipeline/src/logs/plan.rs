@@ -65,14 +65,14 @@ pub enum WorkReason {
     New,
     #[strum(serialize = "content changed")]
     ContentChanged,
-    /// So may an installation be.
+    /// Also of a log whose installation has changed.
     #[strum(serialize = "setting changed")]
     SettingChanged,
     #[strum(serialize = "its flight has no other log now")]
     OwnerGone,
     #[strum(serialize = "in error, asked again")]
     Retry,
-    /// A read, a time limit, a wrong clock.
+    /// A failed read, a time limit, or a wrong clock.
     #[strum(serialize = "failed before for a passing cause")]
     Unfetched,
     #[strum(serialize = "cannot be listed")]

@@ -335,7 +335,7 @@ impl Proposal {
     }
 }
 
-/// What the common template has after a text and before another one, or its end.
+/// The part of the template between two texts, or to its end where the second one does not occur.
 fn common(from: &str, to: &str) -> &'static str {
     let (_, rest) = TEMPLATE.split_once(from).unwrap_or_default();
     rest.split_once(to).map_or(rest, |(text, _)| text)
