@@ -67,7 +67,7 @@ pub struct LogEstimates {
 /// Estimates every actuator of a log, within `run.log_timeout_s`.
 ///
 /// # Errors
-/// As [`discover::log_containing`].
+/// When the configured logs cannot be listed, or the log takes longer.
 pub fn estimate(path: &Path, request: &EstimateRequest) -> Result<LogEstimates, Error> {
     let (path, of_log) = (path.to_owned(), request.clone());
     let log_path = path.display().to_string();
