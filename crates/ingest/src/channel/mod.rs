@@ -1,5 +1,6 @@
 //! Values of one channel: conversion to SI, statistics, quality flags, noise floor.
 
+pub(crate) mod buffer_pool;
 pub(crate) mod column_builder;
 pub(crate) mod missing_code;
 pub mod noise_floor;

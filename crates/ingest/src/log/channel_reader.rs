@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::cell::OnceCell;
 
-use crate::channel::column_builder;
+use crate::channel::buffer_pool;
 use crate::channel::missing_code::missing_code;
 use crate::channel::si_conversion::{Geometry, apply_to_all, to_si};
 use crate::channel::stats::ChannelStats;
@@ -157,7 +157,7 @@ impl<'s> ChannelSampling<'s> {
         } else {
             let (stamps, base) = self.read_base()?;
             if of_table {
-                column_builder::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
+                buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
                 self.table.base.get_or_init(|| base).clone()
             } else {
                 self.stamps = stamps.map(|stamps| base.keep_stamps(stamps).into()).unwrap_or_default();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use records::Position;
 
-use crate::channel::column_builder;
+use crate::channel::buffer_pool;
 use crate::channel::quality::Quality;
 use crate::time::clock::TimestampRepairs;
 
@@ -91,6 +91,6 @@ impl ActuatorChannels {
 
     /// Leaves the memory of its channels to the next actuator that this thread reads.
     pub fn recycle_buffers(self) {
-        [self.motor_m, self.dx_m, self.load_n].into_iter().for_each(column_builder::release);
+        [self.motor_m, self.dx_m, self.load_n].into_iter().for_each(buffer_pool::release);
     }
 }

@@ -12,7 +12,7 @@ use polars_parquet_format::thrift::protocol::{TCompactInputProtocol, TInputProto
 
 use crate::bounds::{self, COLUMN_CHUNKS, FOOTER_BYTES, SCHEMA_DEPTH};
 use crate::error::{Fault, encrypted, not_parquet};
-use crate::io::retry;
+use crate::io::{foreign_format, retry};
 
 /// The highest encoding that is read: byte stream split.
 const HIGHEST_ENCODING: i64 = 9;
@@ -23,29 +23,6 @@ const THRIFT_DEPTH: usize = 32;
 
 /// Bytes of an object's end that are fetched at first: most footers are shorter.
 const USUAL_FOOTER: u64 = 64 << 10;
-
-/// Bytes of a file that are read to identify its format.
-const HEAD_BYTES: u64 = 512;
-
-/// Formats of flight and measurement data that are given in place of Parquet, by their first bytes.
-const MAGIC: [(&[u8], &str); 16] = [
-    (b"MDF     ", "an MDF file (ASAM)"),
-    (b"UnFinMF ", "an MDF file (ASAM) that was not finished"),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
-    (b"TDSm", "a TDMS file (LabVIEW)"),
-    (b"PK\x03\x04", "a ZIP archive"),
-    (b"\x1f\x8b", "a gzip archive"),
-    (b"\x28\xb5\x2f\xfd", "a zstd archive"),
-    (b"7z\xbc\xaf\x27\x1c", "a 7z archive"),
-    (b"ARROW1", "an Arrow (Feather) file"),
-    (b"ORC", "an ORC file"),
-    (b"Obj\x01", "an Avro file"),
-    (b"SQLite format 3\0", "an SQLite database"),
-    (b"MATLAB 5.0 MAT-file", "a MATLAB file"),
-    (b"\x25\xeb", "an IRIG 106 chapter 10 recording"),
-    (b"CDF\x01", "a NetCDF file"),
-    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook"),
-];
 
 /// A footer, where in its file it begins, and what it claims.
 pub(crate) struct Footer {
@@ -95,13 +72,13 @@ pub(crate) fn read(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) 
 
 /// What a file is that does not end with a Parquet footer, by its first bytes.
 fn without_footer(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -> Result<Fault, Fault> {
-    let mut head = vec![0; retry::file_length(file)?.min(HEAD_BYTES) as usize];
+    let mut head = vec![0; retry::file_length(file)?.min(foreign_format::HEAD_BYTES) as usize];
     want(0..head.len() as u64)?;
     retry::read_exact(file, &mut head, 0)?;
     Ok(match head[..] {
         [b'P', b'A', b'R', b'E', ..] => encrypted(None),
         [b'P', b'A', b'R', b'1', ..] => not_parquet("the file is truncated: it does not end with a footer"),
-        _ => match foreign_format(&head) {
+        _ => match foreign_format::of(&head) {
             Some(format) => Fault::new(
                 "not_parquet",
                 format!("this is {format}, not a Parquet file"),
@@ -110,29 +87,6 @@ fn without_footer(file: &File, want: impl Fn(Range<u64>) -> Result<(), Fault>) -
             None => not_parquet("not a Parquet file"),
         },
     })
-}
-
-/// The format that a file's first bytes show, where it is none of Parquet's.
-fn foreign_format(head: &[u8]) -> Option<&'static str> {
-    let by_magic = MAGIC.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format);
-    by_magic.or_else(|| text_format(head))
-}
-
-/// Text: JSON, or cells between separators.
-fn text_format(head: &[u8]) -> Option<&'static str> {
-    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
-    let text = head.utf8_chunks().next()?.valid();
-    let is_readable = |c: char| !c.is_control() || matches!(c, '\n' | '\r' | '\t');
-    // A character may be cut at the end of what was read.
-    if text.is_empty() || text.len() + 4 <= head.len() || !text.chars().all(is_readable) {
-        return None;
-    }
-    match text.trim_start().chars().next() {
-        Some('{' | '[') => Some("a JSON file"),
-        Some('<') => Some("an XML or HTML file"),
-        _ if text.lines().next().is_some_and(|line| line.contains([',', ';', '\t'])) => Some("a CSV file"),
-        _ => Some("a text file"),
-    }
 }
 
 /// A result of the parquet crate, which panics on some damaged bytes.

@@ -1,18 +1,15 @@
 //! Changes of state since the last one that the alert table has, and the messages that are due.
 //!
 //! A change is relative to the table, not to a run: a run that is killed before the change is written finds it again,
-//! a run that is repeated finds none, and a state that leaves and returns within one back-fill is no change. A message is
-//! one JSON document, made once and sent unchanged in every attempt.
+//! a run that is repeated finds none, and a state that leaves and returns within one back-fill is no change.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::{SignedDuration, Timestamp};
 use job::config::AlertChannel;
-use job::config::alerts::NOT_ASSESSED;
-use records::sanitize::escape_cell;
-use records::{AlertRecord, AlertStatus, TrendRow};
-use serde_json::{Value, json};
+use records::{AlertRecord, AlertStatus};
 
+use crate::findings::alert_message;
 use crate::findings::finding::{Finding, GAP, UNCHANGED};
 
 /// Channels by name.
@@ -53,7 +50,7 @@ pub fn detect(
         let Some((number, from)) = before(of_finding, finding) else { continue };
         let id = change_id(finding, number + 1, from);
         let change = row(&id, CHANGE, number + 1, from, finding, run_id, now);
-        let message = change_message(&id, from, finding, run_id);
+        let message = alert_message::change(&id, from, finding, run_id);
         for (name, _) in channels.iter().filter(|(_, channel)| selects(channel, finding)) {
             rows.push(pending(&change, name, &message));
         }
@@ -119,7 +116,7 @@ fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timest
     for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
         let selected: Vec<&Finding> = findings.iter().filter(|finding| selects(channel, finding)).collect();
         let id = identifier(first.as_of_utc, &[BASELINE, name, run_id]);
-        let message = baseline_message(&id, &all, &selected, run_id);
+        let message = alert_message::baseline(&id, &all, &selected, run_id);
         let (quantity, as_of_utc) = (first.quantity, first.as_of_utc);
         let of_fleet = Finding { quantity, as_of_utc, ..Finding::default() };
         let summary = row(&id, BASELINE, 0, None, &of_fleet, run_id, now);
@@ -170,7 +167,7 @@ fn pending(change: &AlertRecord, channel: &str, message: &str) -> AlertRecord {
 /// Identifier of a change: the same whenever it is computed from the same table.
 fn change_id(to: &Finding, number: i64, from: Option<&str>) -> String {
     let number = number.to_string();
-    let state = |state: Option<&str>| word(state).to_owned();
+    let state = |state: Option<&str>| alert_message::word(state).to_owned();
     let part = to.unit.0.as_deref().unwrap_or_default();
     let name = to.serial_number().or(to.tail_number.as_deref()).unwrap_or_default();
     identifier(to.as_of_utc, &[part, name, to.quantity, &number, &state(from), &state(to.state)])
@@ -184,96 +181,4 @@ fn identifier(at: Timestamp, parts: &[&str]) -> String {
         digest.update(part.as_bytes());
     }
     format!("{}-{}", at.strftime("%Y%m%dT%H%M%SZ"), &digest.finalize().to_hex()[..16])
-}
-
-/// Version of the message: it is raised when a key changes its meaning.
-const VERSION: u32 = 1;
-/// Units listed in the summary of a baseline.
-const MAX_LISTED: usize = 50;
-
-fn word(state: Option<&str>) -> &str {
-    state.unwrap_or(NOT_ASSESSED)
-}
-
-fn unit_text(part: Option<&str>, serial: &str) -> String {
-    let name = part.map_or_else(|| serial.to_owned(), |part| format!("{part} / {serial}"));
-    escape_cell(&name).into_owned()
-}
-
-fn change_message(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -> String {
-    let mut message = unit_fields(to);
-    message["freeplay_alert"] = json!(VERSION);
-    message["id"] = json!(id);
-    message["kind"] = json!("change");
-    message["text"] = json!(change_text(from, to));
-    message["from"] = json!(word(from));
-    message["to"] = json!(word(to.state));
-    message["cause"] = json!(to.cause);
-    message["run_id"] = json!(run_id);
-    message.to_string()
-}
-
-fn baseline_message(id: &str, known: &[&Finding], selected: &[&Finding], run_id: &str) -> String {
-    let mut states = BTreeMap::<&str, usize>::new();
-    known.iter().for_each(|finding| *states.entry(word(finding.state)).or_default() += 1);
-    let text = format!(
-        "Units known when alerts begin: {}; findings in a selected state: {}. From now on, changes are sent.",
-        known.len(),
-        selected.len()
-    );
-    json!({
-        "freeplay_alert": VERSION,
-        "id": id,
-        "kind": "baseline",
-        "text": text,
-        "states": states,
-        "units": selected.iter().take(MAX_LISTED).map(|f| unit_fields(f)).collect::<Vec<_>>(),
-        "units_left_out": selected.len().saturating_sub(MAX_LISTED),
-        "run_id": run_id,
-    })
-    .to_string()
-}
-
-fn unit_fields(finding: &Finding) -> Value {
-    let row = finding.assessment.as_ref();
-    json!({
-        "part_number": finding.unit.0,
-        "serial_number": finding.serial_number(),
-        "tail_number": finding.tail_number,
-        "position": finding.position,
-        "quantity": finding.quantity,
-        "state": word(finding.state),
-        "reason": finding.reason,
-        "statement": row.map(TrendRow::statement_text),
-        "due_utc": row.and_then(|row| row.due_utc),
-        "since_utc": finding.since_utc,
-        "as_of_utc": finding.as_of_utc,
-        "gap_m": row.and_then(|row| row.gap_m),
-        "limit_m": row.and_then(|row| row.limit_m),
-        "not_before_utc": row.and_then(|row| row.not_before_utc),
-        "likely_utc": row.and_then(|row| row.likely_utc),
-        "work_request": finding.work_request,
-    })
-}
-
-/// One line for people.
-fn change_text(from: Option<&str>, to: &Finding) -> String {
-    let place = match (&to.tail_number, &to.position) {
-        (Some(tail), Some(position)) => format!(" on {tail} {position}"),
-        (Some(tail), None) => format!(" on {tail}"),
-        _ => String::new(),
-    };
-    let quantity = if to.quantity == GAP { String::new() } else { format!("{} ", to.quantity) };
-    let due = to.assessment.as_ref().and_then(TrendRow::due_text);
-    let due = due.map(|due| format!(", due {due}")).unwrap_or_default();
-    let why = to.assessment.as_ref().map(TrendRow::statement_text).or_else(|| to.reason.clone());
-    let why = why.map(|why| format!(" ({why})")).unwrap_or_default();
-    let name = match (to.serial_number(), &to.tail_number) {
-        (Some(serial), _) => format!("{}{place}", unit_text(to.unit.0.as_deref(), serial)),
-        (None, Some(tail)) => format!("all of {tail}"),
-        (None, None) => format!("all of {}", to.unit.0.as_deref().unwrap_or_default()),
-    };
-    let cause = to.cause.as_deref().map(|cause| format!("; cause: {cause}")).unwrap_or_default();
-    let text = format!("{name}: {quantity}{} → {}{due}{why}{cause}", word(from), word(to.state));
-    escape_cell(&text).into_owned()
 }

@@ -1,6 +1,7 @@
 //! What a run finds beside the assessments, and what follows from both: alerts about changes of state, and work requests.
 
 pub mod alert_changes;
+mod alert_message;
 mod channel;
 pub mod delivery;
 pub mod finding;

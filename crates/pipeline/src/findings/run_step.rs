@@ -55,7 +55,8 @@ impl FollowUp<'_> {
         }
         let alerts = summary.alerts.insert(AlertSummary::default());
         let rows = self.detect(&findings, channels, writer, alerts, now)?;
-        let failed = delivery::deliver(rows, channels, self.run_id, &mut (self, writer), alerts)?;
+        let mut courier = StoreCourier { config: self.config, writer, stop: self.stop };
+        let failed = delivery::deliver(rows, channels, self.run_id, &mut courier, alerts)?;
         summary.errors.extend(diagnostics(&failed));
         Ok(())
     }
@@ -150,19 +151,25 @@ fn diagnostics(failed: &[AlertRecord]) -> Vec<Diagnostic> {
     of_channels.into_iter().map(diagnostic).collect()
 }
 
-/// Rows go to the store, messages to the configured channels.
-impl Courier for (&FollowUp<'_>, &mut Writer) {
+/// Courier of a run: rows go to the store, messages to the configured channels.
+struct StoreCourier<'a> {
+    config: &'a Config,
+    writer: &'a mut Writer,
+    stop: &'a AtomicBool,
+}
+
+impl Courier for StoreCourier<'_> {
     type Error = store::Error;
 
     fn write(&mut self, rows: &[AlertRecord]) -> Result<(), store::Error> {
-        self.1.write_alerts(rows)
+        self.writer.write_alerts(rows)
     }
 
     fn send(&mut self, channel: &AlertChannel, row: &AlertRecord) -> Attempt {
-        channel::send(self.0.config, channel, row)
+        channel::send(self.config, channel, row)
     }
 
     fn is_stopped(&self) -> bool {
-        self.0.stop.load(Ordering::Relaxed)
+        self.stop.load(Ordering::Relaxed)
     }
 }
