@@ -52,8 +52,10 @@ use line_joined::line_length;
 const LONGEST_STEP_S: f64 = 0.05;
 /// Standard normal 95 % quantile.
 const NORMAL_95: f64 = 1.644_853_626_951_472_2;
-/// Standard errors by which no gap of a sound log is below zero.
-const IMPOSSIBLE_SIGMA: f64 = 5.0;
+/// Standard errors by which no gap of a sound log is below zero; the second where it is also by [`IMPOSSIBLE_SHARE`].
+const IMPOSSIBLE_SIGMA: [f64; 2] = [5.0, 2.0];
+/// Share of the wind-up by which the error of a model may make a gap negative.
+const IMPOSSIBLE_SHARE: f64 = 0.2;
 
 /// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection. Flights that
 /// are estimated one after the other share the scratch memory of a workspace.
@@ -168,8 +170,9 @@ fn look(
     })?;
     let (gap_m, gap_se_m) = contact.gap_m;
     let gives_way = contact.compliance_m_per_n > 0.0;
-    let is_possible =
-        gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact, &scaling).is_some();
+    let [certain_m, likely_m] = IMPOSSIBLE_SIGMA.map(|sigma| sigma * gap_se_m);
+    let impossible_m = certain_m.min(likely_m.max(IMPOSSIBLE_SHARE * scaling.windup_m()));
+    let is_possible = gap_m >= -impossible_m || lost_motion::preload_n(&contact, &scaling).is_some();
     // A load that is later still moves the gap.
     let is_in_time = contact.search.line.state.load_delay_s.abs() < LATEST_S;
     // Channels of absurd size overflow the sums of the fit.
