@@ -8,7 +8,7 @@ use crate::measured::rise::Rise;
 use crate::prior::{FleetPrior, UsageAxis};
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
-use crate::statement::crossing::RulDistribution;
+use crate::statement::crossing::{GapsAhead, RulDistribution};
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
 use crate::statement::types::{Crossing, ForecastMethod, Rate, WearStatus};
@@ -41,7 +41,9 @@ pub fn assess(
     let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
         now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
     });
-    let mut found = with_forecast(&unit, settings, elapsed_hours);
+    // The wear laws of a unit that was renewed after its last record are those of its former life.
+    let fit = unit.fit.as_ref().filter(|_| unit.measured.renewed_us.is_none());
+    let mut found = with_forecast(&unit, fit, settings, elapsed_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
     let growth_probability = rises.or(found.growth_probability).unwrap_or_default();
     let earliest = found.crossing.and_then(|crossing| crossing.p05_hours);
@@ -49,7 +51,13 @@ pub fn assess(
         earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
     (found.state, found.reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
     let last_us = unit.measured.last_sound_us();
-    let by_forecast = found.over_limit_probability.unwrap_or_default();
+    let level = unit.measured.level.filter(|_| unit.measured.renewed_us.is_none());
+    let over_limit_probability = level.map(|level| {
+        // The level's standard error does not include the bias of the installation.
+        let error_m = level.se_m.hypot(unit.prior.bias_sd_m).max(f64::MIN_POSITIVE);
+        let by_forecast = found.over_limit_probability.unwrap_or_default();
+        normal_cdf((level.gap_m - settings.limit_m) / error_m).max(by_forecast)
+    });
     Ok(Assessment {
         as_of_us,
         flights: flights.len(),
@@ -58,13 +66,13 @@ pub fn assess(
         level: unit.measured.level,
         latest: unit.measured.latest,
         installation_sd_m: unit.prior.bias_sd_m,
-        law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, found.wear == WearStatus::Wearing)),
+        law: fit.and_then(|fit| level::law(&fit.posterior, found.wear == WearStatus::Wearing)),
         elapsed_hours,
-        over_limit_probability: unit.measured.level.map(|level| {
-            // The level's standard error does not include the bias of the installation.
-            let error_m = level.se_m.hypot(unit.prior.bias_sd_m).max(f64::MIN_POSITIVE);
-            normal_cdf((level.gap_m - settings.limit_m) / error_m).max(by_forecast)
-        }),
+        over_limit_probability,
+        // Wear does not shrink: a limit that is reached now is also reached by the next check.
+        check_probability: found
+            .check_probability
+            .map(|share| share.max(over_limit_probability.unwrap_or(0.0))),
         utilization,
         outliers_us: unit.outliers_us(),
         noise_factor: unit.history.noise_factor,
@@ -77,8 +85,13 @@ pub fn assess(
 }
 
 /// The part of an assessment that a forecast gives: by wear laws, else by the line through the last records.
-fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) -> Assessment {
-    let mut found = match (&unit.fit, unit.rise_now()) {
+fn with_forecast(
+    unit: &UnitFit<'_>,
+    fit: Option<&Fit>,
+    settings: &Settings,
+    elapsed_hours: f64,
+) -> Assessment {
+    let mut found = match (fit, unit.rise_now()) {
         (Some(fit), rise) => {
             let mut found = by_laws(fit, unit, settings, elapsed_hours);
             if let (Some(crossing), Some(rise)) = (&mut found.crossing, rise) {
@@ -91,11 +104,18 @@ fn with_forecast(unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f64) ->
         (None, Some(rise)) => by_line(&rise, settings, elapsed_hours),
         (None, None) => Assessment::default(),
     };
-    if matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held)) {
-        let over = Some(0.0);
-        found.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
-        found.method = Some(ForecastMethod::Measured);
-        found.check_probability = Some(1.0);
+    match unit.measured.exceedance {
+        Some(Exceedance::Confirmed { .. } | Exceedance::Held) => {
+            let over = Some(0.0);
+            found.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
+            found.method = Some(ForecastMethod::Measured);
+            found.check_probability = Some(1.0);
+        }
+        // The limit may be reached already: later records confirm or clear it.
+        Some(Exceedance::Unconfirmed { .. } | Exceedance::Repeated { .. }) => {
+            found.crossing.iter_mut().for_each(|crossing| crossing.p05_hours = Some(0.0));
+        }
+        None => {}
     }
     found
 }
@@ -132,6 +152,10 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
     let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
     let settings = &Settings { limit_m, ..*settings };
     let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);
+    let variance_m2 = unit.history.offset_m2 + fit.prior.bias_sd_m.powi(2);
+    let share_over = |hours: f64| {
+        GapsAhead::after(&fit.posterior, hours / ratio, variance_m2, &fit.prior).share_from(settings.limit_m)
+    };
     let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
     Assessment {
         crossing: Some(remaining.crossing()),
@@ -144,8 +168,8 @@ fn by_laws(fit: &Fit, unit: &UnitFit<'_>, settings: &Settings, elapsed_hours: f6
             _ => WearStatus::Unknown,
         },
         growth_probability: Some(growth_probability),
-        check_probability: Some(remaining.hours.share_below(settings.check_interval_hours)),
-        over_limit_probability: Some(remaining.hours.share_below(elapsed_hours)),
+        check_probability: Some(share_over(settings.check_interval_hours)),
+        over_limit_probability: Some(share_over(elapsed_hours)),
         ..Assessment::default()
     }
 }

@@ -9,7 +9,7 @@ use crate::math::NORMAL_95;
 use crate::measured::record::Record;
 use crate::prior::FleetPrior;
 use crate::settings::Settings;
-use crate::statement::crossing::gap_quantiles;
+use crate::statement::crossing::GapsAhead;
 use crate::unit_fit::{Fit, UnitFit};
 
 /// A gap and its 90 % interval, metres.
@@ -62,7 +62,7 @@ pub fn forecast(
     let variance_m2 = unit.history.offset_m2 + prior.bias_sd_m.powi(2);
     let steepest = unit.rise_now().zip(unit.measured.level);
     let after = |hours: f64| {
-        let quantiles_m = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
+        let quantiles_m = GapsAhead::after(posterior, hours / ratio, variance_m2, prior).quantiles();
         let [p05_m, m, p95_m] = quantiles_m.map(|gap_m| gap_m + unit.history.undone_m.max(0.0));
         // The interval is widened as that of a crossing is.
         let widened =

@@ -63,12 +63,6 @@ impl WeightedSamples {
         });
         reached.or(self.values.last()).map_or(0.0, |(value, _)| *value)
     }
-
-    /// The share of the weight of values up to one; at most one, and zero of nothing.
-    pub(crate) fn share_below(&self, value: f64) -> f64 {
-        let below = &self.values[..self.values.partition_point(|v| v.0 <= value)];
-        if self.total > 0.0 { (below.iter().map(|v| v.1).sum::<f64>() / self.total).min(1.0) } else { 0.0 }
-    }
 }
 
 #[cfg(test)]

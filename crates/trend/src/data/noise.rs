@@ -23,6 +23,9 @@ const MOST_OF_FEW: f64 = 4.0;
 /// If second differences give less than this share of the variance by first ones, the rate changes, and they count.
 const CHANGING_RATE: f64 = 0.7;
 
+/// Found over stated variance up to which values count as repeating.
+const REPEATING: f64 = 1e-6;
+
 /// Neighbours on each side by which an outlier is judged, and how many of them must agree with it.
 const NEIGHBOURS: usize = 3;
 const AGREEING: usize = 2;
@@ -66,7 +69,10 @@ impl Noise {
         };
         let mut errors: Vec<f64> = stated.iter().map(error).collect();
         let factor = factor(values, &errors, assumed.differences);
-        errors.iter_mut().for_each(|error| *error = (factor.sqrt() * *error).max(assumed.least));
+        let rounding = rounding(values);
+        for error in &mut errors {
+            *error = (factor.sqrt() * *error).max(rounding.min(*error)).max(assumed.least);
+        }
         Self { errors, factor }
     }
 
@@ -121,6 +127,17 @@ fn batches(values: &[f64], errors: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
     (means, errors, differences)
 }
 
+/// Standard error of values that are read in steps, the least step over √12; zero unless most values repeat the one before.
+/// Their differences then show less scatter than the reading hides.
+fn rounding(values: &[f64]) -> f64 {
+    let steps = || values.array_windows().map(|[a, b]| (b - a).abs()).filter(|step| *step > 0.0);
+    if 2 * steps().count() >= values.len() {
+        0.0
+    } else {
+        steps().reduce(f64::min).unwrap_or(0.0) / 12_f64.sqrt()
+    }
+}
+
 /// Found over stated variance from successive differences, drawn to one while they are few.
 fn factor(values: &[f64], errors: &[f64], prior: f64) -> f64 {
     // Values without trusted errors hold no wear whose rate could change: the larger estimate is the safer one.
@@ -131,8 +148,8 @@ fn factor(values: &[f64], errors: &[f64], prior: f64) -> f64 {
     if values.len() <= FEW && prior > 0.0 {
         found = found.min(MOST_OF_FEW);
     }
-    // A common factor of the stated errors is limited; exactly repeating values carry no information about it.
-    let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
+    // A common factor of the stated errors is limited; values that repeat, but for rounding, carry no information about it.
+    let stated = if found > REPEATING { (100.0 * found).min(1.0) } else { 1.0 };
     ((found * count + prior * stated) / (count + prior)).max(0.05 * stated)
 }
 

@@ -53,6 +53,10 @@ pub(crate) fn exceedance(
         let begin = || Run { first: k, before_m: before(&records, k), ..Run::default() };
         let Some(mut current) = run.take().or_else(|| is_above(record).then(begin)) else { continue };
         if is_above(record) {
+            // A record below in between: the first one above stays alone, and this one is the first of its row.
+            if current.below > 0 && !current.is_confirmed {
+                current = Run { first: k, before_m: current.before_m, ..Run::default() };
+            }
             (current.above, current.below) = (current.above + 1, 0);
             current.has_sound |= record.is_sound;
             if !current.is_confirmed && current.above > 1 && current.has_sound {

@@ -70,7 +70,7 @@ impl Measured {
             latest: Some(latest),
             exceedance: exceedance.filter(|_| renewed_us.is_none()),
             jump: jump(&sound, settings),
-            rise: rise(&sound, settings),
+            rise: rise(&sound, settings).filter(|_| renewed_us.is_none()),
             was_at_watch: was_at_watch(&sound, level, settings),
             renewed_us,
             events,

@@ -7,8 +7,9 @@ use crate::measured::level::{Line, WILD};
 use crate::measured::record::Record;
 use crate::settings::Settings;
 
-/// Numbers of last records through which a line is laid.
-const WINDOWS: [usize; 10] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20];
+/// Numbers of last records through which a line is laid. Those beyond [`MOST_EVEN`] are for wear that is slow from flight to
+/// flight.
+const WINDOWS: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 32, 50, 80, 125, 200, 320];
 
 /// Standard deviation by which an installation moves all its records, a share of the limit.
 const INSTALLATION_SHARE: f64 = 0.03;
@@ -27,8 +28,9 @@ const PER_WILD: usize = 5;
 
 /// Share of the records' variance about their mean that a line through an even rise leaves at most, whatever their errors.
 const UNEVEN: f64 = 0.12;
-/// Fewest records that rise evenly.
+/// Fewest and most records that rise evenly: wear of several rates looks even over many.
 const LEAST_EVEN: usize = 6;
+const MOST_EVEN: usize = 20;
 
 /// The share of the time by the line after which the limit may be met where the rate still grows.
 const ACCELERATION: f64 = 0.75;
@@ -110,7 +112,8 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
     let rise_m = line.slope * span_hours;
     let is_steep = line.slope > SLOPE_ERRORS * (line.slope_variance * line.inflation()).sqrt();
     let is_large = rise_m > (RISE_SHARE * limit_m).max(RISE_ERRORS * error_m);
-    let is_even = || records.len() >= LEAST_EVEN && line.unexplained_share(records) < UNEVEN;
+    let is_even =
+        || (LEAST_EVEN..=MOST_EVEN).contains(&records.len()) && line.unexplained_share(records) < UNEVEN;
     (is_large && (is_each || (is_steep && (line.explains() || is_even())))).then_some(line)
 }
 

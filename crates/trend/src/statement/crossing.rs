@@ -1,7 +1,7 @@
 //! When the limit is met: the crossings of all components, added up.
 
 use crate::inference::posterior::Posterior;
-use crate::math::{GAUSS_HERMITE_5, WeightedSamples};
+use crate::math::{GAUSS_HERMITE_5, WeightedSamples, normal_cdf};
 use crate::prior::{FleetPrior, WAIT_QUANTILES};
 use crate::settings::Settings;
 use crate::statement::types::Crossing;
@@ -9,7 +9,7 @@ use crate::wear::Component;
 use crate::wear::bank::WearLaw;
 
 pub(crate) struct RulDistribution {
-    pub(crate) hours: WeightedSamples,
+    hours: WeightedSamples,
     horizon_hours: f64,
     /// Factor of the interval's width.
     width: f64,
@@ -76,33 +76,50 @@ impl RulDistribution {
     }
 }
 
-/// 5 %, 50 % and 95 % bounds of the gap after more usage, as measured with some variance.
-pub(crate) fn gap_quantiles(
-    fitted: &Posterior,
-    usage: f64,
-    variance_m2: f64,
-    prior: &FleetPrior,
-) -> [f64; 3] {
-    let mut points = Vec::with_capacity(GAUSS_HERMITE_5.len() * fitted.components.len() / 2);
-    let mut add = |component: &Component, grown_m: f64, share: f64| {
-        let sd_m = (fitted.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();
-        let point = |(z, weight): (f64, f64)| {
-            (component.level_m + grown_m + z * sd_m, component.weight * share * weight)
+/// The gaps of all probable components after more usage, as measured with some variance.
+pub(crate) struct GapsAhead {
+    /// Mean and standard deviation, m, and weight.
+    parts: Vec<(f64, f64, f64)>,
+}
+
+impl GapsAhead {
+    pub(crate) fn after(fitted: &Posterior, usage: f64, variance_m2: f64, prior: &FleetPrior) -> Self {
+        let mut parts = Vec::with_capacity(fitted.components.len());
+        let mut add = |component: &Component, grown_m: f64, share: f64| {
+            let sd_m = (fitted.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();
+            parts.push((component.level_m + grown_m, sd_m, component.weight * share));
         };
-        points.extend(GAUSS_HERMITE_5.map(point));
-    };
-    for component in fitted.significant_components() {
-        if component.onset_pending {
-            let rate = prior.span_m / component.ln_life.exp();
-            for wait in prior.onset_wait_quantiles() {
-                add(component, rate * (usage - wait).max(0.0), 1.0 / WAIT_QUANTILES as f64);
+        for component in fitted.significant_components() {
+            if component.onset_pending {
+                let rate = prior.span_m / component.ln_life.exp();
+                for wait in prior.onset_wait_quantiles() {
+                    add(component, rate * (usage - wait).max(0.0), 1.0 / WAIT_QUANTILES as f64);
+                }
+            } else {
+                let grown =
+                    component.law.value(component.age_now + usage) - component.law.value(component.age_now);
+                add(component, component.amplitude_m * grown, 1.0);
             }
-        } else {
-            let grown =
-                component.law.value(component.age_now + usage) - component.law.value(component.age_now);
-            add(component, component.amplitude_m * grown, 1.0);
         }
+        Self { parts }
     }
-    let points = WeightedSamples::new(points.into_iter());
-    [0.05, 0.5, 0.95].map(|share| points.quantile(share))
+
+    /// Their 5 %, 50 % and 95 % quantiles, m.
+    pub(crate) fn quantiles(&self) -> [f64; 3] {
+        let points = self.parts.iter().flat_map(|(mean_m, sd_m, weight)| {
+            GAUSS_HERMITE_5.map(|(z, share)| (mean_m + z * sd_m, weight * share))
+        });
+        let points = WeightedSamples::new(points);
+        [0.05, 0.5, 0.95].map(|share| points.quantile(share))
+    }
+
+    /// The share at or above a gap.
+    pub(crate) fn share_from(&self, gap_m: f64) -> f64 {
+        let (mut above, mut total) = (0.0, 0.0);
+        for (mean_m, sd_m, weight) in &self.parts {
+            above += weight * normal_cdf((mean_m - gap_m) / sd_m.max(f64::MIN_POSITIVE));
+            total += weight;
+        }
+        above / total
+    }
 }

@@ -143,3 +143,55 @@ fn a_repair_is_on_record_whatever_the_number_of_flights_without_a_log() {
     // The level is measured either way.
     assert_eq!(entered(Some(false)), entered(Some(true)));
 }
+
+/// One record between two above the limit: neither is confirmed by the next one.
+#[test]
+fn records_above_the_limit_that_are_not_in_a_row_confirm_nothing() {
+    let ends = [[60.0, 120.0, 60.0, 121.0], [120.0, 60.0, 121.0, 60.0]];
+    for end in ends {
+        let found = state_of(&unit(40, |h| if h > 72.0 { end[(h / 2.0) as usize - 37] } else { 60.0 }), 40);
+        assert!(matches!(found.reason, Reason::Unconfirmed { records: 1, .. }), "{found:?}");
+        assert_eq!((found.state, found.crossing.unwrap().p05_hours), (State::Plan, Some(0.0)));
+    }
+}
+
+/// The worn gap is that of the former life: no chance, rate or date follows from it.
+#[test]
+fn a_renewal_after_the_last_record_ends_the_forecast() {
+    let series = unit(400, |h| 20.0 + 0.09 * h);
+    assert!(state_of(&series, 400).crossing.is_some());
+    let renewal = trend::MaintenanceEvent { utc_us: 400 * DAY_US, renews: true };
+    let found = state_of(&series.with_maintenance(vec![renewal]), 401);
+    assert!(matches!(found.reason, Reason::Renewed { .. }), "{found:?}");
+    assert_eq!((found.crossing, found.over_limit_probability, found.rate), (None, None, None));
+}
+
+/// Rounding of the arithmetic is no scatter.
+#[test]
+fn values_without_scatter_have_their_stated_errors() {
+    let rows = (0..40).map(|day| histories::row(day, DAY_US, 2.0, 60.0 + 0.01 * day as f64, 1.0));
+    let found = state_of(&Series::new(rows).unwrap(), 40);
+    assert!(found.level.unwrap().se_m < 2e-6, "{found:?}");
+}
+
+/// 50 µm per 1,000 h, read in steps of 5 µm.
+#[test]
+fn a_gap_that_is_read_in_steps_is_seen_to_wear() {
+    let gap_um = |day: i64| 25.0 + 0.1 * day as f64 + Random::new(day as u64).normal();
+    let rows = (0..600).map(|day| histories::row(day, DAY_US, 2.0, 5.0 * (gap_um(day) / 5.0).round(), 1.4));
+    let found = state_of(&Series::new(rows).unwrap(), 600);
+    assert!(found.wear == WearStatus::Wearing && found.changes.len() < 2, "{:?}", found.changes);
+    let crossing = found.crossing.unwrap();
+    assert!(crossing.p05_hours < Some(300.0) && crossing.p95_hours > Some(300.0), "{crossing:?}");
+}
+
+/// 20 µm of running in, then 20 µm per 1,000 h.
+#[test]
+fn wear_that_slowed_is_forecast_no_later_than_its_rate_of_late() {
+    for flights in [400, 800] {
+        let gap_um = |h: f64| 50.0 - 20.0 * (-h / 40.0).exp() + 0.02 * h;
+        let found = state_of(&unit(flights, gap_um), flights);
+        let left_hours = (100.0 - gap_um(2.0 * flights as f64)) / 0.02;
+        assert!(found.crossing.unwrap().p05_hours.is_some_and(|hours| hours < left_hours), "{found:?}");
+    }
+}
