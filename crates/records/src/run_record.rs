@@ -32,7 +32,7 @@ stored_row! {
         pub errors: i64,
         /// Logs not processed, because the run has not reached them or was stopped.
         pub not_reached: i64,
-        /// Exit code; none for a run that was killed or is still active.
+        /// Exit code by the logs alone, before `--fail-on` and alerts count; none for a run that was killed or is still active.
         pub exit_code: Option<i64>,
         /// blake3 of the tables whose bookkeeping is in all records; none until the run has ended.
         pub tables_digest: Option<String>,

@@ -15,9 +15,9 @@ pub fn days_after(from: Timestamp, days: f64) -> Option<Timestamp> {
     from.checked_add(SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
-/// A date for readers: `28 Dec`, with its year where it is more than 300 days from the date of its text.
+/// A date for readers: `28 Dec`, with its year where it is more than half a year from the date of its text.
 pub fn day_text(at: Timestamp, today: Timestamp) -> String {
-    let is_near = days_between(today, at).abs() <= 300.0;
+    let is_near = days_between(today, at).abs() <= 183.0;
     at.strftime(if is_near { "%-d %b" } else { "%-d %b %Y" }).to_string()
 }
 

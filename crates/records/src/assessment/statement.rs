@@ -4,8 +4,8 @@ use crate::assessment::trend_row::{ChangePoint, TrendRow};
 
 impl TrendRow {
     /// Why the unit has its state, in a few words: `152.7 of 150.0 µm, over since 6 Nov`,
-    /// `159.1 of 180.0 µm, +49.0 µm/1000 FH`, `fell from 98.0 to 61.0 µm on 7 Oct, not on record`. `reason` has the whole
-    /// reason with its evidence, [`TrendRow::caveats`] what limits the trust in it.
+    /// `159.1 of 180.0 µm, +49.0 µm/1000 FH`, `61.0 of 180.0 µm, fell by 37.0 µm on 7 Oct, not on record`. `reason` has
+    /// the whole reason with its evidence, [`TrendRow::caveats`] what limits the trust in it.
     pub fn why_text(&self) -> String {
         let whole = || self.reason.clone().unwrap_or_default();
         if let Some(removed) = self.removed_utc {
@@ -14,10 +14,8 @@ impl TrendRow {
         }
         match self.reason_code {
             Some("above_limit") => self.of_limit(self.over_since_text()),
-            Some("crosses_soon" | "rises_to_limit" | "at_watch" | "onset") => {
-                self.of_limit(self.growth_text())
-            }
-            Some("jumped" | "changed") => self.change_text().unwrap_or_else(whole),
+            Some("crosses_soon" | "rises_to_limit" | "at_watch") => self.of_limit(self.growth_text()),
+            Some("onset" | "changed") => self.change_text().unwrap_or_else(whole),
             Some("clear") if self.conditions.is_empty() => self.of_limit(self.growth_text()),
             Some("clear") => {
                 let all = self.conditions.join(", ").replace('_', " ");
@@ -31,8 +29,8 @@ impl TrendRow {
     /// known.
     pub fn chance_text(&self) -> Option<String> {
         let state = self.state?;
-        // A hangar check made the state; how the records stand to the limit says nothing of it.
-        if self.reason_code == Some("inspected") {
+        // A hangar check made the state, or records that contradict each other: no forecast says how sure it is.
+        if self.reason_code.is_some_and(|code| matches!(code, "inspected" | "unconfirmed" | "repeated")) {
             return None;
         }
         if state == "act" {
@@ -128,15 +126,12 @@ impl TrendRow {
         let day = self.day(change.departure_utc);
         let cause =
             if change.tail_wide { ", with the other actuators of its tail" } else { ", not on record" };
-        Some(match (change.kind, self.gap_m) {
-            ("onset", _) => format!("{} since {day}", self.of_limit(self.growth_text())),
-            (_, Some(gap_m)) => {
-                let verb = if change.step_m < 0.0 { "fell" } else { "rose" };
-                let before_m = gap_m - change.step_m;
-                format!("{verb} from {:.1} to {:.1} µm on {day}{cause}", 1e6 * before_m, 1e6 * gap_m)
-            }
-            (_, None) => return None,
-        })
+        if change.kind == "onset" {
+            return Some(format!("{} since {day}", self.of_limit(self.growth_text())));
+        }
+        let verb = if change.step_m < 0.0 { "fell" } else { "rose" };
+        let moved = format!("{verb} by {:.1} µm on {day}{cause}", 1e6 * change.step_m.abs());
+        Some(self.of_limit(Some(moved)))
     }
 }
 
@@ -210,7 +205,7 @@ mod tests {
                 Some("5 % by 14 Dec, 50 % by 9 Jan, 95 % by 27 Nov 2027"),
             ),
             (&hours, "159.1 of 180.0 µm, +49.0 µm/1000 FH", Some("5 % within 237 FH")),
-            (&fell, "fell from 196.1 to 159.1 µm on 7 Oct, not on record", Some("certain")),
+            (&fell, "159.1 of 180.0 µm, fell by 37.0 µm on 7 Oct, not on record", Some("certain")),
             (&still, "159.1 of 180.0 µm, steady", None),
             (&row("unassessed", "no_record"), "the whole reason", None),
             (&measured, "the whole reason", None),
