@@ -123,7 +123,7 @@ pub(crate) struct BacktestArgs {
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ReportArgs {
-    /// Write to this folder, in place of a report in it; its other files stay.
+    /// Write to this folder. A report in it is replaced; a folder with other files is refused.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
     #[command(flatten)]

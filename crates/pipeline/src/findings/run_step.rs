@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::findings::alert_changes::{self, Channels};
 use crate::findings::channel;
 use crate::findings::delivery::{self, Attempt, Courier};
-use crate::findings::finding::Finding;
+use crate::findings::finding::{Finding, GAP};
 use crate::findings::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use crate::findings::work_requests::requests;
 use crate::findings::work_update::{self, Tables};
@@ -78,7 +78,15 @@ impl FollowUp<'_> {
             writer.add_work_events(&added)?;
         }
         events.extend(added.iter().cloned());
-        let requests = requests(&events, now);
+        let mut requests = requests(&events, now);
+        let due_of = |finding: &Finding| {
+            (finding.unit.clone(), finding.assessment.as_ref().and_then(|row| row.due_utc))
+        };
+        let due: BTreeMap<_, _> =
+            findings.iter().filter(|finding| finding.quantity == GAP).map(due_of).collect();
+        for request in requests.iter_mut().filter(|request| request.is_open() && request.quantity == GAP) {
+            request.due_utc = due.get(&request.unit()).copied().flatten();
+        }
         let count = |status: &str| requests.iter().filter(|request| request.status == status).count();
         let with = |kinds: &[WorkEventKind]| -> Vec<WorkRequest> {
             let ids = added.iter().filter(|event| kinds.contains(&event.event));

@@ -168,7 +168,8 @@ pub(crate) fn execute_run(
     report.not_reached_logs = ledger.not_reached(&inputs.run_id);
     report.not_reached = report.not_reached_logs.len();
     ledger.add_up(&mut report);
-    report.add_coverage(ledger.accounts(), config, &inputs.installations);
+    let gone = inputs.plan.gone.values().flatten();
+    report.add_coverage(ledger.accounts(), gone, config, &inputs.installations);
     let OwnershipLedger { touched: mut units, renamed, .. } = ledger;
     report.absent = report.absent.saturating_sub(renamed.len());
     let tables = Bookkeeping::new(config, &inputs.installations);

@@ -228,13 +228,17 @@ impl RunSummary {
     pub(crate) fn add_coverage<'a>(
         &mut self,
         accounts: impl Iterator<Item = &'a LogRecord> + Clone,
+        gone: impl Iterator<Item = &'a LogRecord> + Clone,
         config: &Config,
         installations: &'a Installations,
     ) {
         let days = config.document.trend.stale_after_days;
-        self.newest_departure_utc = accounts.clone().filter_map(|account| account.departure_utc).max();
-        self.quiet = quiet(accounts.clone(), installations, days, self.newest_departure_utc);
-        self.quiet_now = quiet(accounts.clone(), installations, days, Some(Timestamp::now())).len();
+        let newest = accounts.clone().filter_map(|account| account.departure_utc).max();
+        self.newest_departure_utc = newest;
+        // Also a log that was deleted or that no pattern matches any more was data.
+        let all = accounts.clone().chain(gone.filter(move |account| account.departure_utc <= newest));
+        self.quiet = quiet(all.clone(), installations, days, self.newest_departure_utc);
+        self.quiet_now = quiet(all, installations, days, Some(Timestamp::now())).len();
         self.notes.extend(coverage::departures_in_another_zone(config, accounts.clone()));
         self.notes.extend(coverage::logs_without_row(config, accounts.clone()));
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);

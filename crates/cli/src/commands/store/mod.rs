@@ -84,7 +84,7 @@ fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
     };
     let last = match (&found.last_completed, age) {
         (Some(run), Some(age)) => {
-            format!("{}, {} ago, exit code {}", run.run_id, span(age), run.exit_code.unwrap_or_default())
+            format!("{}, {} ago, {}", run.run_id, span(age), runs::status_text(runs::run_status(run, false)))
         }
         _ => "no completed run".to_owned(),
     };
