@@ -211,7 +211,10 @@ pub(crate) fn read(
     let departure_utc = departure.ok_or_else(|| missing(IdentityField::DepartureUtc, mapping))?;
     let flight = text(IdentityField::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
-    let of = |fact: IdentityField| move |e: records::ids::IdError| invalid(fact, &"", &e);
+    let of = |fact: IdentityField| {
+        let start = format!("{:.40}…", text(fact).unwrap_or_default());
+        move |e: records::ids::IdError| invalid(fact, &start, &e)
+    };
     let flight = Flight {
         tail_number: TailNumber::new(tail).map_err(of(IdentityField::TailNumber))?,
         flight_id: FlightId::new(flight).map_err(of(IdentityField::FlightId))?,

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use records::{Alias, Installation, Installations};
 
 use crate::error::{Error, bad_table};
-use crate::tables::cell::{name, number, utc};
+use crate::tables::cell::{name, not_negative, utc};
 use crate::tables::column_batches::{ColumnAliases, TableBatch};
 
 /// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
@@ -29,8 +29,8 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
             serial_number: table.required(row, serial, name)?,
             installed_utc: table.required(row, installed, utc)?,
             removed_utc: table.optional(row, removed, removal)?.flatten(),
-            unit_hours_at_install: table.optional(row, unit_hours, number)?,
-            tail_hours_at_install: table.optional(row, tail_hours, number)?,
+            unit_hours_at_install: table.optional(row, unit_hours, not_negative)?,
+            tail_hours_at_install: table.optional(row, tail_hours, not_negative)?,
             today: None,
         })
     })?;

@@ -92,6 +92,14 @@ pub(crate) fn add_external(
         let detail = format!("no gap is {} m wide: give metres, 60e-6 for 60 µm", gaps_m.value(row));
         return Err(chunk.error(row, Some(column), detail));
     }
+    for name in ["gap_se_m", LARGEST_GAP_ERROR] {
+        let column = chunk.find(&[name]);
+        let errors_m = chunk.numbers(column)?;
+        if let Some(row) = chunk.rows().find(|row| at(&errors_m, *row).is_some_and(|se_m| se_m < 0.0)) {
+            let detail = format!("`{}` is below zero: leave an unknown error empty", errors_m.value(row));
+            return Err(chunk.error(row, column, detail));
+        }
+    }
     let other_gap_m = |row, gap_m| flags.get(row).filter(is_flag).map(|_| gap_m);
     add(rows, chunk, by_largest, other_gap_m)
 }

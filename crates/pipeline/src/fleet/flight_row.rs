@@ -144,7 +144,7 @@ impl FlightExtras {
 pub(crate) fn signed_error(gap_se_m: Option<f64>, contradicting_m: Option<(f64, f64)>) -> f64 {
     match contradicting_m {
         Some((gap_m, other_m)) => -gap_se_m.unwrap_or(0.0).hypot(gap_m - other_m),
-        None => gap_se_m.unwrap_or(f64::NAN),
+        None => gap_se_m.map_or(f64::NAN, f64::abs),
     }
 }
 

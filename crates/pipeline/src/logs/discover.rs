@@ -399,6 +399,10 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     // Other files are passed over, so that a broad pattern may match notes and tables too.
     let others = silent.iter().filter_map(|p| local_files::matching(&config.folder, p).ok());
     let what = match others.flat_map(|found| found.paths).find(|path| path.is_file()) {
+        Some(ours) if ours.starts_with(config.store()) => {
+            let ours = log_path(config, &ours);
+            format!("{patterns} matches `{ours}`, but this is in the store: move the store, or the logs")
+        }
         Some(other) => format!("{patterns} matches no Parquet file, but `{}`", log_path(config, &other)),
         None => format!("no log matches {patterns}"),
     };
