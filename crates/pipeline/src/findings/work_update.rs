@@ -9,7 +9,7 @@ use trend::State;
 use crate::findings::finding::Finding;
 use crate::findings::work_requests::{event_of, next_number, requests};
 use crate::fleet::bookkeeping::maintenance_log::MaintenanceLog;
-use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day};
+use crate::fleet::flight_row::{DAY_US, is_day};
 use crate::fleet::histories::{TailPosition, UnitKey};
 
 /// What the tables of the operator hold about units.

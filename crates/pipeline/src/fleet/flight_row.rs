@@ -45,6 +45,13 @@ pub(crate) fn place_number(
     at as u32
 }
 
+pub(crate) const DAY_US: i64 = 86_400_000_000;
+
+/// Whether a time is midnight UTC, as of a date without a time.
+pub(crate) fn is_day(utc_us: i64) -> bool {
+    utc_us % DAY_US == 0
+}
+
 /// A flight, and its secondary columns.
 pub(crate) type StoredFlight = (FlightRow, FlightExtras);
 

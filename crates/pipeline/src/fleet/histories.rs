@@ -4,13 +4,13 @@
 //! trend is made from, and names once for each unit.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use jiff::Timestamp;
 use records::Installation;
 use store::ColumnScan;
 
-use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight};
+use crate::fleet::flight_row::{FlightExtras, FlightRow, StoredFlight, is_day};
 use crate::fleet::unit_rows::{SettingsCounts, UnitRows};
 
 pub use crate::fleet::flight_row::{TailPosition, UnitKey};
@@ -82,6 +82,26 @@ impl History {
                 && installation.covers(flown.departure_utc())
         };
         installations.iter().position(is_here)
+    }
+
+    /// Keeps one record of each flight: a unit is in one position at a time, but has a record under each name of a position that
+    /// was renamed. The record in an installation counts, then one with a gap.
+    pub(crate) fn keep_one_record_a_flight(&mut self, installations: &[&Installation]) {
+        let flight_id = |flown: &FlightRow| self.flight_id(flown).filter(|_| is_day(flown.departure_us()));
+        let flight = |flown: &FlightRow| (flown.departure_us(), flight_id(flown));
+        let order = |flown: &&FlightRow| {
+            let is_elsewhere = self.installation(flown, installations).is_none();
+            (is_elsewhere, flown.gap_m().is_none(), self.place(flown))
+        };
+        let of_flight = self.flights.chunk_by(|a, b| flight(a) == flight(b)).filter(|all| all.len() > 1);
+        let repeated = of_flight.flat_map(|all| {
+            let kept = all.iter().min_by_key(order).map(|kept| kept.row);
+            all.iter().map(|flown| flown.row).filter(move |row| Some(*row) != kept)
+        });
+        let repeated: HashSet<u32> = repeated.collect();
+        let mut flights = self.flights.iter();
+        self.extras.retain(|_| flights.next().is_some_and(|flown| !repeated.contains(&flown.row)));
+        self.flights.retain(|flown| !repeated.contains(&flown.row));
     }
 
     /// The history of a unit's rows; sorted, so that it does not depend on the order of arrival.

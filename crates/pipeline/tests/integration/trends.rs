@@ -8,7 +8,7 @@ use job::Config;
 use pipeline::assess::backtest;
 use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
-use records::{GapRecord, Installation, Installations, TailNumber, TrendRow};
+use records::{GapRecord, Installation, Installations, Position, TailNumber, TrendRow};
 use store::Store;
 
 use crate::fleet::{self, config, day};
@@ -134,6 +134,27 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
         (Some(60.0), Some("unassessed"), Some("check_logs"))
     );
     assert!(rows[4].reason.as_deref().unwrap().starts_with("no sound record for 60 days"), "{:?}", rows[4]);
+}
+
+/// The records under the former name of the position have other settings: 5 µm more.
+#[test]
+fn a_flight_counts_once_after_its_position_was_renamed() {
+    let stay = Installation { position: Position::new("LH").unwrap(), ..installation(3, None) };
+    let installations = Installations::new(vec![stay.clone()]).unwrap();
+    let (mut renamed, mut both) = (Vec::new(), Vec::new());
+    for mut row in flown(200).into_iter().filter(|row| unit(row) == 3) {
+        row.estimate.friction_n = row.estimate.gap_m.map(|gap_m| 1e6 * gap_m);
+        renamed.push(GapRecord { position: stay.position.clone(), ..row.clone() });
+        row.estimate.gap_m = row.estimate.gap_m.map(|gap_m| gap_m + 5e-6);
+        both.extend([row, renamed[renamed.len() - 1].clone()]);
+    }
+    let assess = |rows: &[GapRecord]| {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, ask) = (store(folder.path(), rows), UnitSelection::default());
+        let found = trends::assess_store(&config(), &installations, &store, &ask).unwrap();
+        (found.now[0].flights, found.now[0].rate_m_per_hour, found.followed)
+    };
+    assert_eq!(assess(&both), assess(&renamed));
 }
 
 #[test]

@@ -12,13 +12,6 @@ use crate::fleet::histories::History;
 /// Longest time between the departures of a flight and of its record: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
-pub(crate) const DAY_US: i64 = 86_400_000_000;
-
-/// Whether a time is midnight UTC, as of a date without a time.
-pub(crate) fn is_day(utc_us: i64) -> bool {
-    utc_us % DAY_US == 0
-}
-
 /// Flights of a unit's installations for which it has no row, each with the index of its installation. None if none of
 /// the unit's rows lies in an installation: the table does not describe such a history.
 pub(crate) fn unlogged_flights<'a>(

@@ -11,8 +11,8 @@ use crate::error::Error;
 use crate::fleet::bookkeeping::hour_meter::drop_contradicting;
 use crate::fleet::bookkeeping::inspections::{self, InspectionRow};
 use crate::fleet::bookkeeping::maintenance_log;
-use crate::fleet::bookkeeping::unlogged_flights::{DAY_US, is_day, unlogged_flights};
-use crate::fleet::flight_row::FlightRow;
+use crate::fleet::bookkeeping::unlogged_flights::unlogged_flights;
+use crate::fleet::flight_row::{DAY_US, FlightRow, is_day};
 use crate::fleet::histories::{History, UnitKey};
 
 pub(crate) struct OperatorTables<'a> {
@@ -56,10 +56,13 @@ impl<'a> OperatorTables<'a> {
         }
     }
 
-    /// A unit's flights with their accumulated usage and recorded maintenance.
-    pub(crate) fn series(&self, name: &UnitKey, history: &History) -> Result<Series, Error> {
+    /// A unit's flights with their accumulated usage and recorded maintenance. Flights with several records keep one.
+    pub(crate) fn series(&self, name: &UnitKey, history: &mut History) -> Result<Series, Error> {
         let installations: Vec<&Installation> = self.installations.of_unit(name).collect();
         let installed = if self.is_booked { &installations[..] } else { &[] };
+        if self.is_booked {
+            history.keep_one_record_a_flight(installed);
+        }
         let unlogged = unlogged_flights(self.flights, history, installed);
         let mut observations = observations(history, installed, &unlogged);
         if self.is_booked {
