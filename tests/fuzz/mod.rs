@@ -9,7 +9,7 @@ use ingest::tables::TableBatch;
 use job::Config;
 use pipeline::fleet::bookkeeping::maintenance_log;
 use pipeline::fleet::external_estimates;
-use records::{PartNumber, Status, TailNumber};
+use records::{Installations, PartNumber, Status, TailNumber};
 
 use self::edits::{Choices, edit_text, number};
 use crate::harness::top;
@@ -68,7 +68,7 @@ fn fuzz_maintenance_and_estimates() {
         let mut bytes = choices.pick(&corpus).clone();
         edit_text(choices, &mut bytes, &corpus);
         std::fs::write(&file, bytes).unwrap();
-        let _ = maintenance_log::read(&config).map_err(|e| e.to_string());
+        let _ = maintenance_log::read(&config, &Installations::default()).map_err(|e| e.to_string());
         let _ =
             external_estimates::read(&file, &std::collections::BTreeSet::new()).map_err(|e| e.to_string());
         let _ = TableBatch::read(&file)

@@ -4,8 +4,9 @@
 //! is validated first: a unit cannot be in two positions at once, nor two units in one position.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use crate::ids::{PartNumber, Position, SerialNumber, TailNumber};
@@ -40,6 +41,15 @@ pub struct Alias {
     pub serial_number: SerialNumber,
 }
 
+impl Alias {
+    /// Whether a unit with this serial number, and this part number where it is known, is the former one.
+    fn is_of(&self, part: Option<&str>, serial: &str) -> bool {
+        let is_part = |(former, part): (&PartNumber, &str)| former.as_str() == part;
+        self.former_serial_number.as_str() == serial
+            && self.former_part_number.as_ref().zip(part).is_none_or(is_part)
+    }
+}
+
 impl Installation {
     /// Age of the unit when the tail has `tail_hours` total hours, if the installation records both hours.
     pub fn unit_hours(&self, tail_hours: Option<f64>) -> Option<f64> {
@@ -68,6 +78,9 @@ pub struct Installations {
     rows: Vec<Installation>,
     /// Numbers of the rows by the serial number that the unit has today, the earliest installation first.
     by_serial: Vec<usize>,
+    /// Numbers of the rows whose unit has other numbers today, by the serial number of the row.
+    former: BTreeMap<String, Vec<usize>>,
+    aliases: Vec<Alias>,
 }
 
 impl Installations {
@@ -112,7 +125,11 @@ impl Installations {
     fn indexed(rows: Vec<Installation>) -> Self {
         let mut by_serial: Vec<usize> = (0..rows.len()).collect();
         by_serial.sort_by_key(|&row| (rows[row].unit().1, rows[row].installed_utc));
-        Self { rows, by_serial }
+        let mut former = BTreeMap::<String, Vec<usize>>::new();
+        for (row, stay) in rows.iter().enumerate().filter(|(_, stay)| stay.today.is_some()) {
+            former.entry(stay.serial_number.to_string()).or_default().push(row);
+        }
+        Self { rows, by_serial, former, aliases: Vec::new() }
     }
 
     /// The same with units under the part and serial numbers that they have today.
@@ -122,16 +139,34 @@ impl Installations {
             // Each alias leads to a later name; as many steps as there are aliases end a circle.
             for _ in 0..aliases.len() {
                 let (part, serial) = row.unit();
-                let is_former = |alias: &&Alias| {
-                    alias.former_serial_number == *serial
-                        && alias.former_part_number.as_ref().is_none_or(|former| former == part)
-                };
+                let is_former = |alias: &&Alias| alias.is_of(Some(part.as_str()), serial.as_str());
                 let Some(alias) = aliases.iter().find(is_former) else { break };
                 let part = alias.part_number.clone().unwrap_or_else(|| part.clone());
                 row.today = Some((part, alias.serial_number.clone()));
             }
         }
-        Self::indexed(self.rows)
+        Self { aliases: aliases.to_vec(), ..Self::indexed(self.rows) }
+    }
+
+    /// The unit of today that a table names on a date: that of the latest installation until then under this name, or else of
+    /// the next one, or else of an alias.
+    pub fn unit_today(&self, named: (Option<String>, String), at: Timestamp) -> (Option<String>, String) {
+        let mut unit = named;
+        for _ in 0..=self.aliases.len() {
+            let (part, serial) = (unit.0.as_deref(), unit.1.as_str());
+            let former = self.former.get(serial).into_iter().flatten().map(|&row| &self.rows[row]);
+            let former = former.filter(|row| part.is_none_or(|part| row.part_number.as_str() == part));
+            let order =
+                |row: &&Installation| (row.installed_utc > at, row.installed_utc.duration_since(at).abs());
+            let installed = former.chain(self.of_unit(&unit)).min_by_key(order);
+            if let Some((part, serial)) = installed.map(Installation::unit) {
+                return (unit.0.map(|_| part.to_string()), serial.to_string());
+            }
+            let Some(alias) = self.aliases.iter().find(|alias| alias.is_of(part, serial)) else { break };
+            let part = unit.0.map(|part| alias.part_number.as_ref().map_or(part, ToString::to_string));
+            unit = (part, alias.serial_number.to_string());
+        }
+        unit
     }
 
     /// Two places that one unit has at once by the numbers of today, which aliases made of two units: what is wrong, in words.
@@ -177,6 +212,17 @@ impl Installations {
     /// The installation that a unit is in on a date.
     pub fn installed(&self, unit: &(Option<String>, String), as_of: Timestamp) -> Option<&Installation> {
         self.of_unit(unit).find(|installation| installation.covers(as_of))
+    }
+
+    /// Since when a unit is in the position that it has on a date; a modification that splits its installation ends no stay.
+    pub fn installed_since(&self, unit: &(Option<String>, String), as_of: Timestamp) -> Option<Timestamp> {
+        let first = self.installed(unit, as_of)?;
+        let just_before = first.installed_utc.checked_sub(SignedDuration::from_nanos(1)).ok();
+        let before = just_before.and_then(|at| self.installed(unit, at));
+        match before.filter(|before| place(before) == place(first)) {
+            Some(before) => self.installed_since(unit, before.installed_utc),
+            None => Some(first.installed_utc),
+        }
     }
 
     /// The last installation of a unit that is in none on a date; nothing of a unit without installations before it.
@@ -301,6 +347,13 @@ mod tests {
         let units: Vec<_> =
             table.clone().with_aliases(std::slice::from_ref(&alias)).iter().map(unit).collect();
         assert_eq!(units, [named("B"), named("B"), named("B")]);
+        // C has no installation but by its number of today.
+        let of_c = Alias { former_serial_number: serial("C"), serial_number: serial("A"), ..alias.clone() };
+        let aliased = table.clone().with_aliases(&[of_c, alias.clone()]);
+        for (part, serial) in [("EMA-OLD", "A"), ("EMA", "A"), ("EMA", "B"), ("EMA", "C")] {
+            let unit = aliased.unit_today((Some(part.to_owned()), serial.to_owned()), JAN.parse().unwrap());
+            assert_eq!((unit.0.unwrap(), unit.1), named("B"), "{part} {serial}");
+        }
         // A circle of aliases ends.
         let back = Alias { former_serial_number: serial("B"), serial_number: serial("A"), ..alias.clone() };
         assert_eq!(table.with_aliases(&[alias, back]).iter().count(), 3);

@@ -138,7 +138,8 @@ impl RowSources<'_> {
             caveats: NoColumn(caveats),
             sketch_m: sketched(&gaps_m),
         };
-        let inspection = installed.and_then(|stay| self.latest_inspection(stay));
+        let since = tables.and_then(|tables| tables.installed_since(name, as_of));
+        let inspection = since.and_then(|since| self.latest_inspection(since));
         inspected(row, inspection, history.until(as_of)).with_action(fleet.limits.at_limit(part))
     }
 
@@ -213,12 +214,12 @@ impl RowSources<'_> {
         }
     }
 
-    /// The latest inspection in an installation and after the last renewal.
-    fn latest_inspection(&self, installed: &Installation) -> Option<&InspectionRow> {
+    /// The latest inspection since an installation and after the last renewal.
+    fn latest_inspection(&self, installed_utc: Timestamp) -> Option<&InspectionRow> {
         let done = self.series.maintenance_until(self.as_of.as_microsecond());
         let renewed = done.iter().rev().find(|event| event.renews);
         let renewed = renewed.and_then(|event| Timestamp::from_microsecond(event.utc_us).ok());
-        inspections::latest(&self.fleet.tables.inspections, self.name, installed, renewed, self.as_of)
+        inspections::latest(&self.fleet.tables.inspections, self.name, installed_utc, renewed, self.as_of)
     }
 
     fn change_point(&self, change: &trend::ChangePoint) -> Option<ChangePoint> {

@@ -237,8 +237,11 @@ pub fn assess(
     let stored = || load_histories(&store()?, &config.parts_by_largest_gap());
     let mut histories = histories.map_or_else(stored, Ok)?;
     let days: Vec<Timestamp> = queries.iter().map(|(_, as_of)| *as_of).collect();
-    let selected = queries.iter().map(|(named, _)| unit_of(named, &histories));
-    let selected = selected.collect::<Result<Vec<UnitKey>, Error>>()?;
+    let unit = |(named, as_of): &AsOfQuery| match histories.stored {
+        Some(_) => unit_of(&installations.unit_today(named.clone(), *as_of), &histories),
+        None => unit_of(named, &histories),
+    };
+    let selected = queries.iter().map(unit).collect::<Result<Vec<UnitKey>, Error>>()?;
     // A unit that never flew has an assessment all the same.
     for unit in &selected {
         histories.units.entry(unit.clone()).or_default();

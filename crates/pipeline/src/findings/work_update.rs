@@ -198,10 +198,9 @@ impl<'a> Tables<'a> {
 
     /// The first repair after a date that makes the unit as good as new. A repair without a time counts for its whole
     /// day.
-    fn repair_after(&self, (part, serial): &UnitKey, after: Timestamp) -> Option<Timestamp> {
-        let unit = (part.clone().unwrap_or_default(), serial.clone());
+    fn repair_after(&self, name: &UnitKey, after: Timestamp) -> Option<Timestamp> {
         let whole_day = |us: i64| if is_day(us) { us + DAY_US - 1 } else { us };
-        let repairs = self.maintenance.get(&unit)?.iter().filter(|event| event.renews);
+        let repairs = self.maintenance.get(name)?.iter().filter(|event| event.renews);
         let mut ends = repairs.map(|event| whole_day(event.utc_us));
         let end = ends.find(|us| *us > after.as_microsecond() && *us - DAY_US < self.at.as_microsecond())?;
         Timestamp::from_microsecond(end).ok()

@@ -45,7 +45,7 @@ pub fn compose(
     made_utc: Timestamp,
     program: &str,
 ) -> Result<Report, Error> {
-    let mut checks = inspections::read(config)?;
+    let mut checks = inspections::read(config, installations)?;
     let (accounts, mut logs_known) = (store.accounts()?, BTreeMap::<_, usize>::new());
     accounts.iter().for_each(|log| *logs_known.entry(log.tail_number.clone()).or_default() += 1);
     let failed = accounts.into_iter().filter(|log| log.outcome == LogOutcome::Error);
@@ -66,16 +66,14 @@ pub fn compose(
     let StoreAssessment { now, followed, mapping_faults, notes } = fleet;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     // A report of a past date knows nothing of later inspections.
-    checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));
+    checks.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of));
     let known = |c: &InspectionRow| histories.units.keys().any(|name| c.is_of(name));
-    let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
+    let inspections_unmatched = checks.iter().filter(|c| !known(c)).count();
     let mut requests = by_unit(work_requests::requests(&store.work_events()?, made_utc), WorkRequest::unit);
     let mut tails = tails(&histories, config, as_of_utc);
     // An aircraft whose units flew on others alone has a page too: theirs lead to it.
     now.iter().filter_map(|row| row.tail_number.as_deref()).for_each(|name| _ = entry(&mut tails, name));
-    let checks_known = checks.as_deref().unwrap_or(&[]);
-    let compose =
-        ReportComposer { config, earlier: &earlier, checks: checks_known, installations, by_largest };
+    let compose = ReportComposer { config, earlier: &earlier, checks: &checks, installations, by_largest };
     let mut quantities = quantities(&followed.rows, &histories)?;
     let mut details = histories.stored.as_deref().map(flight_details).transpose()?.unwrap_or_default();
     let unit = |(row, drawn): (TrendRow, &Forecast)| {
@@ -108,7 +106,7 @@ pub fn compose(
         log_errors,
         priors: priors.into_iter().map(prior).collect(),
         tails,
-        inspections_given: checks.is_some(),
+        inspections_given: config.document.logs.inspections.is_some(),
         inspections_unmatched,
         units,
         quantity_changes: followed.changes,

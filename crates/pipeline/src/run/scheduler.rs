@@ -123,8 +123,8 @@ pub(crate) fn execute_run(
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
     refuse_placeholders(config, &installations)?;
-    let inspections = inspections::read(config)?.unwrap_or_default();
-    let maintenance = maintenance_log::read(config)?;
+    let inspections = inspections::read(config, &installations)?;
+    let maintenance = maintenance_log::read(config, &installations)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(context.wait)?;

@@ -8,7 +8,7 @@ use job::Config;
 use pipeline::assess::backtest;
 use pipeline::assess::changes::{Cause, RunFacts, changes};
 use pipeline::assess::trends::{self, UnitSelection};
-use records::{GapRecord, Installation, Installations, Position, TailNumber, TrendRow};
+use records::{GapRecord, Installation, Installations, PartNumber, Position, TailNumber, TrendRow};
 use store::Store;
 
 use crate::fleet::{self, config, day};
@@ -134,6 +134,32 @@ fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
         (Some(60.0), Some("unassessed"), Some("check_logs"))
     );
     assert!(rows[4].reason.as_deref().unwrap().starts_with("no sound record for 60 days"), "{:?}", rows[4]);
+}
+
+/// Before its part number changed, S03 was reshimmed by 12 µm, and was measured above its limit.
+#[test]
+fn maintenance_and_inspections_under_a_former_number_are_those_of_the_unit_today() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, columns: &str, row: String| {
+        let text = format!("part_number,serial_number,{columns}\nOLD,S03,{row}\n");
+        std::fs::write(folder.path().join(name), text).unwrap();
+        Some(folder.path().join(name).display().to_string())
+    };
+    let mut config = config();
+    config.document.logs.maintenance = table("m.csv", "utc,kind", format!("{},reshim", day(100)));
+    config.document.logs.inspections = table("i.csv", "date_utc,play_m", format!("{},1.6e-4", day(140)));
+    let part_number = PartNumber::new("OLD").unwrap();
+    let former = Installation { part_number, ..installation(3, Some(day(150))) };
+    let present = Installation { installed_utc: day(150), ..installation(3, None) };
+    let installations = Installations::new(vec![former, present]).unwrap();
+    let mut rows = flown(200);
+    rows.retain(|row| unit(row) == 3);
+    for gap_m in rows[100..].iter_mut().filter_map(|row| row.estimate.gap_m.as_mut()) {
+        *gap_m -= 12e-6;
+    }
+    let ask = UnitSelection { as_of_utc: Some(day(199)), ..UnitSelection::default() };
+    let row = &assess_rows(&config, &installations, &rows, &ask)[0];
+    assert_eq!((row.reason_code, row.change_points[0].kind), (Some("inspected"), "recorded"), "{row:?}");
 }
 
 /// The records under the former name of the position have other settings: 5 µm more.

@@ -42,7 +42,7 @@ impl Desk {
             }
             ["run", day, states @ ..] => self.run(day, states),
             [kind @ ("repair" | "lubrication"), serial, at] => {
-                let unit = ("EMA".to_owned(), (*serial).to_owned());
+                let unit = (Some("EMA".to_owned()), (*serial).to_owned());
                 let event = MaintenanceEvent { utc_us: utc(at).as_microsecond(), renews: *kind == "repair" };
                 self.maintenance.entry(unit).or_default().push(event);
                 Vec::new()

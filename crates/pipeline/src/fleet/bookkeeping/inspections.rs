@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use job::Config;
 use job::config::limits::PLAUSIBLE_LIMIT_M;
 use records::time::days_between;
-use records::{Installation, SerialNumber};
+use records::{Installations, SerialNumber};
 
 use crate::error::Error;
 use crate::fleet::bookkeeping::dates_ahead::DateAhead;
@@ -23,8 +23,8 @@ const CONTRADICTION: (f64, f64) = (0.3, 30e-6);
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InspectionRow {
-    pub(crate) part_number: Option<String>,
-    pub(crate) serial_number: String,
+    /// Part, where it is stated, and serial number that the unit has today.
+    pub(crate) unit: UnitKey,
     pub(crate) date_utc: Timestamp,
     pub(crate) play_m: f64,
     pub(crate) instrument: Option<String>,
@@ -33,11 +33,11 @@ pub(crate) struct InspectionRow {
 
 impl InspectionRow {
     pub(crate) fn is_of(&self, unit: &UnitKey) -> bool {
-        self.serial_number == unit.1 && (self.part_number.is_none() || self.part_number == unit.0)
+        self.unit.1 == unit.1 && (self.unit.0.is_none() || self.unit.0 == unit.0)
     }
 
     pub(crate) fn date(&self) -> DateAhead {
-        DateAhead::new(self.part_number.clone(), self.serial_number.clone(), "date_utc", self.date_utc)
+        DateAhead::new(self.unit.0.clone(), self.unit.1.clone(), "date_utc", self.date_utc)
     }
 
     /// Median of the last estimates before it, m, and their number.
@@ -70,17 +70,17 @@ impl InspectionRow {
     }
 }
 
-/// The latest of some inspections of a unit until a date, in the installation that it is in then and after its last renewal.
+/// The latest of some inspections of a unit until a date, since its installation in its position then and after its last renewal.
 pub(crate) fn latest<'i>(
     inspections: &'i [InspectionRow],
     unit: &UnitKey,
-    installed: &Installation,
+    installed_utc: Timestamp,
     renewed: Option<Timestamp>,
     as_of: Timestamp,
 ) -> Option<&'i InspectionRow> {
     let is_of_now = |inspection: &&InspectionRow| {
         inspection.is_of(unit)
-            && (installed.installed_utc..=as_of).contains(&inspection.date_utc)
+            && (installed_utc..=as_of).contains(&inspection.date_utc)
             && renewed.is_none_or(|renewed| renewed < inspection.date_utc)
     };
     // Of several at one time, the largest play counts, whatever the order of the rows.
@@ -119,9 +119,12 @@ fn plausible_play(text: &str) -> Result<f64, String> {
     Err(format!("`{text}` is not between {least} and {most} m: 64 µm are 64e-6"))
 }
 
+/// The configured inspections; none without a table.
+///
+/// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be right.
-pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
-    let Some(file) = &config.document.logs.inspections else { return Ok(None) };
+pub(crate) fn read(config: &Config, installations: &Installations) -> Result<Vec<InspectionRow>, Error> {
+    let Some(file) = &config.document.logs.inspections else { return Ok(Vec::new()) };
     let table = TableBatch::read(&config.path(file))?;
     let serial = table.column(&["serial_number", "serial"])?;
     let date = table.column(&["date_utc", "date"])?;
@@ -130,14 +133,15 @@ pub(crate) fn read(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error>
         ["part_number", "instrument", "force_n"].map(|column| table.find(&[column]));
     let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
     let check = |row| {
+        let serial = table.required(row, serial, name::<SerialNumber>)?.to_string();
+        let date_utc = table.required(row, date, utc)?;
         Ok(InspectionRow {
-            part_number: text(row, part),
-            serial_number: table.required(row, serial, name::<SerialNumber>)?.to_string(),
-            date_utc: table.required(row, date, utc)?,
+            unit: installations.unit_today((text(row, part), serial), date_utc),
+            date_utc,
             play_m: table.required(row, play, plausible_play)?,
             instrument: text(row, instrument),
             force_n: table.optional(row, force, number)?,
         })
     };
-    table.rows().map(check).collect::<Result<Vec<_>, Error>>().map(Some)
+    table.rows().map(check).collect()
 }

@@ -12,16 +12,17 @@ use trend::MaintenanceEvent;
 use crate::error::Error;
 use crate::fleet::bookkeeping::dates_ahead::DateAhead;
 use crate::fleet::bookkeeping::inspections::InspectionRow;
+use crate::fleet::histories::UnitKey;
 
-/// Entries by part and serial number.
-pub type MaintenanceLog = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
+/// Entries by the part and serial number that the unit has today.
+pub type MaintenanceLog = BTreeMap<UnitKey, Vec<MaintenanceEvent>>;
 
 /// Reads the configured maintenance table; empty where none is configured. Its columns are `part_number`, `serial_number`,
 /// `utc` and `kind` (`reshim`, `rerig`, `overhaul` or `lubrication`); CSV or Parquet.
 ///
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
-pub fn read(config: &Config) -> Result<MaintenanceLog, Error> {
+pub fn read(config: &Config, installations: &Installations) -> Result<MaintenanceLog, Error> {
     let mut maintenance = MaintenanceLog::new();
     let Some(file) = &config.document.logs.maintenance else { return Ok(maintenance) };
     let table = TableBatch::read(&config.path(file))?;
@@ -29,13 +30,12 @@ pub fn read(config: &Config) -> Result<MaintenanceLog, Error> {
     let (part, serial) = (column("part_number")?, column("serial_number")?);
     let (done, kind) = (column("utc")?, column("kind")?);
     for row in table.rows() {
-        let unit = (
-            table.required(row, part, name::<PartNumber>)?.to_string(),
-            table.required(row, serial, name::<SerialNumber>)?.to_string(),
-        );
-        let utc_us = table.required(row, done, utc)?.as_microsecond();
-        let renews = table.required(row, kind, renews)?;
-        maintenance.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
+        let part = table.required(row, part, name::<PartNumber>)?.to_string();
+        let serial = table.required(row, serial, name::<SerialNumber>)?.to_string();
+        let done = table.required(row, done, utc)?;
+        let event =
+            MaintenanceEvent { utc_us: done.as_microsecond(), renews: table.required(row, kind, renews)? };
+        maintenance.entry(installations.unit_today((Some(part), serial), done)).or_default().push(event);
     }
     Ok(maintenance)
 }
@@ -44,7 +44,7 @@ pub(crate) fn dates(log: &MaintenanceLog) -> impl Iterator<Item = DateAhead> {
     log.iter().flat_map(|((part, serial), events)| {
         events.iter().filter_map(|event| {
             let done = Timestamp::from_microsecond(event.utc_us).ok()?;
-            Some(DateAhead::new(Some(part.clone()), serial.clone(), "utc", done))
+            Some(DateAhead::new(part.clone(), serial.clone(), "utc", done))
         })
     })
 }
@@ -66,22 +66,14 @@ pub(crate) fn unknown_units(
     maintenance: &MaintenanceLog,
     inspections: &[InspectionRow],
 ) -> Vec<UnknownUnit> {
-    let known: BTreeSet<(&str, &str)> =
-        installations.iter().map(|i| (i.part_number.as_str(), i.serial_number.as_str())).collect();
-    let serials: BTreeSet<&str> = known.iter().map(|(_, serial)| *serial).collect();
-    let is_unknown = |(_, part, serial): &(&Option<String>, Option<&str>, &str)| {
-        part.map_or(!serials.contains(serial), |part| !known.contains(&(part, serial)))
-    };
+    let is_unknown = |(_, unit): &(_, &UnitKey)| installations.of_unit(unit).next().is_none();
     let logs = &config.document.logs;
-    let maintained =
-        maintenance.keys().map(|(part, serial)| (&logs.maintenance, Some(part.as_str()), serial.as_str()));
-    let inspected = inspections
-        .iter()
-        .map(|row| (&logs.inspections, row.part_number.as_deref(), row.serial_number.as_str()));
-    let unit = |(table, part, serial): (&Option<String>, Option<&str>, &str)| UnknownUnit {
+    let maintained = maintenance.keys().map(|unit| (&logs.maintenance, unit));
+    let inspected = inspections.iter().map(|row| (&logs.inspections, &row.unit));
+    let unit = |(table, (part, serial)): (&Option<String>, &UnitKey)| UnknownUnit {
         table: table.clone().unwrap_or_default(),
-        part_number: part.map(str::to_owned),
-        serial_number: serial.to_owned(),
+        part_number: part.clone(),
+        serial_number: serial.clone(),
     };
     let units: BTreeSet<UnknownUnit> = maintained.chain(inspected).filter(is_unknown).map(unit).collect();
     units.into_iter().collect()

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use ingest::Flights;
+use jiff::Timestamp;
 use job::Config;
 use records::{Installation, Installations};
 use trend::{Observation, Series, UsageSource};
@@ -31,10 +32,10 @@ impl<'a> OperatorTables<'a> {
         is_booked: bool,
     ) -> Result<Self, Error> {
         Ok(Self {
-            maintenance: maintenance_log::read(config)?,
+            maintenance: maintenance_log::read(config, installations)?,
             flights: &config.flights,
             installations,
-            inspections: if is_booked { inspections::read(config)?.unwrap_or_default() } else { Vec::new() },
+            inspections: if is_booked { inspections::read(config, installations)? } else { Vec::new() },
             is_booked,
         })
     }
@@ -58,6 +59,9 @@ impl<'a> OperatorTables<'a> {
 
     /// A unit's flights with their accumulated usage and recorded maintenance. Flights with several records keep one.
     pub(crate) fn series(&self, name: &UnitKey, history: &mut History) -> Result<Series, Error> {
+        // Estimates made elsewhere may still have the former name of a unit.
+        let today = (!self.is_booked).then(|| self.installations.unit_today(name.clone(), Timestamp::MAX));
+        let name = today.as_ref().unwrap_or(name);
         let installations: Vec<&Installation> = self.installations.of_unit(name).collect();
         let installed = if self.is_booked { &installations[..] } else { &[] };
         if self.is_booked {
@@ -74,8 +78,7 @@ impl<'a> OperatorTables<'a> {
         series.source = self.source(history);
         series.faults.meter_readings = dropped;
         // The maintenance table has no rows of a unit without a part number.
-        let unit = name.0.clone().map(|part| (part, name.1.clone()));
-        let mut events = unit.and_then(|unit| self.maintenance.get(&unit).cloned()).unwrap_or_default();
+        let mut events = self.maintenance.get(name).cloned().unwrap_or_default();
         // Maintenance with a date alone counts as done after the last flight of that day.
         for event in events.iter_mut().filter(|event| is_day(event.utc_us)) {
             let of_day = series.flights_until(event.utc_us + DAY_US - 1);
