@@ -103,9 +103,9 @@ impl KnownNames {
                 let stored = store.as_ref().and_then(|store| store.distinct(column).ok());
                 let installed = installations.iter().filter_map(|stay| match column {
                     "tail_number" => Some(stay.tail_number.to_string()),
-                    "serial_number" => Some(stay.serial_number.to_string()),
+                    "serial_number" => Some(stay.unit().1.to_string()),
                     "position" => Some(stay.position.to_string()),
-                    "part_number" => Some(stay.part_number.to_string()),
+                    "part_number" => Some(stay.unit().0.to_string()),
                     _ => None,
                 });
                 stored.unwrap_or_default().into_iter().chain(installed).collect()
@@ -129,7 +129,12 @@ impl KnownNames {
         let what = columns.iter().map(|column| called(column)).collect::<Vec<_>>().join(", ");
         let what =
             what.rsplit_once(", ").map_or(what.clone(), |(others, last)| format!("{others} or {last}"));
+        let today = match self {
+            Self::Store(_, table) => table.unit_today((None, name.to_owned()), Timestamp::MAX).1,
+            Self::Estimates(..) => name.to_owned(),
+        };
         let hint = match nearest(name, known.iter().map(String::as_str)) {
+            _ if today != name => format!("the serial number of this unit today is `{today}`"),
             Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
             None => format!("list all units of {} with `{}`", self.place(), self.listing()),
         };

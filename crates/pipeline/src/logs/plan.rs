@@ -48,7 +48,7 @@ impl Request {
         let flew = |serial: &SerialNumber| {
             installations
                 .units_on_tail(&flight.tail_number, at)
-                .any(|installation| installation.serial_number == *serial)
+                .any(|installation| installation.unit().1 == serial)
         };
         self.since_utc.is_none_or(|since| since <= at)
             && self.until_utc.is_none_or(|until| at < until)
