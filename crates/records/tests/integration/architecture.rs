@@ -57,7 +57,7 @@ fn a_folder_holds_at_most_a_dozen_files() {
     }
 }
 
-pub(crate) fn root() -> PathBuf {
+fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
@@ -78,7 +78,7 @@ fn crates() -> BTreeMap<String, BTreeSet<String>> {
     packages.collect()
 }
 
-pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
+fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -4,4 +4,3 @@
 
 mod architecture;
 mod columns_page;
-mod outbound;
