@@ -266,9 +266,8 @@ fn a_sweep_against_a_spring_shows_its_gap() {
     for seed in 0..24 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut noise_m = || 2e-6 * random.random_range(-1.7..1.7);
-        let motor_m: Vec<f64> = (0..90 * 125)
-            .map(|k| 4e-3 * (std::f64::consts::TAU * 0.05 * f64::from(k) / 125.0).sin())
-            .collect();
+        let motor_m: Vec<f64> =
+            (0..90 * 125).map(|k| 4e-3 * (TAU * 0.05 * f64::from(k) / 125.0).sin()).collect();
         let load_n: Vec<f64> = motor_m.iter().map(|x_m| 4e5 * x_m).collect();
         let dx_m: Vec<f64> = load_n.iter().map(|n| 108e-6 * n.signum() + n / 5e7 + noise_m()).collect();
         // A sweep may be refused.
@@ -543,8 +542,7 @@ fn a_bench_shows_gap_and_loop_and_how_far_they_change() {
 #[test]
 fn the_loop_of_a_slow_bench_is_its_gap() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
-    let motor_m: Vec<f64> =
-        (0..120 * 50).map(|k| 3e-4 * (std::f64::consts::TAU * 0.1 * f64::from(k) / 50.0).sin()).collect();
+    let motor_m: Vec<f64> = (0..120 * 50).map(|k| 3e-4 * (TAU * 0.1 * f64::from(k) / 50.0).sin()).collect();
     let pressed_n = |x_m: f64| -5e7 * (x_m - x_m.clamp(-58e-6, 58e-6));
     let load_n: Vec<f64> = motor_m.iter().map(|x| pressed_n(*x) + random.random_range(-30.0..30.0)).collect();
     let dx_m: Vec<f64> = motor_m.iter().map(|x| -x).collect();
@@ -721,7 +719,7 @@ fn under_load(load_n: impl Fn(f64) -> f64) -> ContactOutcome {
     let (mut motor_m, mut dx_m, mut logged_n) = (Vec::new(), Vec::new(), Vec::new());
     for t in (0..90 * 125).map(|k| f64::from(k) / 125.0) {
         let load = load_n(t);
-        motor_m.push(0.02 * (std::f64::consts::TAU * 0.11 * t).sin() + 1e-6 * random.random_range(-1.0..1.0));
+        motor_m.push(0.02 * (TAU * 0.11 * t).sin() + 1e-6 * random.random_range(-1.0..1.0));
         dx_m.push(50e-6 * load.signum() + load / 5e7 + 3e-6 * random.random_range(-1.0..1.0));
         logged_n.push(load + 40.0 * random.random_range(-1.0..1.0));
     }
@@ -732,7 +730,7 @@ fn under_load(load_n: impl Fn(f64) -> f64) -> ContactOutcome {
 /// them always, gap and wind-up add up to one travel.
 #[test]
 fn held_loads_are_not_taken_for_clipped_ones() {
-    let wave = |t: f64| 3.0 * (std::f64::consts::TAU * 0.25 * t).sin();
+    let wave = |t: f64| 3.0 * (TAU * 0.25 * t).sin();
     let found = under_load(|t| 6000.0 * wave(t).clamp(-1.0, 1.0)).unwrap();
     assert!((found.gap_m - 100e-6).abs() < 1e-6, "{found:?}");
     assert_eq!(under_load(|t| 6000.0 * wave(t).signum()), Err(Rejection::LoadHeld));
@@ -742,7 +740,7 @@ fn held_loads_are_not_taken_for_clipped_ones() {
 #[test]
 fn a_load_that_oscillates_near_the_sample_rate_is_sampled_too_slowly() {
     for share in [0.2, 0.27, 0.33, 0.4, 0.48] {
-        let found = under_load(|t| 6000.0 * (std::f64::consts::TAU * share * 125.0 * t + 0.3).sin());
+        let found = under_load(|t| 6000.0 * (TAU * share * 125.0 * t + 0.3).sin());
         assert_eq!(found, Err(Rejection::RateTooLow), "{share} of the rate");
     }
 }
