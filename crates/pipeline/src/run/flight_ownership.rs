@@ -369,9 +369,13 @@ impl<'a> OwnershipLedger<'a> {
             return Ok(Default::default());
         }
         let new: Vec<HeldRecord> = records.iter().map(HeldRecord::of).collect();
-        let mut held = writer.held(&keys)?;
-        held.retain(|_, stored| new.iter().any(|new| stored.is_same_as(new)));
         let gone: HashMap<&String, &LogRecord> = gone.map(|log| (&log.log_path, log)).collect();
+        let mut held = writer.held(&keys)?;
+        // The records of another log that is still there are its own: this one was a copy of it.
+        held.retain(|_, stored| {
+            (stored.log_path == account.log_path || gone.contains_key(&stored.log_path))
+                && new.iter().any(|new| stored.is_same_as(new))
+        });
         let (of_gone, own): (Vec<_>, Vec<_>) =
             held.into_iter().partition(|(_, stored)| gone.contains_key(&stored.log_path));
         let of_gone = of_gone.into_iter().map(|(key, stored)| (key, stored, account.log_path.as_str()));
